@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "palpate/core/mesh.hpp"
+
+namespace palpate {
+
+struct Verdict {
+  std::string code;     ///< stable, e.g. "nu_not_determined"
+  std::string message;  ///< plain words: what it means and what to do
+};
+
+/// value = posterior median, interval = equal-tailed quantiles; force scale and discretisation error included.
+struct Parameter {
+  std::string name;    ///< young_modulus, poisson_ratio, alpha, ...
+  std::string region;  ///< empty = whole object
+  std::string unit;
+  double value = 0, std = 0, lower_95 = 0, upper_95 = 0;
+  bool determined = true;  ///< false: the data say little more than the prior
+};
+
+struct Nuisance {
+  std::string name;
+  std::string unit;
+  double value = 0, std = 0, lower_95 = 0, upper_95 = 0;
+  double prior_std = 0;
+  double pull = 0;  ///< (value - prior mean) / prior standard deviation
+};
+
+enum class Termination { converged, max_iterations, cancelled, no_progress, failed };
+
+struct FitSummary {
+  double rms_m = 0;
+  double chi2_per_dof = 0;
+  std::size_t points_used = 0;
+  std::size_t pushes = 0;
+  std::size_t steps = 0;
+  int iterations = 0;
+  int solves = 0;  ///< static equilibria that were solved
+};
+
+struct HeldOut {
+  bool available = false;
+  std::string what;              ///< "push 3" or "last step"
+  double force_error = 0;        ///< relative, of the predicted force (NaN = not predicted)
+  double surface_rms_m = 0;      ///< predicted surface against the observed one
+  double baseline_no_deformation_rms_m = 0;
+  double baseline_last_step_rms_m = 0;
+};
+
+/// What one input's uncertainty does to the answer.
+struct BudgetEntry {
+  std::string input;
+  double young_modulus_percent = 0;
+  double poisson_shift = 0;
+};
+
+/// Everything a figure needs of one step: the simulated and the observed surface at the optimum.
+struct StepFit {
+  std::string push;
+  int step = 0;
+  Points surface_m;            ///< deformed vertices of Identification::surface (base frame)
+  Points observed_m;           ///< observed points (base frame, at the fitted pose)
+  VectorX residual_m;          ///< per observed point, signed
+  Vec3 force_n = Vec3::Zero();
+  Vec3 contact_m = Vec3::Zero();
+  double travel_m = 0, travel_predicted_m = 0;
+  double force_measured_n = 0, force_predicted_n = 0, force_predicted_std_n = 0;
+  bool used = true;
+};
+
+struct PosteriorGrid {
+  VectorX young_modulus_pa;  ///< one axis (log spaced)
+  VectorX poisson_ratio;     ///< other axis
+  MatrixX density;           ///< rows = E, cols = nu, integrates to one over (log E, nu)
+};
+
+struct Identification {
+  std::string method = "palpate";  ///< or "paper"
+  std::string material;
+  std::vector<Parameter> parameters;
+  std::vector<Nuisance> nuisances;
+  MatrixX covariance;  ///< of (log E, nu, ...) in the order of `parameters`
+  std::vector<Verdict> verdicts;
+  FitSummary fit;
+  HeldOut prediction;
+  std::vector<BudgetEntry> budget;
+  std::vector<Parameter> per_push;  ///< young_modulus of each push alone (region = push name)
+  Termination termination = Termination::failed;
+  std::string message = "identify() was not called.";
+  std::map<std::string, std::string> provenance;
+  std::map<std::string, double> timing_s;
+  TriMesh surface;  ///< rest surface that `steps` deform
+  std::vector<StepFit> steps;
+  PosteriorGrid posterior;
+};
+
+}  // namespace palpate

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot recorded, whatever file it came from. docs/recording-format.md says how it looks on disk; docs/conventions.md
+// defines every frame and sign. Forces are those of the tool on the object, in the base frame, at the tip.
+#pragma once
+
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "palpate/core/mesh.hpp"
+
+namespace palpate {
+
+enum class DistortionModel { none, plumb_bob, rational, fisheye };
+
+/// Pinhole camera, pixel centres at whole numbers, z forward, x right, y down.
+struct Camera {
+  int width_px = 0, height_px = 0;
+  double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
+  DistortionModel distortion = DistortionModel::none;
+  std::vector<double> distortion_coefficients;
+};
+
+/// Standard deviation of a depth sensor along the optical axis: a row of the table in `sensing` (by name) or `constant`.
+struct DepthNoise {
+  std::string model = "constant";
+  double sigma_m = std::numeric_limits<double>::quiet_NaN();  ///< of `constant`; NaN = not given
+  double bias_std_m = 0.0;  ///< prior of one common depth offset a push (0 = none)
+};
+
+struct DepthFrame {
+  double time_s = 0;
+  Camera camera;
+  Pose T_base_camera = Pose::Identity();
+  double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the camera's pose, per frame
+  DepthImage depth_m;
+  MaskImage mask;  ///< empty, or 1 where a pixel is invalid (robot, table, ...)
+  DepthNoise noise;
+};
+
+struct PointCloud {
+  Points points_m;
+  Points normals;    ///< 0 x 3 where unknown
+  VectorX sigma_m;   ///< size 1 (common) or N: standard deviation per axis
+  double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the cloud's pose, per frame
+};
+
+/// Depth measurements as rays, what the likelihood along the camera ray works on.
+struct RayCloud {
+  Points origins_m;
+  Points directions;  ///< unit length
+  VectorX range_m;
+  VectorX sigma_m;    ///< along the ray
+  Eigen::Matrix<Index, Eigen::Dynamic, 2, Eigen::RowMajor> pixel;
+};
+
+/// Markers attached rigidly to the nearest patch of the surface; they may stand off it.
+struct Markers {
+  std::vector<std::string> names;
+  Points rest_m;                  ///< position in the object's rest frame; NaN rows where unknown
+  Points observed_m;              ///< base frame; NaN rows where hidden
+  double sigma_m = std::numeric_limits<double>::quiet_NaN();  ///< of one observation, per axis
+  double rest_std_m = 0.0;        ///< prior on each rest position, per axis, shared by all steps
+};
+
+struct ToolTravel {
+  double travel_m = 0;  ///< along the tool's direction, into the object positive, from first contact
+  double sigma_m = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Of the tool on the object, base frame, at the tip.
+struct Wrench {
+  double time_s = 0;
+  Vec3 force_n = Vec3::Zero();
+  Vec3 torque_nm = Vec3::Zero();
+  double force_sigma_n = std::numeric_limits<double>::quiet_NaN();
+  double torque_sigma_nm = std::numeric_limits<double>::quiet_NaN();
+  bool has_torque = false;
+};
+
+using Observation = std::variant<DepthFrame, PointCloud, Markers, ToolTravel, Wrench>;
+
+enum class ToolShape { vertices, sphere, disc, capsule, edge, mesh, platen };
+
+struct Tool {
+  std::string name;
+  ToolShape shape = ToolShape::sphere;
+  double radius_m = 0;
+  double length_m = 0;
+  std::optional<TriMesh> mesh;
+  std::vector<Index> vertices;  ///< ToolShape::vertices: 0-based nodes that the force is spread over equally
+  Plane plane;                  ///< ToolShape::platen: its face at rest, normal = direction into the object
+  ContactLaw contact = ContactLaw::bonded;
+  double friction_coefficient = 0;
+  double compliance_m_per_n = 0;  ///< of stick and arm between encoder and tip
+};
+
+/// What acts on the object in one step. Either the force is imposed (measured) or the motion is.
+struct Load {
+  std::string tool;                  ///< name in Recording::tools
+  std::optional<Vec3> force_n;       ///< resultant on the object, base frame
+  double force_std_n = 0;            ///< absolute part of its prior standard deviation, per axis
+  double force_relative_std = 0;     ///< relative part, independent from step to step (0.02 = 2 %)
+  std::optional<double> travel_m;    ///< motion imposed along the tool's direction (platen: its plane normal)
+  Vec3 contact_m = Vec3::Zero();     ///< contact point on the rest surface (tools that are not `vertices` or `platen`)
+  Vec3 direction = -Vec3::UnitZ();   ///< unit vector of the push, into the object
+  double contact_std_m = 0;          ///< prior on the contact point, tangential
+};
+
+struct Step {
+  double time_s = 0;
+  std::vector<Load> loads;           ///< empty or all zero = an unloaded step, a step like any other
+  std::optional<Pose> T_base_tip;
+  std::vector<double> joints_rad;
+  std::vector<Observation> observations;
+  bool unloading = false;            ///< recorded while the tool was going back
+  std::string source;                ///< file and line, for messages
+};
+
+struct Push {
+  std::string name;
+  std::string site;                  ///< e.g. "head"; empty = one site
+  std::vector<Step> steps;
+};
+
+struct Environment {
+  Vec3 gravity_m_s2 = Vec3::Zero();
+  std::vector<Plane> planes;         ///< table and walls
+};
+
+/// A table row of the room `fem`, with values where they are known beforehand.
+struct Material {
+  std::string name = "linear";
+  std::map<std::string, double> parameters;  ///< young_modulus [Pa], poisson_ratio [-], alpha [-], density [kg/m3]
+};
+
+struct ModelDefaults {
+  std::string mesh = "auto";      ///< as_given | remeshed | auto
+  std::string element = "auto";   ///< tet4 | tet10 | auto
+  std::string refine = "auto";    ///< none | auto
+  std::string material = "neo_hookean";
+  double poisson_lower = 0.0, poisson_upper = 0.4995;  ///< uniform prior
+  std::optional<double> poisson_fixed;
+};
+
+/// Where the object came from: exactly one of the three.
+struct Rest {
+  std::optional<TetMesh> volume;
+  std::optional<TriMesh> surface;
+  std::vector<DepthFrame> views;
+  RestState state = RestState::stress_free;
+  double surface_std_m = 0;            ///< slow error of the rest surface (correlated)
+  double surface_correlation_m = 0.04;
+  std::optional<Triangles> observed_triangles;  ///< the part of the boundary that sensors saw, by node index
+};
+
+/// One link of a URDF with its shapes; the room `sensing` poses it.
+struct RobotShape {
+  enum class Kind { mesh, box, cylinder, sphere } kind = Kind::mesh;
+  Pose T_link_shape = Pose::Identity();
+  TriMesh mesh;            ///< Kind::mesh
+  Vec3 size_m = Vec3::Zero();  ///< box: edges; cylinder: radius, length; sphere: radius
+};
+struct RobotLink {
+  std::string name;
+  std::vector<RobotShape> visual, collision;
+};
+struct RobotJoint {
+  enum class Kind { revolute, continuous, prismatic, fixed } kind = Kind::fixed;
+  std::string name, parent, child;
+  Pose T_parent_joint = Pose::Identity();
+  Vec3 axis = Vec3::UnitX();
+  double lower = 0, upper = 0, velocity = 0;
+  std::string mimic;                 ///< empty = none
+  double mimic_multiplier = 1, mimic_offset = 0;
+};
+struct RobotModel {
+  std::string name;
+  std::vector<RobotLink> links;
+  std::vector<RobotJoint> joints;
+};
+
+struct Recording {
+  std::string name;
+  std::optional<RobotModel> robot;
+  std::vector<Tool> tools;
+  Environment environment;
+  Rest rest;
+  std::vector<Support> supports;
+  bool free = false;                   ///< `supports: free`
+  double density_kg_m3 = 0;            ///< 0 = unknown and not needed
+  double density_std_kg_m3 = 0;
+  double force_scale_std = 0;          ///< prior of the sensor's common scale error (0.01 = 1 %)
+  ModelDefaults model;
+  std::vector<Push> pushes;
+  std::string source;                  ///< path it was read from
+  std::map<std::string, std::string> input_hashes;  ///< file -> SHA-256, for the provenance
+  std::vector<std::string> warnings;
+};
+
+}  // namespace palpate

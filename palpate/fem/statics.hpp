@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Static equilibrium of one body under loads and motions that are linear in a few coefficients:
+//
+//   f_int(u; E, nu) = F a          on free degrees of freedom
+//   u               = M b          on prescribed ones
+//
+// F holds nodal forces per unit coefficient (one column: unit force along x on a patch, unit density times gravity, ...), M
+// nodal displacements per unit coefficient (platen travel). Everything that an estimator wants to know about forces
+// (scale, tare, direction, density, tilt of gravity) is then a coefficient, and its sensitivity one more back-substitution.
+#pragma once
+
+#include <Eigen/SparseCore>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "palpate/core/math.hpp"
+#include "palpate/core/mesh.hpp"
+
+namespace palpate::fem {
+
+/// Prescribed directions of one node: `axes` columns 0..count-1 are orthonormal directions whose displacement is prescribed
+/// (count 3: clamped; 1: sliding on a plane with that normal).
+struct Constraint {
+  Index node = 0;
+  Mat3 axes = Mat3::Identity();
+  int count = 3;
+};
+
+struct Boundary {
+  std::vector<Constraint> constraints;        ///< at most one a node
+  Eigen::SparseMatrix<double> forces;         ///< 3n x k, newton per unit coefficient
+  Eigen::SparseMatrix<double> motions;        ///< 3n x m, metres per unit coefficient, non-zero on constrained nodes only
+  bool inertia_relief = false;                ///< free object: rigid motions projected out, no constraints
+};
+
+struct StaticsOptions {
+  double residual_tolerance = 1e-9;  ///< on free dofs, relative to the largest of external and internal force norms
+  int max_newton_steps = 60;
+  int max_load_steps = 400;          ///< in the continuation that is started when plain Newton fails
+  int threads = 1;
+};
+
+/// A state of the body. `converged` false is a result, not an exception; `reason` says why in plain words.
+struct Equilibrium {
+  VectorX displacement_m;            ///< 3n, node-major (x0 y0 z0 x1 ...)
+  double young_modulus_pa = 0, poisson_ratio = 0;
+  VectorX force_coefficients, motion_coefficients;
+  VectorX motion_reaction;           ///< m: work-conjugate to the motion coefficients, M' (f_int - F a), newton
+  bool converged = false;
+  std::string reason;
+  int newton_steps = 0;
+  int factorisations = 0;
+  int inverted_elements = 0;
+  double residual = 0;               ///< relative, as in StaticsOptions
+};
+
+/// Exact derivatives from the tangent's factor at the equilibrium (implicit function theorem).
+struct Sensitivity {
+  VectorX d_log_young;               ///< 3n: du / d log E
+  VectorX d_poisson;                 ///< 3n: du / d nu
+  MatrixX d_force;                   ///< 3n x k: du / d a
+  MatrixX d_motion;                  ///< 3n x m: du / d b
+  VectorX reaction_d_log_young;      ///< m
+  VectorX reaction_d_poisson;        ///< m
+  MatrixX reaction_d_force;          ///< m x k
+  MatrixX reaction_d_motion;         ///< m x m
+};
+
+/// Immutable description (mesh, element, material, boundary) plus the symbolic analysis that all solves share.
+class Statics {
+ public:
+  /// @param mesh   linear (4 columns) or quadratic (10 columns) tetrahedra; the columns choose the element
+  /// @param material  a name in the table of materials.hpp
+  /// @throws Error on an inside-out or degenerate element, an unknown material, a node index out of range, or supports that
+  ///         leave a rigid motion free (names which one) unless inertia_relief is set.
+  Statics(const TetMesh& mesh, const std::string& material, Boundary boundary, StaticsOptions options = {});
+  ~Statics();
+  Statics(Statics&&) noexcept;
+  Statics& operator=(Statics&&) noexcept;
+
+  /// @param extra  values of the material's further parameters (e.g. alpha of the foam law), in its table's order
+  /// @param start  displacement to start Newton from (nullptr: zero, or loads are stepped when that fails)
+  Equilibrium solve(double young_modulus_pa, double poisson_ratio, const VectorX& force_coefficients,
+                    const VectorX& motion_coefficients, const VectorX* start = nullptr, const VectorX& extra = {}) const;
+
+  /// Re-factorises the tangent at `at` only if it is not the last one solved (linear material: once per nu).
+  Sensitivity sensitivity(const Equilibrium& at) const;
+
+  /// Many load cases of a linear material with one factor: columns of `force_coefficients` (k x cases).
+  std::vector<Equilibrium> solve_many(double young_modulus_pa, double poisson_ratio, const MatrixX& force_coefficients,
+                                      const MatrixX& motion_coefficients) const;
+
+  bool is_linear() const;
+  const TetMesh& mesh() const;
+  const Boundary& boundary() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::fem

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "palpate/core/mesh.hpp"
+
+namespace palpate::geometry {
+
+struct ClosestPoint {
+  Index triangle = -1;
+  Vec3 barycentric = Vec3::Zero();  ///< sums to one; point = sum barycentric(k) * vertex(k)
+  Vec3 point_m = Vec3::Zero();
+  double squared_distance_m2 = 0;
+};
+
+struct RayHit {
+  Index triangle = -1;
+  Vec3 barycentric = Vec3::Zero();
+  double range_m = 0;
+};
+
+/// Bounding volume hierarchy over the triangles of a surface; exact in double. Const queries are thread-safe.
+class TriangleTree {
+ public:
+  /// @throws Error when there is no triangle, an index is out of range or a vertex is not finite.
+  explicit TriangleTree(TriMesh mesh);
+  ~TriangleTree();
+  TriangleTree(TriangleTree&&) noexcept;
+  TriangleTree& operator=(TriangleTree&&) noexcept;
+
+  /// Same triangles, moved vertices: boxes are refitted, not rebuilt.
+  void refit(const Points& vertices_m);
+
+  /// Closest point of the surface. `hint`: a triangle that is likely near (the last answer), or -1.
+  ClosestPoint closest(const Vec3& point_m, Index hint = -1) const;
+
+  /// First hit of a ray, both sides of a triangle count. `direction` need not have unit length; range is in its units.
+  std::optional<RayHit> cast(const Vec3& origin_m, const Vec3& direction, double max_range = 1e300) const;
+
+  const TriMesh& mesh() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::geometry
