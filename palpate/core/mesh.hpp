@@ -41,10 +41,14 @@ struct Plane {
 
 enum class SupportKind { vertices, plane, box, table, wall, clamp };
 enum class ContactLaw { bonded, frictionless, friction };
+enum class NodeSelection { vertices, plane, box };
+enum class PoseVaries { never, push, step };
 
-/// How the object is held. Where it touches is chosen by `vertices`, by a box or by a plane (nodes within tolerance_m of it).
+/// How the object is held. Where it touches is chosen by `vertices`, by a box or by a plane (nodes within tolerance_m of
+/// it); `select` says by which (of interest for a clamp, the other kinds imply it).
 struct Support {
   SupportKind kind = SupportKind::vertices;
+  NodeSelection select = NodeSelection::vertices;
   std::vector<Index> vertices;  ///< 0-based node indices of the rest volume (or surface) mesh
   Plane plane;
   Vec3 box_min_m = Vec3::Zero();
@@ -52,8 +56,9 @@ struct Support {
   double tolerance_m = 1e-4;
   ContactLaw contact = ContactLaw::bonded;
   double friction_coefficient = 0.0;
-  double pose_std_m = 0.0;    ///< clamp: prior on its translation; 0 = exactly known
-  double pose_std_rad = 0.0;  ///< clamp: prior on its rotation; 0 = exactly known
+  double pose_std_m = 0.0;                     ///< clamp: prior on its translation; 0 = exactly known
+  double pose_std_rad = 0.0;                   ///< clamp: prior on its rotation; 0 = exactly known
+  PoseVaries pose_varies = PoseVaries::never;  ///< clamp: one pose in the recording, or one a push, or one a step
   std::string name;
 };
 
@@ -63,8 +68,8 @@ struct ObjectModel {
   SurfaceEmbedding embedding;  ///< of `surface` in `volume`
   RestState rest_state = RestState::stress_free;
   std::vector<Support> supports;
-  bool free = false;                 ///< `supports: free`: inertia relief
-  double unseen_share = 0.0;         ///< share of the surface that was completed and not seen (0 for a whole model)
+  bool free = false;                  ///< `supports: free`: inertia relief
+  double unseen_share = 0.0;          ///< share of the surface that was completed and not seen (0 for a whole model)
   std::vector<std::string> warnings;  ///< plain words from the quality gate
 };
 

@@ -28,7 +28,7 @@ struct Camera {
 struct DepthNoise {
   std::string model = "constant";
   double sigma_m = std::numeric_limits<double>::quiet_NaN();  ///< of `constant`; NaN = not given
-  double bias_std_m = 0.0;  ///< prior of one common depth offset a push (0 = none)
+  double bias_std_m = 0.0;                                    ///< prior of one common depth offset a push (0 = none)
 };
 
 struct DepthFrame {
@@ -43,8 +43,8 @@ struct DepthFrame {
 
 struct PointCloud {
   Points points_m;
-  Points normals;    ///< 0 x 3 where unknown
-  VectorX sigma_m;   ///< size 1 (common) or N: standard deviation per axis
+  Points normals;                           ///< 0 x 3 where unknown
+  VectorX sigma_m;                          ///< size 1 (common) or N: standard deviation per axis
   double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the cloud's pose, per frame
 };
 
@@ -53,20 +53,21 @@ struct RayCloud {
   Points origins_m;
   Points directions;  ///< unit length
   VectorX range_m;
-  VectorX sigma_m;    ///< along the ray
+  VectorX sigma_m;  ///< along the ray
   Eigen::Matrix<Index, Eigen::Dynamic, 2, Eigen::RowMajor> pixel;
 };
 
 /// Markers attached rigidly to the nearest patch of the surface; they may stand off it.
 struct Markers {
   std::vector<std::string> names;
-  Points rest_m;                  ///< position in the object's rest frame; NaN rows where unknown
-  Points observed_m;              ///< base frame; NaN rows where hidden
+  Points rest_m;      ///< position in the object's rest frame; NaN rows where unknown
+  Points observed_m;  ///< base frame; NaN rows where hidden
   double sigma_m = std::numeric_limits<double>::quiet_NaN();  ///< of one observation, per axis
-  double rest_std_m = 0.0;        ///< prior on each rest position, per axis, shared by all steps
+  double rest_std_m = 0.0;                                    ///< prior on each rest position, per axis, shared by all steps
 };
 
 struct ToolTravel {
+  std::string tool;     ///< name in Recording::tools; empty = the step's only one
   double travel_m = 0;  ///< along the tool's direction, into the object positive, from first contact
   double sigma_m = std::numeric_limits<double>::quiet_NaN();
 };
@@ -79,6 +80,8 @@ struct Wrench {
   double force_sigma_n = std::numeric_limits<double>::quiet_NaN();
   double torque_sigma_nm = std::numeric_limits<double>::quiet_NaN();
   bool has_torque = false;
+  std::string tool;           ///< name in Recording::tools; empty = the step's only one
+  Vec3 along = Vec3::Zero();  ///< single-axis cell: only the component along this unit vector was measured; zero = all three
 };
 
 using Observation = std::variant<DepthFrame, PointCloud, Markers, ToolTravel, Wrench>;
@@ -88,11 +91,12 @@ enum class ToolShape { vertices, sphere, disc, capsule, edge, mesh, platen };
 struct Tool {
   std::string name;
   ToolShape shape = ToolShape::sphere;
-  double radius_m = 0;
-  double length_m = 0;
+  double radius_m = 0;  ///< sphere, disc, capsule; edge: half width of its contact strip
+  double length_m = 0;  ///< capsule, edge
   std::optional<TriMesh> mesh;
   std::vector<Index> vertices;  ///< ToolShape::vertices: 0-based nodes that the force is spread over equally
   Plane plane;                  ///< ToolShape::platen: its face at rest, normal = direction into the object
+  Vec3 axis = Vec3::UnitX();    ///< capsule, edge: unit direction of its length, base frame
   ContactLaw contact = ContactLaw::bonded;
   double friction_coefficient = 0;
   double compliance_m_per_n = 0;  ///< of stick and arm between encoder and tip
@@ -100,35 +104,35 @@ struct Tool {
 
 /// What acts on the object in one step. Either the force is imposed (measured) or the motion is.
 struct Load {
-  std::string tool;                  ///< name in Recording::tools
-  std::optional<Vec3> force_n;       ///< resultant on the object, base frame
-  double force_std_n = 0;            ///< absolute part of its prior standard deviation, per axis
-  double force_relative_std = 0;     ///< relative part, independent from step to step (0.02 = 2 %)
-  std::optional<double> travel_m;    ///< motion imposed along the tool's direction (platen: its plane normal)
-  Vec3 contact_m = Vec3::Zero();     ///< contact point on the rest surface (tools that are not `vertices` or `platen`)
-  Vec3 direction = -Vec3::UnitZ();   ///< unit vector of the push, into the object
-  double contact_std_m = 0;          ///< prior on the contact point, tangential
+  std::string tool;                 ///< name in Recording::tools
+  std::optional<Vec3> force_n;      ///< resultant on the object, base frame
+  double force_std_n = 0;           ///< absolute part of its prior standard deviation, per axis
+  double force_relative_std = 0;    ///< relative part, independent from step to step (0.02 = 2 %)
+  std::optional<double> travel_m;   ///< motion imposed along the tool's direction (platen: its plane normal)
+  Vec3 contact_m = Vec3::Zero();    ///< contact point on the rest surface (tools that are not `vertices` or `platen`)
+  Vec3 direction = -Vec3::UnitZ();  ///< unit vector of the push, into the object
+  double contact_std_m = 0;         ///< prior on the contact point, tangential
 };
 
 struct Step {
   double time_s = 0;
-  std::vector<Load> loads;           ///< empty or all zero = an unloaded step, a step like any other
+  std::vector<Load> loads;  ///< empty or all zero = an unloaded step, a step like any other
   std::optional<Pose> T_base_tip;
   std::vector<double> joints_rad;
   std::vector<Observation> observations;
-  bool unloading = false;            ///< recorded while the tool was going back
-  std::string source;                ///< file and line, for messages
+  bool unloading = false;  ///< recorded while the tool was going back
+  std::string source;      ///< file and line, for messages
 };
 
 struct Push {
   std::string name;
-  std::string site;                  ///< e.g. "head"; empty = one site
+  std::string site;  ///< e.g. "head"; empty = one site
   std::vector<Step> steps;
 };
 
 struct Environment {
   Vec3 gravity_m_s2 = Vec3::Zero();
-  std::vector<Plane> planes;         ///< table and walls
+  std::vector<Plane> planes;  ///< table and walls
 };
 
 /// A table row of the room `fem`, with values where they are known beforehand.
@@ -138,9 +142,9 @@ struct Material {
 };
 
 struct ModelDefaults {
-  std::string mesh = "auto";      ///< as_given | remeshed | auto
-  std::string element = "auto";   ///< tet4 | tet10 | auto
-  std::string refine = "auto";    ///< none | auto
+  std::string mesh = "auto";     ///< as_given | remeshed | auto
+  std::string element = "auto";  ///< tet4 | tet10 | auto
+  std::string refine = "auto";   ///< none | auto
   std::string material = "neo_hookean";
   double poisson_lower = 0.0, poisson_upper = 0.4995;  ///< uniform prior
   std::optional<double> poisson_fixed;
@@ -152,7 +156,7 @@ struct Rest {
   std::optional<TriMesh> surface;
   std::vector<DepthFrame> views;
   RestState state = RestState::stress_free;
-  double surface_std_m = 0;            ///< slow error of the rest surface (correlated)
+  double surface_std_m = 0;  ///< slow error of the rest surface (correlated)
   double surface_correlation_m = 0.04;
   std::optional<Triangles> observed_triangles;  ///< the part of the boundary that sensors saw, by node index
 };
@@ -161,7 +165,7 @@ struct Rest {
 struct RobotShape {
   enum class Kind { mesh, box, cylinder, sphere } kind = Kind::mesh;
   Pose T_link_shape = Pose::Identity();
-  TriMesh mesh;            ///< Kind::mesh
+  TriMesh mesh;                ///< Kind::mesh
   Vec3 size_m = Vec3::Zero();  ///< box: edges; cylinder: radius, length; sphere: radius
 };
 struct RobotLink {
@@ -174,7 +178,7 @@ struct RobotJoint {
   Pose T_parent_joint = Pose::Identity();
   Vec3 axis = Vec3::UnitX();
   double lower = 0, upper = 0, velocity = 0;
-  std::string mimic;                 ///< empty = none
+  std::string mimic;  ///< empty = none
   double mimic_multiplier = 1, mimic_offset = 0;
 };
 struct RobotModel {
@@ -185,18 +189,20 @@ struct RobotModel {
 
 struct Recording {
   std::string name;
+  std::string description;  ///< free text: source, licence, how to cite
   std::optional<RobotModel> robot;
+  std::vector<std::string> joint_names;  ///< order of Step::joints_rad
   std::vector<Tool> tools;
   Environment environment;
   Rest rest;
   std::vector<Support> supports;
-  bool free = false;                   ///< `supports: free`
-  double density_kg_m3 = 0;            ///< 0 = unknown and not needed
+  bool free = false;         ///< `supports: free`
+  double density_kg_m3 = 0;  ///< 0 = unknown and not needed
   double density_std_kg_m3 = 0;
-  double force_scale_std = 0;          ///< prior of the sensor's common scale error (0.01 = 1 %)
+  double force_scale_std = 0;  ///< prior of the sensor's common scale error (0.01 = 1 %)
   ModelDefaults model;
   std::vector<Push> pushes;
-  std::string source;                  ///< path it was read from
+  std::string source;                               ///< path it was read from
   std::map<std::string, std::string> input_hashes;  ///< file -> SHA-256, for the provenance
   std::vector<std::string> warnings;
 };
