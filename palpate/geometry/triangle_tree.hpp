@@ -31,12 +31,16 @@ class TriangleTree {
   TriangleTree& operator=(TriangleTree&&) noexcept;
 
   /// Same triangles, moved vertices: boxes are refitted, not rebuilt.
+  /// @throws Error when the number of rows differs or a vertex is not finite; the tree is then as before.
   void refit(const Points& vertices_m);
 
-  /// Closest point of the surface. `hint`: a triangle that is likely near (the last answer), or -1.
+  /// Closest point of the surface. `hint`: a triangle that is likely near (the last answer), or -1; it changes the speed
+  /// and, between triangles that are equally near, which one is named. A point that is not finite gets triangle -1 and a
+  /// squared distance of NaN.
   ClosestPoint closest(const Vec3& point_m, Index hint = -1) const;
 
   /// First hit of a ray, both sides of a triangle count. `direction` need not have unit length; range is in its units.
+  /// No ray slips between two triangles that share an edge (Woop, Benthin, Wald 2013).
   std::optional<RayHit> cast(const Vec3& origin_m, const Vec3& direction, double max_range = 1e300) const;
 
   const TriMesh& mesh() const;
