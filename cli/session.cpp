@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/session.hpp"
+
+#include <fmt/core.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <thread>
+
+namespace palpate::cli {
+namespace {
+
+std::atomic<bool> interrupt_seen{false};
+
+extern "C" void on_interrupt(int signal) {
+  if (interrupt_seen.exchange(true)) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+  }
+}
+
+std::size_t terminal_columns() {
+  winsize size{};
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
+  return 80;
+}
+
+constexpr double redraw_every_s = 0.1;
+constexpr double time_left_after_s = 2.0;  // an extrapolation from less says nothing
+constexpr double time_left_after_share = 0.03;
+
+}  // namespace
+
+void stop_on_interrupt() {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  std::signal(SIGPIPE, SIG_IGN);  // a reader that closed early is no reason to lose a result on disk
+}
+
+bool Session::interrupted() { return interrupt_seen.load(); }
+
+std::string duration(double seconds) {
+  if (seconds < 10) return fmt::format("{:.1f} s", seconds);
+  const long whole = std::lround(seconds);
+  if (whole < 60) return fmt::format("{} s", whole);
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole % 3600 / 60);
+}
+
+int Session::thread_count() const {
+  if (threads > 0) return threads;
+  return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
+
+void Session::clear_line() {
+  if (line_open_) std::fputs("\r\033[K", stderr);
+  line_open_ = false;
+}
+
+void Session::say(std::string_view line) {
+  if (quiet) return;
+  const std::scoped_lock lock(mutex_);
+  clear_line();
+  fmt::print(stderr, "{}\n", line);
+}
+
+void Session::warn(std::string_view line) {
+  const std::scoped_lock lock(mutex_);
+  clear_line();
+  fmt::print(stderr, "warning: {}\n", line);
+}
+
+void Session::result(const nlohmann::json& object) {
+  if (!json) return;
+  const std::scoped_lock lock(mutex_);
+  clear_line();
+  // Names come from files and may be anything: bytes that are not UTF-8 are replaced, not fatal.
+  fmt::print("{}\n", object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  std::fflush(stdout);
+}
+
+OnProgress Session::progress() {
+  return [this](std::string_view stage, double share) { return draw(stage, share); };
+}
+
+bool Session::draw(std::string_view stage, double share) {
+  if (quiet) return !interrupted();
+  static const bool on_terminal = isatty(STDERR_FILENO) != 0;
+  const auto now = std::chrono::steady_clock::now();
+  const auto since = [&](auto then) { return std::chrono::duration<double>(now - then).count(); };
+  const std::scoped_lock lock(mutex_);
+  if (stage != stage_) {
+    if (on_terminal && !stage_.empty() && line_open_) {
+      clear_line();
+      fmt::print(stderr, "  {:<40} {}\n", stage_, duration(since(stage_start_)));
+    }
+    stage_ = stage;
+    stage_start_ = now;
+    last_draw_ = {};
+    if (!on_terminal) fmt::print(stderr, "{} ...\n", stage_);
+  }
+  const bool finished = share >= 1.0;
+  if (on_terminal && finished) {
+    clear_line();
+    fmt::print(stderr, "  {:<40} {}\n", stage_, duration(since(stage_start_)));
+    stage_.clear();
+  } else if (on_terminal && since(last_draw_) > redraw_every_s) {
+    const double elapsed = since(stage_start_);
+    std::string line = fmt::format("  {:<40} {:3.0f} %", stage_, 100 * std::fmax(share, 0.0));
+    if (elapsed > time_left_after_s && share > time_left_after_share) {
+      line += fmt::format("  about {} left", duration(elapsed * (1 - share) / share));
+    }
+    if (line.size() >= terminal_columns()) line.resize(terminal_columns() - 1);
+    fmt::print(stderr, "\r\033[K{}", line);
+    std::fflush(stderr);
+    line_open_ = true;
+    last_draw_ = now;
+  }
+  return !interrupted();
+}
+
+}  // namespace palpate::cli

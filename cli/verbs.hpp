@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of verbs. A new verb is one line here and one file cli/<verb>.cpp; help, completion and the check for mistyped
+// words read this table.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <span>
+#include <string>
+
+#include "cli/session.hpp"
+
+namespace palpate::cli {
+
+/// What a verb does once its options are parsed. Returns an ExitCode; throws Error for bad input.
+using Run = std::function<int(Session&)>;
+
+/// Adds the verb's options to `app` and returns what to run. Option values live in a shared struct that Run captures.
+using SetUp = Run(CLI::App& app);
+
+// clang-format off
+//     verb         group      what it does (one line of the help)                                     an example
+#define PALPATE_VERBS(VERB) \
+  VERB(doctor,     "set up",  "check the installation and say what to do about what is missing",      "palpate doctor") \
+  VERB(completion, "set up",  "print the completion script of a shell: bash, zsh or fish",            "palpate completion bash > ~/.local/share/bash-completion/completions/palpate")
+
+// clang-format on
+
+namespace verbs {
+#define PALPATE_DECLARE_VERB(name, group, summary, example) SetUp name;
+PALPATE_VERBS(PALPATE_DECLARE_VERB)
+#undef PALPATE_DECLARE_VERB
+}  // namespace verbs
+
+struct Verb {
+  const char* name;
+  const char* group;
+  const char* summary;
+  const char* example;
+  SetUp* set_up;
+};
+
+std::span<const Verb> verb_table();
+
+/// The whole command line: global options and one subcommand a verb. Building it runs nothing. `chosen` becomes the Run of
+/// the verb that was parsed; it stays empty when there was none.
+void build_command_line(CLI::App& app, Session& session, Run& chosen);
+
+}  // namespace palpate::cli

@@ -1,0 +1,150 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// The frame of the command line, seen from outside as a user and a script see it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string out, err;
+};
+
+Outcome palpate(const std::string& arguments) {
+  const auto errors = std::filesystem::path(testing::TempDir()) /
+                      (std::string("stderr_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " 2>" + errors.string()).c_str(), "r");
+  Outcome outcome;
+  std::array<char, 4096> buffer;
+  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe))
+    outcome.out.append(buffer.data(), count);
+  const int status = pclose(pipe);
+  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  std::ifstream file(errors);
+  std::stringstream text;
+  text << file.rdbuf();
+  outcome.err = text.str();
+  std::filesystem::remove(errors);
+  return outcome;
+}
+
+std::vector<std::string> verbs() {
+  std::vector<std::string> names;
+  std::istringstream lines(palpate("--help").out);
+  bool in_table = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("Options:")) continue;
+    if (!line.empty() && !line.starts_with(' ') && line.ends_with(':')) in_table = true;
+    if (in_table && line.starts_with("  ") && line[2] != ' ') names.push_back(line.substr(2, line.find(' ', 2) - 2));
+  }
+  return names;
+}
+
+TEST(CommandLine, NewcomerIsToldThreeThingsToTry) {
+  const Outcome outcome = palpate("");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("palpate demo"));
+  EXPECT_THAT(outcome.err, HasSubstr("palpate info"));
+  EXPECT_THAT(outcome.err, HasSubstr("palpate estimate"));
+  EXPECT_THAT(outcome.out, IsEmpty());
+}
+
+TEST(CommandLine, MistypedVerbGetsSuggestionAndUsageCode) {
+  const Outcome outcome = palpate("docter");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("Did you mean `doctor`?"));
+}
+
+TEST(CommandLine, MistypedOptionGetsSuggestionAndUsageCode) {
+  const Outcome outcome = palpate("doctor --treads 2");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("Did you mean `--threads`?"));
+}
+
+TEST(CommandLine, FarFetchedWordGetsNoSuggestion) {
+  const Outcome outcome = palpate("xylophone");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, Not(HasSubstr("Did you mean")));
+}
+
+TEST(CommandLine, WrongUsageAnswersAProgramInJson) {
+  const Outcome outcome = palpate("doctor --nonsense --json");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.out, HasSubstr("\"exit_code\": 2"));
+  EXPECT_THAT(outcome.out, HasSubstr("\"kind\": \"usage\""));
+}
+
+TEST(CommandLine, DoctorJsonIsOneObjectAndQuietSilencesPeoplesText) {
+  const Outcome outcome = palpate("--quiet doctor --json");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_TRUE(outcome.out.starts_with("{"));
+  EXPECT_THAT(outcome.out, HasSubstr("\"healthy\": true"));
+  EXPECT_THAT(outcome.err, IsEmpty());
+}
+
+TEST(CommandLine, DoctorFailsWithCureWhereNothingCanBeWritten) {
+  const std::string command =
+      "cd /proc && " + std::string(PALPATE_CLI) + " doctor 2>&1 >/dev/null | grep -A1 'FAILED  current' | grep -q -- '->'";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  const int status = std::system(("cd /proc && " + std::string(PALPATE_CLI) + " doctor --quiet").c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 1);
+}
+
+TEST(CommandLine, EveryVerbsHelpEndsWithAnExampleThatNamesIt) {
+  const std::vector<std::string> names = verbs();
+  ASSERT_GE(names.size(), 2u);
+  for (const std::string& name : names) {
+    const Outcome outcome = palpate(name + " --help");
+    EXPECT_EQ(outcome.exit_code, 0) << name;
+    const std::size_t example = outcome.out.rfind("Example:");
+    ASSERT_NE(example, std::string::npos) << name;
+    EXPECT_THAT(outcome.out.substr(example), HasSubstr("palpate " + name));
+  }
+}
+
+TEST(CommandLine, BashCompletionOffersVerbsAndTheirOptions) {
+  const auto script = std::filesystem::path(testing::TempDir()) / "palpate_completion.bash";
+  ASSERT_EQ(palpate("completion bash > " + script.string()).exit_code, 0);
+  const auto complete = [&](const std::string& words, int at) {
+    const std::string command = "bash -c '. " + script.string() + "; COMP_WORDS=(" + words +
+                                "); COMP_CWORD=" + std::to_string(at) + "; _palpate; echo ${COMPREPLY[@]}'";
+    FILE* pipe = popen(command.c_str(), "r");
+    std::array<char, 4096> buffer{};
+    const std::size_t count = std::fread(buffer.data(), 1, buffer.size() - 1, pipe);
+    pclose(pipe);
+    return std::string(buffer.data(), count);
+  };
+  EXPECT_THAT(complete("palpate doc", 1), HasSubstr("doctor"));
+  EXPECT_THAT(complete("palpate doctor --th", 2), HasSubstr("--threads"));
+}
+
+TEST(CommandLine, ZshAndFishCompletionNameEveryVerb) {
+  for (const std::string shell : {"zsh", "fish"}) {
+    const Outcome outcome = palpate("completion " + shell);
+    EXPECT_EQ(outcome.exit_code, 0);
+    for (const std::string& name : verbs()) EXPECT_THAT(outcome.out, HasSubstr(name)) << shell;
+  }
+}
+
+TEST(CommandLine, VersionIsTheProjects) {
+  const Outcome outcome = palpate("--version");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.out, HasSubstr("palpate 0."));
+}
+
+}  // namespace
