@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/held_body.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+double diagonal_m(const TetMesh& mesh) {
+  return (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
+}
+
+/// Directions held at each node, orthonormal, in the order in which they were asked for.
+class Holds {
+ public:
+  void add(Index node, const Vec3& direction) {
+    auto& held = directions_[node];
+    Vec3 rest = direction;
+    for (const auto& axis : held) rest -= axis.dot(rest) * axis;
+    if (rest.norm() > 1e-6) held.push_back(rest.normalized());
+  }
+  void clamp(Index node) {
+    for (int d = 0; d < 3; ++d) add(node, Vec3::Unit(d));
+  }
+  const std::map<Index, std::vector<Vec3>>& directions() const { return directions_; }
+
+  std::vector<fem::Constraint> constraints() const {
+    std::vector<fem::Constraint> list;
+    for (const auto& [node, held] : directions_) {
+      fem::Constraint constraint;
+      constraint.node = node;
+      constraint.count = static_cast<int>(held.size());
+      for (int c = 0; c < constraint.count; ++c) constraint.axes.col(c) = held[static_cast<std::size_t>(c)];
+      complete(constraint.axes, constraint.count);
+      list.push_back(constraint);
+    }
+    return list;
+  }
+
+ private:
+  static void complete(Mat3& axes, int count) {
+    if (count == 1) axes.col(1) = axes.col(0).unitOrthogonal();
+    if (count <= 2) axes.col(2) = axes.col(0).cross(axes.col(1));
+  }
+  std::map<Index, std::vector<Vec3>> directions_;
+};
+
+/// Displacement of a node under the six rigid motions (translations, rotations about the centre in units of `length`).
+Eigen::Matrix<double, 3, 6> rigid_motions(const Vec3& arm, double length) {
+  Eigen::Matrix<double, 3, 6> m;
+  m.leftCols<3>().setIdentity();
+  m.rightCols<3>() << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+  m.rightCols<3>() /= length;
+  return m;
+}
+
+MatrixX null_space(const MatrixX& rows) {
+  if (rows.rows() == 0) return MatrixX::Identity(6, 6);
+  const Eigen::JacobiSVD<MatrixX> svd(rows.transpose() * rows, Eigen::ComputeFullV);
+  const auto& values = svd.singularValues();
+  int rank = 0;
+  while (rank < 6 && values(rank) > 1e-10 * std::max(values(0), 1.0)) ++rank;
+  return svd.matrixV().rightCols(6 - rank);
+}
+
+/// Pins the motions that are left at single nodes: as many directions as motions, so that no stress can arise from them.
+MatrixX pin_free_motions(const TetMesh& mesh, Holds& holds) {
+  const Vec3 centre = mesh.nodes_m.colwise().mean();
+  const double length = diagonal_m(mesh);
+  MatrixX rows(0, 6);
+  const auto append = [&](Index node, const Vec3& direction) {
+    rows.conservativeResize(rows.rows() + 1, 6);
+    rows.row(rows.rows() - 1) = direction.transpose() * rigid_motions(mesh.nodes_m.row(node).transpose() - centre, length);
+  };
+  for (const auto& [node, held] : holds.directions()) {
+    for (const auto& direction : held) append(node, direction);
+  }
+  const MatrixX free = null_space(rows);
+  if (free.cols() == 0) return MatrixX(3 * mesh.nodes_m.rows(), 0);
+
+  MatrixX left = free;
+  while (left.cols() > 0) {
+    Index best_node = -1;
+    Vec3 best_motion = Vec3::Zero();
+    for (Index node = 0; node < mesh.nodes_m.rows(); ++node) {
+      Vec3 motion = rigid_motions(mesh.nodes_m.row(node).transpose() - centre, length) * left.col(0);
+      if (const auto held = holds.directions().find(node); held != holds.directions().end()) {
+        for (const auto& axis : held->second) motion -= axis.dot(motion) * axis;
+      }
+      if (motion.norm() > best_motion.norm() * (1 + 1e-9)) {
+        best_motion = motion;
+        best_node = node;
+      }
+    }
+    holds.add(best_node, best_motion.normalized());
+    append(best_node, best_motion.normalized());
+    left = null_space(rows);
+  }
+
+  MatrixX motions(3 * mesh.nodes_m.rows(), free.cols());
+  for (Index node = 0; node < mesh.nodes_m.rows(); ++node) {
+    motions.middleRows<3>(3 * node) = rigid_motions(mesh.nodes_m.row(node).transpose() - centre, length) * free;
+  }
+  return motions;
+}
+
+std::vector<Index> platen_nodes(const TetMesh& mesh, const Tool& platen) {
+  const double tolerance = std::max(1e-6, 1e-4 * diagonal_m(mesh));
+  std::vector<Index> nodes;
+  for (Index node = 0; node < mesh.nodes_m.rows(); ++node) {
+    if (std::abs(platen.plane.normal.dot(mesh.nodes_m.row(node).transpose() - platen.plane.point_m)) < tolerance) {
+      nodes.push_back(node);
+    }
+  }
+  if (nodes.empty()) {
+    throw Error("the platen's plane touches no node of the object; give a point of its face where it first touches",
+                "tools." + platen.name + ".plane");
+  }
+  return nodes;
+}
+
+}  // namespace
+
+HeldBody hold(const TetMesh& mesh, const std::vector<Support>& supports, const std::vector<const Tool*>& platens) {
+  Holds holds;
+  for (const Support& support : supports) {
+    for (Index node : fem::support_nodes(mesh, support)) {
+      if (support.contact == ContactLaw::bonded) {
+        holds.clamp(node);
+      } else {
+        holds.add(node, support.plane.normal.normalized());
+      }
+    }
+  }
+
+  std::vector<Eigen::Triplet<double>> motion;
+  for (std::size_t p = 0; p < platens.size(); ++p) {
+    const Vec3 direction = platens[p]->plane.normal.normalized();
+    for (Index node : platen_nodes(mesh, *platens[p])) {
+      holds.add(node, direction);
+      if (platens[p]->contact == ContactLaw::bonded) holds.clamp(node);
+      for (int d = 0; d < 3; ++d) {
+        if (direction(d) != 0) motion.emplace_back(3 * node + d, static_cast<int>(p), direction(d));
+      }
+    }
+  }
+
+  HeldBody body;
+  body.free_motions = pin_free_motions(mesh, holds);
+  body.constraints = holds.constraints();
+  body.motions.resize(3 * mesh.nodes_m.rows(), static_cast<Index>(platens.size()));
+  body.motions.setFromTriplets(motion.begin(), motion.end());
+  return body;
+}
+
+}  // namespace palpate::estimation

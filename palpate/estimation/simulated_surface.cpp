@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/simulated_surface.hpp"
+
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+std::array<Index, 3> sorted(Index a, Index b, Index c) {
+  std::array<Index, 3> key{a, b, c};
+  std::sort(key.begin(), key.end());
+  return key;
+}
+
+}  // namespace
+
+SimulatedSurface SimulatedSurface::boundary_of(const TetMesh& mesh, const Triangles* observed) {
+  const Tetrahedra faces = fem::boundary_faces(mesh);
+  std::set<std::array<Index, 3>> seen;
+  if (observed != nullptr) {
+    for (Index t = 0; t < observed->rows(); ++t) seen.insert(sorted((*observed)(t, 0), (*observed)(t, 1), (*observed)(t, 2)));
+  }
+
+  const bool quadratic = faces.cols() == 6;
+  std::vector<std::array<Index, 3>> triangles;
+  SimulatedSurface surface;
+  Index matched = 0;
+  for (Index f = 0; f < faces.rows(); ++f) {
+    const char is_seen = observed == nullptr || seen.count(sorted(faces(f, 0), faces(f, 1), faces(f, 2))) > 0 ? 1 : 0;
+    matched += observed != nullptr && is_seen;
+    if (quadratic) {
+      const Index a = faces(f, 0), b = faces(f, 1), c = faces(f, 2), ab = faces(f, 3), bc = faces(f, 4), ca = faces(f, 5);
+      triangles.insert(triangles.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+      surface.observed_.insert(surface.observed_.end(), 4, is_seen);
+    } else {
+      triangles.push_back({faces(f, 0), faces(f, 1), faces(f, 2)});
+      surface.observed_.push_back(is_seen);
+    }
+  }
+  if (observed != nullptr && matched == 0) {
+    throw Error("none of the observed triangles is a face of the mesh's boundary; give node indices of the mesh that "
+                "`rest` names",
+                "rest.observed_triangles");
+  }
+
+  // Number the nodes on the boundary from zero.
+  std::vector<Index> vertex_of(static_cast<std::size_t>(mesh.nodes_m.rows()), -1);
+  std::vector<Index> node_of;
+  surface.rest_.triangles.resize(static_cast<Index>(triangles.size()), 3);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      Index& vertex = vertex_of[static_cast<std::size_t>(triangles[t][static_cast<std::size_t>(k)])];
+      if (vertex < 0) {
+        vertex = static_cast<Index>(node_of.size());
+        node_of.push_back(triangles[t][static_cast<std::size_t>(k)]);
+      }
+      surface.rest_.triangles(static_cast<Index>(t), k) = vertex;
+    }
+  }
+  surface.rest_.vertices_m.resize(static_cast<Index>(node_of.size()), 3);
+  for (std::size_t v = 0; v < node_of.size(); ++v) {
+    surface.rest_.vertices_m.row(static_cast<Index>(v)) = mesh.nodes_m.row(node_of[v]);
+    surface.start_.push_back(static_cast<int>(v));
+    surface.nodes_.push_back(node_of[v]);
+    surface.weights_.push_back(1.0);
+  }
+  surface.start_.push_back(static_cast<int>(node_of.size()));
+  return surface;
+}
+
+SimulatedSurface SimulatedSurface::embedded(const TetMesh& mesh, const TriMesh& triangles, const SurfaceEmbedding& embedding) {
+  if (embedding.element.rows() != triangles.vertices_m.rows()) {
+    throw Error("the embedding has another number of vertices than the surface", "ObjectModel.embedding");
+  }
+  SimulatedSurface surface;
+  surface.rest_ = triangles;
+  surface.observed_.assign(static_cast<std::size_t>(triangles.triangles.rows()), 1);
+  for (Index v = 0; v < triangles.vertices_m.rows(); ++v) {
+    surface.start_.push_back(static_cast<int>(surface.nodes_.size()));
+    for (int k = 0; k < 4; ++k) {
+      surface.nodes_.push_back(mesh.tetrahedra(embedding.element(v), k));
+      surface.weights_.push_back(embedding.weights(v, k));
+    }
+  }
+  surface.start_.push_back(static_cast<int>(surface.nodes_.size()));
+  return surface;
+}
+
+MatrixX SimulatedSurface::restrict(const MatrixX& nodal) const {
+  MatrixX values = MatrixX::Zero(3 * vertex_count(), nodal.cols());
+  for (Index c = 0; c < nodal.cols(); ++c) {
+    const double* from = nodal.col(c).data();
+    double* to = values.col(c).data();
+    for (Index v = 0; v < vertex_count(); ++v) {
+      for (int e = start_[static_cast<std::size_t>(v)]; e < start_[static_cast<std::size_t>(v) + 1]; ++e) {
+        const Index node = nodes_[static_cast<std::size_t>(e)];
+        const double weight = weights_[static_cast<std::size_t>(e)];
+        for (int d = 0; d < 3; ++d) to[3 * v + d] += weight * from[3 * node + d];
+      }
+    }
+  }
+  return values;
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// The vector that the fit moves: log E, nu, then every nuisance with its prior. One entry a scalar.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "palpate/core/math.hpp"
+
+namespace palpate::estimation {
+
+struct Unknown {
+  std::string name;
+  std::string unit;
+  double prior_mean = 0;
+  double prior_std = std::numeric_limits<double>::infinity();  ///< infinity: flat
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
+  bool fixed = false;
+};
+
+/// Indices of the two parameters that everything is about.
+inline constexpr int log_young = 0;
+inline constexpr int poisson = 1;
+
+class Unknowns {
+ public:
+  int add(Unknown unknown) {
+    entries_.push_back(std::move(unknown));
+    return static_cast<int>(entries_.size()) - 1;
+  }
+  /// Adds `count` entries that share a prior; suffixes name them. Returns the first index, or -1 when prior_std is 0.
+  int add_block(const std::string& name, const std::string& unit, double prior_std, const std::vector<std::string>& suffixes) {
+    if (!(prior_std > 0)) return -1;
+    const int first = size();
+    for (const auto& suffix : suffixes) add({name + suffix, unit, 0, prior_std});
+    return first;
+  }
+  int size() const { return static_cast<int>(entries_.size()); }
+  const Unknown& operator[](int i) const { return entries_[static_cast<std::size_t>(i)]; }
+  Unknown& operator[](int i) { return entries_[static_cast<std::size_t>(i)]; }
+  VectorX prior_mean() const {
+    VectorX mean(size());
+    for (int i = 0; i < size(); ++i) mean(i) = (*this)[i].prior_mean;
+    return mean;
+  }
+
+ private:
+  std::vector<Unknown> entries_;
+};
+
+}  // namespace palpate::estimation
