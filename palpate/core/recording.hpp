@@ -127,6 +127,8 @@ struct Step {
 struct Push {
   std::string name;
   std::string site;  ///< e.g. "head"; empty = one site
+  double force_tare_std_n = 0;     ///< prior of a constant force error in this push, per axis (0 = none)
+  double travel_offset_std_m = 0;  ///< prior of the travel's zero: where contact really began (0 = exactly known)
   std::vector<Step> steps;
 };
 
