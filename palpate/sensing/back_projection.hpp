@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a depth image to measurements that a likelihood may trust: rays with a standard deviation, normals, and marks on the
+// pixels that mix two surfaces. Pure functions of the frame.
+#pragma once
+
+#include <vector>
+
+#include "palpate/core/recording.hpp"
+
+namespace palpate::sensing {
+
+struct BackProjectionOptions {
+  double min_depth_m = 0.05;         ///< nearer ones are invalid
+  double max_depth_m = 10.0;         ///< farther ones are invalid
+  int stride_px = 1;                 ///< keep every n-th row and column (all of them serve normals and edges)
+  bool remove_edges = true;          ///< drop pixels at depth edges, where flying pixels live
+  double edge_sigmas = 4.0;          ///< neighbours differing by more than this many standard deviations are an edge ...
+  double edge_incidence_rad = 1.4;   ///< ... unless a surface seen at this angle to its normal explains the difference
+  int edge_margin_px = 1;            ///< and this many pixels around an edge go too
+  bool remove_hole_borders = false;  ///< drop pixels beside missing data as well (sensors that smear around holes)
+  int normal_radius_px = 3;          ///< half width of the window that normals are fitted in
+  int min_normal_pixels = 6;         ///< fewer neighbours on the same surface: no normal, the pixel is dropped
+  double max_incidence_rad = 1.4;    ///< pixels seen at a more grazing angle are dropped
+};
+
+/// @throws Error naming the option that is out of range.
+void check(const BackProjectionOptions& options);
+
+/// Where the camera saw something usable: 1 = invalid. Missing, not finite, out of range, masked by frame.mask, or (with
+/// remove_edges) at a depth edge.
+/// @throws Error when image, mask and camera differ in size, or the frame's noise is unknown.
+MaskImage invalid_pixels(const DepthFrame& frame, const BackProjectionOptions& options = {});
+
+/// Unit normals in the camera frame, facing the camera: one row a pixel (row-major), NaN where there is none. A plane is
+/// linear in inverse depth over the undistorted image, so the fit is a 3 x 3 least-squares problem and exact on planes.
+/// @param invalid  as from invalid_pixels
+Points normals(const DepthFrame& frame, const MaskImage& invalid, const BackProjectionOptions& options = {});
+
+/// Valid pixels as rays in the base frame, with the standard deviation along the ray from the sensor's noise model at that
+/// depth and incidence.
+/// @param normals_base  if given: filled with one unit normal a ray (base frame, facing the camera)
+/// @throws Error as invalid_pixels does.
+RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& options = {}, Points* normals_base = nullptr);
+
+/// End points of the rays with their normals; sigma_m is the rays' (isotropic where only the ray's is known).
+PointCloud to_point_cloud(const RayCloud& rays, const Points& normals_base = Points(0, 3));
+
+}  // namespace palpate::sensing

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Standard deviation of depth sensors: one row of a table each, with its source.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "palpate/core/recording.hpp"
+
+namespace palpate::sensing {
+
+/// What a pixel's noise depends on.
+struct DepthNoiseInput {
+  double depth_m = 1;        ///< along the optical axis
+  double incidence_rad = 0;  ///< between the ray and the surface normal; 0 = seen frontally
+  double focal_px = 525;     ///< of the camera that measured
+};
+
+struct DepthNoiseModel {
+  std::string_view name;
+  std::string_view source;
+  double (*axial_sigma_m)(const DepthNoiseInput&);     ///< along the optical axis
+  double (*lateral_sigma_px)(const DepthNoiseInput&);  ///< across, in pixels; nullptr = the source states none
+};
+
+/// The table that --help, the docs and the contract test loop over. `constant` is not in it: it has no figures of its own.
+std::span<const DepthNoiseModel> depth_noise_models();
+
+/// Row of the table. @throws Error listing the names when there is none of that name.
+const DepthNoiseModel& depth_noise_model(std::string_view name);
+
+/// Standard deviation of one depth along the optical axis.
+/// @throws Error when `constant` has no positive sigma_m, or for an unknown model.
+double axial_sigma_m(const DepthNoise& noise, const DepthNoiseInput& input);
+
+/// Stereo law: sigma_z = z^2 s / (f B) for a disparity error of `disparity_sigma_px`.
+double stereo_sigma_m(double depth_m, double focal_px, double baseline_m, double disparity_sigma_px);
+
+/// Phase noise of a time-of-flight pixel: sigma = c / (4 sqrt(2) pi f_mod) sqrt(A + B) / (contrast A), with A signal and B
+/// background electrons (Lange and Seitz 2001, IEEE J. Quantum Electronics 37(3), eq. 12).
+double time_of_flight_sigma_m(double modulation_hz, double signal_electrons, double background_electrons, double contrast);
+
+}  // namespace palpate::sensing

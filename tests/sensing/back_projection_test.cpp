@@ -1,0 +1,196 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sensing/back_projection.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "palpate/core/error.hpp"
+#include "palpate/sensing/camera.hpp"
+#include "palpate/sensing/depth_noise.hpp"
+
+namespace palpate::sensing {
+namespace {
+
+DepthFrame empty_frame() {
+  DepthFrame frame;
+  frame.camera.width_px = 160;
+  frame.camera.height_px = 120;
+  frame.camera.fx_px = frame.camera.fy_px = 140;
+  frame.camera.cx_px = 79.5;
+  frame.camera.cy_px = 59.5;
+  frame.depth_m = DepthImage::Zero(120, 160);
+  frame.noise = {"constant", 0.002, 0};
+  return frame;
+}
+
+// Depth of the plane n . x = distance, seen exactly.
+DepthFrame see_plane(const Vec3& normal, double distance_m, DepthFrame frame = empty_frame()) {
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      const auto ray = unproject(frame.camera, Vec2(column, row));
+      frame.depth_m(row, column) = float(distance_m / normal.dot(*ray));
+    }
+  return frame;
+}
+
+TEST(BackProjection, PlaneIsReproducedExactlyInTheBaseFrame) {
+  const Vec3 normal = Vec3(0.3, -0.4, -0.8).normalized();
+  DepthFrame frame = see_plane(normal, -0.6);
+  frame.camera.distortion = DistortionModel::plumb_bob;
+  frame.camera.distortion_coefficients = {0.05, -0.1, 0.001, 0.001};
+  frame = see_plane(normal, -0.6, frame);
+  frame.T_base_camera = Eigen::Translation3d(0.5, -0.2, 1.1) * Eigen::AngleAxisd(2.1, Vec3(1, 2, 0.5).normalized());
+  Points normals_base;
+  const RayCloud rays = back_project(frame, {}, &normals_base);
+  ASSERT_EQ(rays.range_m.size(), 160 * 120);
+  const PointCloud cloud = to_point_cloud(rays, normals_base);
+  for (Eigen::Index i = 0; i < cloud.points_m.rows(); i += 17) {
+    const Vec3 seen = frame.T_base_camera.inverse() * Vec3(cloud.points_m.row(i));
+    EXPECT_NEAR(normal.dot(seen), -0.6, 1e-6);
+    EXPECT_NEAR((Vec3(normals_base.row(i)) - frame.T_base_camera.linear() * normal).norm(), 0, 1e-4);
+    EXPECT_NEAR(rays.directions.row(i).norm(), 1, 1e-12);
+    const auto pixel = project(frame.camera, seen);
+    EXPECT_NEAR((*pixel - rays.pixel.row(i).cast<double>().transpose()).norm(), 0, 1e-4);
+    // 2 mm along the axis are more along an oblique ray.
+    EXPECT_NEAR(rays.sigma_m(i), 0.002 * rays.range_m(i) / seen.z(), 1e-9);
+  }
+}
+
+TEST(BackProjection, NormalsFollowASphere) {
+  DepthFrame frame = empty_frame();
+  const Vec3 centre(0, 0, 0.8);
+  const double radius = 0.2;
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      const Vec3 ray = unproject(frame.camera, Vec2(column, row))->normalized();
+      const double along = ray.dot(centre), under = along * along - centre.squaredNorm() + radius * radius;
+      if (under > 0) frame.depth_m(row, column) = float((along - std::sqrt(under)) * ray.z());
+    }
+  Points normals_base;
+  const RayCloud rays = back_project(frame, {}, &normals_base);
+  ASSERT_GT(rays.range_m.size(), 2000);
+  const Points points = to_point_cloud(rays).points_m;
+  double worst = 0, mean = 0;
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    const Vec3 exact = (Vec3(points.row(i)) - centre).normalized();
+    const double angle = std::acos(std::min(1.0, exact.dot(Vec3(normals_base.row(i)))));
+    worst = std::max(worst, angle);
+    mean += angle / double(points.rows());
+  }
+  EXPECT_LT(mean, 0.02);
+  EXPECT_LT(worst, 0.5);
+}
+
+TEST(BackProjection, FlyingPixelsAtAStepAreRemovedAndNothingElse) {
+  DepthFrame frame = empty_frame();
+  std::mt19937 generator(7);
+  std::uniform_real_distribution<double> mixture(0.1, 0.9);
+  std::normal_distribution<double> noise(0, 0.002);
+  int flying = 0;
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      double z = column < 80 ? 0.6 : 0.8;
+      if (column == 80) z = 0.6 + 0.2 * mixture(generator), ++flying;
+      frame.depth_m(row, column) = float(z + noise(generator));
+    }
+  const MaskImage invalid = invalid_pixels(frame);
+  int removed_flying = 0, removed_else = 0;
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      if (column == 80)
+        removed_flying += invalid(row, column);
+      else if (column < 79 || column > 81)
+        removed_else += invalid(row, column);
+    }
+  EXPECT_EQ(removed_flying, flying);
+  EXPECT_LT(removed_else, 20);  // of 18 840; the tail of the noise beyond 4 sigma
+}
+
+TEST(BackProjection, SteepSurfaceIsNoEdge) {
+  const double incidence = 0.85;  // on the axis; 1.37 at the border of the image
+  const DepthFrame frame = see_plane(Vec3(std::sin(incidence), 0, -std::cos(incidence)), -0.25);
+  EXPECT_EQ(invalid_pixels(frame).cast<int>().sum(), 0);
+}
+
+TEST(BackProjection, MaskRangeStrideAndGrazingAngle) {
+  DepthFrame frame = see_plane(-Vec3::UnitZ(), -0.7);
+  frame.mask = MaskImage::Zero(120, 160);
+  frame.mask.block(10, 20, 30, 40).setOnes();
+  frame.depth_m(100, 100) = 0;
+  frame.depth_m(101, 100) = std::nanf("");
+  frame.depth_m(102, 100) = 20;
+  const RayCloud rays = back_project(frame);
+  // The pixel of 20 m is out of range, thus missing and no edge.
+  EXPECT_EQ(rays.range_m.size(), 120 * 160 - 30 * 40 - 3);
+  for (Eigen::Index i = 0; i < rays.pixel.rows(); ++i) EXPECT_EQ(frame.mask(rays.pixel(i, 1), rays.pixel(i, 0)), 0);
+
+  BackProjectionOptions every_fourth;
+  every_fourth.stride_px = 4;
+  EXPECT_EQ(back_project(see_plane(-Vec3::UnitZ(), -0.7), every_fourth).range_m.size(), 30 * 40);
+
+  BackProjectionOptions frontal;
+  frontal.max_incidence_rad = 0.5;
+  EXPECT_EQ(back_project(see_plane(Vec3(std::sin(1.1), 0, -std::cos(1.1)), -0.5), frontal).range_m.size() > 0, false)
+      << "all of the image is seen at more than 28 degrees";
+}
+
+TEST(BackProjection, MaskDoesNotHideEdges) {
+  DepthFrame frame = see_plane(-Vec3::UnitZ(), -0.7);
+  frame.mask = MaskImage::Zero(120, 160);
+  frame.depth_m.block(40, 40, 20, 20).setConstant(0.4F);  // the robot, known and masked
+  frame.mask.block(40, 40, 20, 20).setOnes();
+  const MaskImage invalid = invalid_pixels(frame);
+  EXPECT_EQ(invalid(39, 50), 1) << "the pixel beside the robot may mix both";
+  EXPECT_EQ(invalid(37, 50), 0);
+}
+
+TEST(BackProjection, SigmaFollowsTheNoiseModel) {
+  DepthFrame frame = see_plane(-Vec3::UnitZ(), -1.2);
+  frame.noise = {"kinect_v1", NAN, 0};
+  const RayCloud rays = back_project(frame);
+  for (Eigen::Index i = 0; i < rays.range_m.size(); i += 101) {
+    const double cosine = 1.2 / rays.range_m(i);
+    const double axial = depth_noise_model("kinect_v1").axial_sigma_m({1.2, std::acos(cosine), 140});
+    EXPECT_NEAR(rays.sigma_m(i), axial / cosine, 1e-7);
+  }
+}
+
+TEST(BackProjection, BadInputIsNamed) {
+  DepthFrame frame = empty_frame();
+  frame.depth_m.resize(100, 160);
+  EXPECT_THROW(back_project(frame), Error);
+  frame = empty_frame();
+  frame.mask = MaskImage::Zero(3, 3);
+  EXPECT_THROW(back_project(frame), Error);
+  frame = empty_frame();
+  frame.noise = {};
+  EXPECT_THROW(back_project(frame), Error);
+
+  const auto refused = [](auto change) {
+    BackProjectionOptions options;
+    change(options);
+    try {
+      check(options);
+    } catch (const Error&) {
+      return true;
+    }
+    return false;
+  };
+  using O = BackProjectionOptions;
+  EXPECT_FALSE(refused([](O&) {}));
+  EXPECT_TRUE(refused([](O& o) { o.min_depth_m = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.max_depth_m = 0.01; }));
+  EXPECT_TRUE(refused([](O& o) { o.stride_px = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.edge_sigmas = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.edge_incidence_rad = 1.6; }));
+  EXPECT_TRUE(refused([](O& o) { o.edge_margin_px = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.normal_radius_px = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.min_normal_pixels = 2; }));
+  EXPECT_TRUE(refused([](O& o) { o.max_incidence_rad = NAN; }));
+}
+
+}  // namespace
+}  // namespace palpate::sensing
