@@ -6,13 +6,12 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
-#include "palpate/geometry/triangle_bvh.hpp"
+#include "palpate/geometry/bvh.hpp"
 
 namespace palpate::geometry {
 namespace {
 
 constexpr int leaf_size = 4;
-constexpr int stack_size = 128;  // build_bvh bounds the depth to 40 + 32
 
 struct Corner {
   Vec3 a, ab, ac;
@@ -93,10 +92,6 @@ inline Candidate closest_on(const Corner& t, const Vec3& p) {
   return {squared_at(t, ap, v, w), v, w};
 }
 
-inline double squared_distance(const Box& b, const Vec3& p) {
-  return (b.min - p).cwiseMax(p - b.max).cwiseMax(0.0).squaredNorm();
-}
-
 /// Ray prepared for the slab test and for the watertight triangle test (Woop, Benthin, Wald 2013): the ray becomes the
 /// z axis of a sheared frame, and a point on a shared edge belongs to both triangles, so that no ray slips between.
 struct Ray {
@@ -151,7 +146,7 @@ void check_vertices(const Points& vertices) {
 
 struct TriangleTree::Impl {
   TriMesh mesh;
-  TriangleBvh bvh;
+  Bvh bvh;
   std::vector<Corner> corners;  ///< in the order of the leaves
   std::vector<Index> slot;      ///< of a triangle in `corners`
 
@@ -167,7 +162,7 @@ TriangleTree::TriangleTree(TriMesh mesh) : impl_(std::make_unique<Impl>()) {
     throw Error("a vertex index is outside 0.." + std::to_string(n - 1), "TriangleTree: triangles");
   check_vertices(mesh.vertices_m);
   impl_->mesh = std::move(mesh);
-  impl_->bvh = build_bvh(impl_->mesh, leaf_size);
+  impl_->bvh = build_bvh(triangle_boxes(impl_->mesh), leaf_size);
   impl_->corners.resize(impl_->bvh.order.size());
   impl_->slot.resize(impl_->bvh.order.size());
   for (std::size_t i = 0; i < impl_->slot.size(); ++i) impl_->slot[impl_->bvh.order[i]] = static_cast<Index>(i);
@@ -204,7 +199,7 @@ ClosestPoint TriangleTree::closest(const Vec3& p, Index hint) const {
     double squared;
     Index node;
   };
-  std::array<Visit, stack_size> stack;
+  std::array<Visit, bvh_stack_size> stack;
   int top = 0;
   stack[top++] = {0, 0};
   while (top > 0) {
@@ -212,7 +207,7 @@ ClosestPoint TriangleTree::closest(const Vec3& p, Index hint) const {
     if (visit.squared >= best.squared) continue;
     const BvhNode* node = &s.bvh.nodes[visit.node];
     while (node != nullptr) {
-      const std::array<double, 2> d{squared_distance(node->box[0], p), squared_distance(node->box[1], p)};
+      const std::array<double, 2> d{node->box[0].squared_distance(p), node->box[1].squared_distance(p)};
       const int first = d[1] < d[0] ? 1 : 0;
       const BvhNode* next = nullptr;
       double waiting = 0;
@@ -255,7 +250,7 @@ std::optional<RayHit> TriangleTree::cast(const Vec3& origin, const Vec3& directi
     double enter;
     Index node;
   };
-  std::array<Visit, stack_size> stack;
+  std::array<Visit, bvh_stack_size> stack;
   int top = 0;
   stack[top++] = {0, 0};
   while (top > 0) {

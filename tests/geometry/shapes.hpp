@@ -23,19 +23,29 @@ inline TriMesh make(const std::vector<Vec3>& v, const std::vector<std::array<Ind
 inline TriMesh box(const Vec3& size, const Vec3& origin = Vec3::Zero()) {
   std::vector<Vec3> v;
   for (int i = 0; i < 8; ++i) v.push_back(origin + Vec3((i & 1) * size.x(), ((i >> 1) & 1) * size.y(), (i >> 2) * size.z()));
-  return make(v, {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6},
-                  {1, 3, 5}, {3, 7, 5}});
+  return make(v, {{0, 2, 1},
+                  {1, 2, 3},
+                  {4, 5, 6},
+                  {5, 7, 6},
+                  {0, 1, 4},
+                  {1, 5, 4},
+                  {2, 6, 3},
+                  {3, 6, 7},
+                  {0, 4, 2},
+                  {2, 4, 6},
+                  {1, 3, 5},
+                  {3, 7, 5}});
 }
 
 /// Icosahedron, `levels` times refined, corners on the sphere.
 inline TriMesh sphere(double radius, int levels, const Vec3& centre = Vec3::Zero()) {
   const double g = (1 + std::sqrt(5.0)) / 2;
-  std::vector<Vec3> v{{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g},
-                      {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
+  std::vector<Vec3> v{{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                      {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
   for (Vec3& p : v) p.normalize();
-  std::vector<std::array<Index, 3>> t{{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                                      {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8},
-                                      {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  std::vector<std::array<Index, 3>> t{{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                                      {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                                      {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   for (int l = 0; l < levels; ++l) {
     std::map<std::pair<Index, Index>, Index> middle;
     const auto mid = [&](Index a, Index b) {
@@ -92,12 +102,23 @@ inline TriMesh soup(int count, std::uint32_t seed) {
     const auto n = static_cast<Index>(v.size());
     v.insert(v.end(), {a, a + d, a + e});
     switch (i % 8) {
-      case 1: v[n + 1] = v[n + 2] = a; break;                          // a point
-      case 2: v[n + 2] = a + 0.37 * d; break;                          // a line, third corner within
-      case 3: v[n + 2] = a + 1.7 * d + 1e-9 * e; break;                // a needle
-      case 4: v[n + 1] = a + 1e-4 * d; break;                          // a short edge
-      case 5: v[n + 1].x() = v[n + 2].x() = a.x(); break;              // a flat box
-      default: break;
+      case 1:
+        v[n + 1] = v[n + 2] = a;
+        break;  // a point
+      case 2:
+        v[n + 2] = a + 0.37 * d;
+        break;  // a line, third corner within
+      case 3:
+        v[n + 2] = a + 1.7 * d + 1e-9 * e;
+        break;  // a needle
+      case 4:
+        v[n + 1] = a + 1e-4 * d;
+        break;  // a short edge
+      case 5:
+        v[n + 1].x() = v[n + 2].x() = a.x();
+        break;  // a flat box
+      default:
+        break;
     }
     t.push_back({n, n + 1, n + 2});
     if (i % 16 == 7) t.push_back({n, n + 2, n + 1});

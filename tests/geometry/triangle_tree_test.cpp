@@ -22,8 +22,7 @@ long double squared_to_segment(const Vec3L& p, const Vec3L& a, const Vec3L& b) {
 
 /// Another way than the tree's, in long double: foot of the perpendicular if it lies inside (edge planes), else the edges.
 long double squared_to_triangle(const Vec3L& p, const Vec3L& a, const Vec3L& b, const Vec3L& c) {
-  long double best =
-      std::min({squared_to_segment(p, a, b), squared_to_segment(p, b, c), squared_to_segment(p, c, a)});
+  long double best = std::min({squared_to_segment(p, a, b), squared_to_segment(p, b, c), squared_to_segment(p, c, a)});
   const Vec3L n = (b - a).cross(c - a);
   const long double n2 = n.squaredNorm();
   if (n2 > 0 && n.cross(b - a).dot(p - a) >= 0 && n.cross(c - b).dot(p - b) >= 0 && n.cross(a - c).dot(p - c) >= 0) {
@@ -37,8 +36,8 @@ long double brute_force(const TriMesh& m, const Vec3& p) {
   long double best = std::numeric_limits<long double>::infinity();
   const auto v = [&](Index i) { return Vec3L(m.vertices_m.row(i).transpose().cast<long double>()); };
   for (Eigen::Index i = 0; i < m.triangles.rows(); ++i)
-    best = std::min(best, squared_to_triangle(p.cast<long double>(), v(m.triangles(i, 0)), v(m.triangles(i, 1)),
-                                              v(m.triangles(i, 2))));
+    best = std::min(
+        best, squared_to_triangle(p.cast<long double>(), v(m.triangles(i, 0)), v(m.triangles(i, 1)), v(m.triangles(i, 2))));
   return best;
 }
 
@@ -125,7 +124,8 @@ TEST_P(ClosestPointOf, first_ray_hit_is_the_nearest_of_all_triangles) {
 
 INSTANTIATE_TEST_SUITE_P(Shapes, ClosestPointOf,
                          testing::Values(shapes::box(Vec3::Ones()), shapes::sphere(0.8, 3), shapes::torus(0.7, 0.2, 40, 20),
-                                         shapes::soup(300, 1), shapes::make({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}})));
+                                         shapes::soup(300, 1),
+                                         shapes::make({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}})));
 
 TEST(TriangleTree, rays_along_edges_and_through_corners_do_not_slip_through) {
   const TriangleTree tree(shapes::sphere(1, 3));

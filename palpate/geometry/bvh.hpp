@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inside of TriangleTree and WindingNumber: a binary hierarchy of boxes over triangles.
+// Inside of TriangleTree, WindingNumber and the embedding: a binary hierarchy over the boxes of triangles or tetrahedra.
 #pragma once
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "palpate/core/mesh.hpp"
@@ -13,6 +14,7 @@ namespace palpate::geometry {
 struct Box {
   Vec3 min = Vec3::Constant(std::numeric_limits<double>::infinity());
   Vec3 max = Vec3::Constant(-std::numeric_limits<double>::infinity());
+  double squared_distance(const Vec3& p) const { return (min - p).cwiseMax(p - max).cwiseMax(0.0).squaredNorm(); }
   void add(const Vec3& p) {
     min = min.cwiseMin(p);
     max = max.cwiseMax(p);
@@ -27,24 +29,28 @@ struct Box {
   }
 };
 
+inline constexpr int bvh_stack_size = 128;
+
 /// A node holds the boxes of its two children, so that a query decides which one to visit without touching either.
-/// count > 0: leaf, triangles order[child .. child + count). count == 0: inner node `child`. child < 0: nothing there.
+/// count > 0: leaf, items order[child .. child + count). count == 0: inner node `child`. child < 0: nothing there.
 struct BvhNode {
   std::array<Box, 2> box;
   std::array<Index, 2> child{-1, -1};
   std::array<Index, 2> count{0, 0};
 };
 
-struct TriangleBvh {
+struct Bvh {
   std::vector<BvhNode> nodes;  ///< root first, children behind their parent
-  std::vector<Index> order;    ///< triangle ids, leaf after leaf
-  int depth = 0;               ///< longest path; queries need a stack of depth + 1
+  std::vector<Index> order;    ///< item ids, leaf after leaf
+  int depth = 0;               ///< longest path; at most 40 + 32, so that a stack of bvh_stack_size holds any query
 };
 
 /// Binned surface-area heuristic (Wald 2007), single-threaded and deterministic.
-TriangleBvh build_bvh(const TriMesh& mesh, int max_leaf_size);
+Bvh build_bvh(const std::vector<Box>& boxes, int max_leaf_size);
+
+std::vector<Box> triangle_boxes(const TriMesh& mesh);
 
 /// Recomputes the boxes for moved vertices; the topology stays.
-void refit_bvh(TriangleBvh& bvh, const Points& vertices_m, const Triangles& triangles);
+void refit_bvh(Bvh& bvh, const Points& vertices_m, const Triangles& triangles);
 
 }  // namespace palpate::geometry

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/geometry/triangle_bvh.hpp"
+#include "palpate/geometry/bvh.hpp"
 
 #include <algorithm>
 #include <numeric>
@@ -17,10 +17,9 @@ Box triangle_box(const Points& v, const Triangles& t, Index i) {
 }
 
 struct Builder {
-  const TriMesh& mesh;
+  const std::vector<Box>& boxes;
   int max_leaf_size;
-  TriangleBvh out;
-  std::vector<Box> boxes;
+  Bvh out;
   std::vector<Vec3> centres;
 
   Box range_box(Index first, Index last) const {
@@ -114,23 +113,26 @@ struct Builder {
 
 }  // namespace
 
-TriangleBvh build_bvh(const TriMesh& mesh, int max_leaf_size) {
-  Builder b{mesh, max_leaf_size, {}, {}, {}};
-  const auto n = static_cast<Index>(mesh.triangles.rows());
+Bvh build_bvh(const std::vector<Box>& boxes, int max_leaf_size) {
+  Builder b{boxes, max_leaf_size, {}, {}};
+  const auto n = static_cast<Index>(boxes.size());
   b.out.order.resize(n);
   std::iota(b.out.order.begin(), b.out.order.end(), 0);
-  b.boxes.reserve(n);
   b.centres.reserve(n);
-  for (Index i = 0; i < n; ++i) {
-    b.boxes.push_back(triangle_box(mesh.vertices_m, mesh.triangles, i));
-    b.centres.push_back(0.5 * (b.boxes.back().min + b.boxes.back().max));
-  }
+  for (const Box& box : boxes) b.centres.push_back(0.5 * (box.min + box.max));
   b.out.nodes.reserve(n);
   if (n > 0) b.node(0, n > 1 ? b.split(0, n, 0) : 0, n, 1);
   return std::move(b.out);
 }
 
-void refit_bvh(TriangleBvh& bvh, const Points& vertices_m, const Triangles& triangles) {
+std::vector<Box> triangle_boxes(const TriMesh& mesh) {
+  std::vector<Box> boxes;
+  boxes.reserve(mesh.triangles.rows());
+  for (Index i = 0; i < mesh.triangles.rows(); ++i) boxes.push_back(triangle_box(mesh.vertices_m, mesh.triangles, i));
+  return boxes;
+}
+
+void refit_bvh(Bvh& bvh, const Points& vertices_m, const Triangles& triangles) {
   for (auto node = bvh.nodes.rbegin(); node != bvh.nodes.rend(); ++node) {
     for (int side = 0; side < 2; ++side) {
       if (node->child[side] < 0) continue;
