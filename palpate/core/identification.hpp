@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -45,9 +46,9 @@ struct FitSummary {
 
 struct HeldOut {
   bool available = false;
-  std::string what;              ///< "push 3" or "last step"
-  double force_error = 0;        ///< relative, of the predicted force (NaN = not predicted)
-  double surface_rms_m = 0;      ///< predicted surface against the observed one
+  std::string what;          ///< "push 3" or "last step"
+  double force_error = 0;    ///< relative, of the predicted force (NaN = not predicted)
+  double surface_rms_m = 0;  ///< predicted surface against the observed one
   double baseline_no_deformation_rms_m = 0;
   double baseline_last_step_rms_m = 0;
 };
@@ -63,20 +64,31 @@ struct BudgetEntry {
 struct StepFit {
   std::string push;
   int step = 0;
-  Points surface_m;            ///< deformed vertices of Identification::surface (base frame)
-  Points observed_m;           ///< observed points (base frame, at the fitted pose)
-  VectorX residual_m;          ///< per observed point, signed
+  Points surface_m;    ///< deformed vertices of Identification::surface (base frame)
+  Points observed_m;   ///< observed points (base frame, at the fitted pose)
+  VectorX residual_m;  ///< per observed point, signed
   Vec3 force_n = Vec3::Zero();
   Vec3 contact_m = Vec3::Zero();
-  double travel_m = 0, travel_predicted_m = 0;
-  double force_measured_n = 0, force_predicted_n = 0, force_predicted_std_n = 0;
+  double tool_radius_m = 0;                                        ///< 0 = no round tip (vertices, platen)
+  double travel_m = unknown, travel_predicted_m = unknown;         ///< into the object; NaN = not measured, not predicted
+  double force_measured_n = unknown, force_predicted_n = unknown;  ///< along the push; NaN as above
+  double force_predicted_std_n = unknown;
+  VectorX von_mises_pa;  ///< per vertex of surface_m; empty = not computed
   bool used = true;
+
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct PosteriorGrid {
   VectorX young_modulus_pa;  ///< one axis (log spaced)
   VectorX poisson_ratio;     ///< other axis
   MatrixX density;           ///< rows = E, cols = nu, integrates to one over (log E, nu)
+};
+
+/// One accepted iteration of the fit, for the convergence figure.
+struct FitIteration {
+  double young_modulus_pa = 0, poisson_ratio = 0;
+  double cost = 0;  ///< half the robust, weighted sum of squares (the paper's method: its error function)
 };
 
 struct Identification {
@@ -97,6 +109,7 @@ struct Identification {
   TriMesh surface;  ///< rest surface that `steps` deform
   std::vector<StepFit> steps;
   PosteriorGrid posterior;
+  std::vector<FitIteration> trace;  ///< from the start to the optimum; empty = not kept
 };
 
 }  // namespace palpate
