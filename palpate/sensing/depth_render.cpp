@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sensing/depth_render.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "palpate/core/error.hpp"
+#include "palpate/sensing/camera.hpp"
+#include "palpate/sensing/depth_noise.hpp"
+
+namespace palpate::sensing {
+namespace {
+
+constexpr double near_m = 1e-3;
+
+// A vertex on the image: pixel and inverse depth, which is what varies linearly over a triangle's image.
+struct Corner {
+  double u, v, inverse_depth;
+};
+
+class Buffer {
+ public:
+  Buffer(int width, int height) : width_(width), height_(height), nearest_(std::size_t(width) * height, 0.0F) {}
+
+  void draw(const Corner& a, const Corner& b, const Corner& c) {
+    const double area = (b.u - a.u) * (c.v - a.v) - (c.u - a.u) * (b.v - a.v);
+    if (std::abs(area) < 1e-12) return;
+    const double top = std::min({a.v, b.v, c.v}), bottom = std::max({a.v, b.v, c.v});
+    const int first_row = std::max(0, int(std::ceil(std::max(top, -1.0))));
+    const int last_row = std::min(height_ - 1, int(std::floor(std::min(bottom, double(height_)))));
+    // Inverse depth as an affine function of the pixel.
+    const double slope_u =
+        ((b.inverse_depth - a.inverse_depth) * (c.v - a.v) - (c.inverse_depth - a.inverse_depth) * (b.v - a.v)) / area;
+    const double slope_v =
+        ((c.inverse_depth - a.inverse_depth) * (b.u - a.u) - (b.inverse_depth - a.inverse_depth) * (c.u - a.u)) / area;
+    const std::array<const Corner*, 4> loop{&a, &b, &c, &a};
+    for (int row = first_row; row <= last_row; ++row) {
+      double left = 1e300, right = -1e300;
+      for (int e = 0; e < 3; ++e) {  // where the row cuts the edges
+        const Corner &p = *loop[e], &q = *loop[e + 1];
+        if ((p.v < row && q.v < row) || (p.v > row && q.v > row)) continue;
+        if (p.v == q.v) {
+          left = std::min({left, p.u, q.u});
+          right = std::max({right, p.u, q.u});
+          continue;
+        }
+        const double u = p.u + (row - p.v) / (q.v - p.v) * (q.u - p.u);
+        left = std::min(left, u);
+        right = std::max(right, u);
+      }
+      if (!(left <= right)) continue;
+      const int first = std::max(0, int(std::ceil(std::max(left, -1.0))));
+      const int last = std::min(width_ - 1, int(std::floor(std::min(right, double(width_)))));
+      float* line = nearest_.data() + std::size_t(row) * width_;
+      const auto start = float(a.inverse_depth + slope_u * (first - a.u) + slope_v * (row - a.v));
+      for (int column = first; column <= last; ++column) {
+        const float value = start + float(slope_u) * float(column - first);
+        line[column] = std::max(line[column], value);
+      }
+    }
+  }
+
+  DepthImage depth() const {
+    DepthImage image(height_, width_);
+    for (Eigen::Index i = 0; i < image.size(); ++i) {
+      const float inverse = nearest_[std::size_t(i)];
+      image.data()[i] = inverse > 0 ? 1 / inverse : 0;
+    }
+    return image;
+  }
+
+ private:
+  int width_, height_;
+  std::vector<float> nearest_;
+};
+
+}  // namespace
+
+DepthImage render_depth(const std::vector<PosedMesh>& bodies, const Camera& camera, const Pose& T_base_camera) {
+  check(camera);
+  Buffer buffer(camera.width_px, camera.height_px);
+  const bool distorted = camera.distortion != DistortionModel::none;
+  std::vector<Vec3> points;
+  std::vector<Corner> corners;
+  const auto see = [&](const Vec3& p) {
+    if (distorted) {
+      const auto pixel = project(camera, p);
+      return Corner{pixel->x(), pixel->y(), 1 / p.z()};
+    }
+    const double inverse = 1 / p.z();
+    return Corner{camera.fx_px * p.x() * inverse + camera.cx_px, camera.fy_px * p.y() * inverse + camera.cy_px, inverse};
+  };
+  for (const PosedMesh& body : bodies) {
+    const Pose T_camera_mesh = T_base_camera.inverse() * body.T_base_mesh;
+    const Points& vertices = body.mesh->vertices_m;
+    points.resize(std::size_t(vertices.rows()));
+    corners.resize(points.size());
+    for (Eigen::Index i = 0; i < vertices.rows(); ++i) {
+      const Vec3 p = T_camera_mesh * Vec3(vertices.row(i));
+      points[std::size_t(i)] = p;
+      if (p.z() >= near_m) corners[std::size_t(i)] = see(p);
+    }
+    for (Eigen::Index t = 0; t < body.mesh->triangles.rows(); ++t) {
+      const auto triangle = body.mesh->triangles.row(t);
+      const std::array<std::size_t, 3> id{std::size_t(triangle(0)), std::size_t(triangle(1)), std::size_t(triangle(2))};
+      const int behind = (points[id[0]].z() < near_m) + (points[id[1]].z() < near_m) + (points[id[2]].z() < near_m);
+      if (behind == 0) {
+        buffer.draw(corners[id[0]], corners[id[1]], corners[id[2]]);
+      } else if (behind < 3) {
+        std::vector<Corner> polygon;  // the part in front of the near plane: 3 or 4 corners
+        for (int k = 0; k < 3; ++k) {
+          const Vec3 &p = points[id[k]], &q = points[id[(k + 1) % 3]];
+          if (p.z() >= near_m) polygon.push_back(see(p));
+          if ((p.z() >= near_m) != (q.z() >= near_m)) {
+            Vec3 cut = p + (near_m - p.z()) / (q.z() - p.z()) * (q - p);
+            cut.z() = near_m;
+            polygon.push_back(see(cut));
+          }
+        }
+        for (std::size_t k = 2; k < polygon.size(); ++k) buffer.draw(polygon[0], polygon[k - 1], polygon[k]);
+      }
+    }
+  }
+  return buffer.depth();
+}
+
+void check(const RenderMaskOptions& o) {
+  const auto bad = [](const char* field) { throw Error("must not be negative", std::string("RenderMaskOptions.") + field); };
+  if (!(o.depth_margin_m >= 0)) bad("depth_margin_m");
+  if (!(o.depth_sigmas >= 0)) bad("depth_sigmas");
+  if (!(o.lateral_margin_m >= 0)) bad("lateral_margin_m");
+  if (!(o.lateral_margin_px >= 0)) bad("lateral_margin_px");
+}
+
+MaskImage mask_rendered(const DepthFrame& frame, const DepthImage& rendered_m, const RenderMaskOptions& options) {
+  check(options);
+  if (rendered_m.rows() != frame.depth_m.rows() || rendered_m.cols() != frame.depth_m.cols())
+    throw Error("must have the size of the frame's image", "rendered_m");
+  const int rows = int(rendered_m.rows()), columns = int(rendered_m.cols());
+  const double focal = std::min(frame.camera.fx_px, frame.camera.fy_px);
+
+  // Widen the outline: every pixel at the body's border (also against a part of it that lies farther back) stamps a disc.
+  DepthImage wide = rendered_m;
+  const auto farther = [&](int row, int column, float z) {
+    if (row < 0 || row >= rows || column < 0 || column >= columns) return false;
+    const float other = rendered_m(row, column);
+    return other == 0 || other > z + float(options.depth_margin_m + 0.01);
+  };
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const float z = rendered_m(row, column);
+      if (z == 0) continue;
+      if (!farther(row, column - 1, z) && !farther(row, column + 1, z) && !farther(row - 1, column, z) &&
+          !farther(row + 1, column, z))
+        continue;
+      const double reach = options.lateral_margin_px + options.lateral_margin_m * focal / z;
+      const int whole = int(reach);
+      for (int r = std::max(0, row - whole); r <= std::min(rows - 1, row + whole); ++r)
+        for (int c = std::max(0, column - whole); c <= std::min(columns - 1, column + whole); ++c)
+          if ((r - row) * (r - row) + (c - column) * (c - column) <= reach * reach)
+            if (wide(r, c) == 0 || wide(r, c) > z) wide(r, c) = z;
+    }
+
+  MaskImage mask = MaskImage::Zero(rows, columns);
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const double body = wide(row, column), seen = frame.depth_m(row, column);
+      if (body == 0 || !(seen > 0)) continue;
+      const double tolerance =
+          options.depth_margin_m + options.depth_sigmas * axial_sigma_m(frame.noise, {body, 0.0, frame.camera.fx_px});
+      mask(row, column) = seen > body - tolerance;
+    }
+  return mask;
+}
+
+}  // namespace palpate::sensing

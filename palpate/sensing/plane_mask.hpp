@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "palpate/core/recording.hpp"
+
+namespace palpate::sensing {
+
+struct PlaneMaskOptions {
+  double margin_m = 0.003;  ///< error of the plane and of the camera's pose
+  double sigmas = 3.0;      ///< plus this many standard deviations of the sensor along the ray
+};
+
+/// Pixels that show tables and walls: 1 where the ray reaches a plane before the measurement does, or less than the margins
+/// after it. Margins act along the normal; a low part of the object within them is lost, which a likelihood can bear, while
+/// a pixel of the table taken for the object would bias it.
+/// @throws Error when a margin is negative, or the camera is behind a plane (its normal points the wrong way).
+MaskImage mask_planes(const DepthFrame& frame, const std::vector<Plane>& planes, const PlaneMaskOptions& options = {});
+
+/// Frame with `mask` merged into its own.
+/// @throws Error when the sizes differ.
+DepthFrame with_mask(DepthFrame frame, const MaskImage& mask);
+
+}  // namespace palpate::sensing

@@ -1,0 +1,132 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// The simulated sensor must show the figures that its noise model states.
+#include "palpate/lab/depth_sensor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/sensing/depth_noise.hpp"
+
+namespace palpate::lab {
+namespace {
+
+Camera camera() {
+  Camera c;
+  c.width_px = 160;
+  c.height_px = 120;
+  c.fx_px = c.fy_px = 300;
+  c.cx_px = 79.5;
+  c.cy_px = 59.5;
+  return c;
+}
+
+PerfectView wall(float depth_m, float incidence_rad = 0) {
+  PerfectView view;
+  view.depth_m = DepthImage::Constant(120, 160, depth_m);
+  view.incidence_rad = DepthImage::Constant(120, 160, incidence_rad);
+  view.label = MaskImage::Ones(120, 160);
+  return view;
+}
+
+double spread(const DepthImage& seen, double mean_m) {
+  return std::sqrt((seen.cast<double>().array() - mean_m).square().mean());
+}
+
+TEST(DepthSensor, AxialNoiseIsThatOfEveryModelAtEveryRange) {
+  for (const auto& row : sensing::depth_noise_models())
+    for (const float z : {0.4F, 0.8F, 1.5F}) {
+      DepthSensorOptions options;
+      options.noise.model = std::string(row.name);
+      options.depth_unit_m = 0;
+      Random random(11, std::uint64_t(z * 10));
+      const double expected = row.axial_sigma_m({z, 0.3, 300});
+      const DepthImage seen = sense_depth(wall(z, 0.3F), camera(), options, random);
+      // 19 200 samples: the standard error of their spread is half a per cent.
+      EXPECT_NEAR(spread(seen, z) / expected, 1, 0.02) << row.name << " at " << z;
+      EXPECT_NEAR(seen.cast<double>().mean(), z, 4 * expected / std::sqrt(19200.0)) << row.name;
+    }
+}
+
+TEST(DepthSensor, CorrelatedPartHasItsVarianceAndLength) {
+  DepthSensorOptions options;
+  options.noise = {"constant", 1e-7, 0};
+  options.correlated_sigma_m = 0.002;
+  options.correlation_px = 5;
+  options.depth_unit_m = 0;
+  double variance = 0, near = 0, far = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Random random(seed);
+    const Eigen::ArrayXXd e = sense_depth(wall(0.7F), camera(), options, random).cast<double>().array() - double(0.7F);
+    variance += e.square().mean() / 20;
+    near += (e.leftCols(155) * e.rightCols(155)).mean() / 20;  // 5 px apart: exp(-1/2)
+    far += (e.leftCols(130) * e.rightCols(130)).mean() / 20;   // 30 px apart: nothing
+  }
+  EXPECT_NEAR(std::sqrt(variance), 0.002, 1e-4);
+  EXPECT_NEAR(near / variance, std::exp(-0.5), 0.05);
+  EXPECT_NEAR(far / variance, 0, 0.05);
+}
+
+TEST(DepthSensor, FlyingPixelsStandBetweenTheTwoSidesOfAnEdge) {
+  PerfectView view = wall(1.0F);
+  view.depth_m.leftCols(80).setConstant(0.6F);
+  DepthSensorOptions options;
+  options.noise = {"constant", 1e-4, 0};
+  options.depth_unit_m = 0;
+  Random random(3);
+  const DepthImage seen = sense_depth(view, camera(), options, random);
+  int flying = 0, elsewhere = 0;
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      const float z = seen(row, column);
+      const bool between = z > 0.602F && z < 0.998F;
+      (column == 79 || column == 80 ? flying : elsewhere) += between;
+    }
+  EXPECT_EQ(elsewhere, 0);
+  EXPECT_NEAR(flying / 240.0, options.flying_pixel_share, 4 * std::sqrt(0.6 * 0.4 / 240));
+}
+
+TEST(DepthSensor, GrazingSurfacesGiveNothingAndDepthIsQuantised) {
+  DepthSensorOptions options;
+  Random random(5);
+  EXPECT_EQ(sense_depth(wall(1, 1.45F), camera(), options, random).maxCoeff(), 0);
+  const DepthImage seen = sense_depth(wall(1), camera(), options, random);
+  for (Eigen::Index i = 0; i < seen.size(); i += 37) {
+    const double units = double(seen.data()[i]) / 0.001;
+    EXPECT_NEAR(units, std::round(units), 1e-3);
+  }
+}
+
+TEST(DepthSensor, SameSeedSameImage) {
+  const PerfectView view = wall(0.9F);
+  Random a(9, 2), b(9, 2), c(9, 3);
+  const DepthImage first = sense_depth(view, camera(), {}, a);
+  EXPECT_EQ(first, sense_depth(view, camera(), {}, b));
+  EXPECT_NE(first, sense_depth(view, camera(), {}, c));
+}
+
+TEST(DepthSensor, BadOptionsAreRefused) {
+  const auto refused = [](auto change) {
+    DepthSensorOptions options;
+    change(options);
+    try {
+      check(options);
+    } catch (const Error&) {
+      return true;
+    }
+    return false;
+  };
+  using O = DepthSensorOptions;
+  EXPECT_FALSE(refused([](O&) {}));
+  EXPECT_TRUE(refused([](O& o) { o.correlated_sigma_m = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.correlation_px = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.flying_pixel_share = 1.1; }));
+  EXPECT_TRUE(refused([](O& o) { o.dropout_incidence_rad = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.depth_unit_m = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.noise.model = "eye"; }));
+}
+
+}  // namespace
+}  // namespace palpate::lab
