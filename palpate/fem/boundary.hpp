@@ -27,14 +27,22 @@ TetMesh refine_uniform(const TetMesh& mesh);
 Eigen::SparseMatrix<double> spread_over_nodes(Index node_count, const std::vector<Index>& nodes);
 
 /// Three columns: consistent nodal forces of a uniform traction with unit resultant over the part of the boundary inside a
-/// sphere of radius_m about centre_m (exact disc quadrature by sub-sampling; never the nearest node). @throws Error when no
-/// boundary face lies in it.
+/// sphere of radius_m about centre_m (exact disc quadrature by sub-sampling; never the nearest node). Only the connected
+/// part of the boundary around the point nearest to the centre counts, so the far side of a thin object is not pushed.
+/// @throws Error when no boundary face lies in it.
 Eigen::SparseMatrix<double> spread_over_patch(const TetMesh& mesh, const Vec3& centre_m, double radius_m);
 
 /// Three columns: body force per unit density (kg/m3) and unit acceleration along x, y, z: newton.
 Eigen::SparseMatrix<double> body_force(const TetMesh& mesh);
 
-/// Nodes that a support holds. @throws Error naming the support when it holds none.
+/// Product of the consistent mass matrix at unit density with nodal fields (3n x c): kg per kg/m3 times the field's unit.
+MatrixX mass_times(const TetMesh& mesh, const MatrixX& fields);
+
+/// Volume of the mesh, m3.
+double volume(const TetMesh& mesh);
+
+/// Nodes that a support holds (of a quadratic mesh also the midpoints of edges between two listed corners). @throws Error
+/// naming the support when it holds none.
 std::vector<Index> support_nodes(const TetMesh& mesh, const Support& support);
 
 }  // namespace palpate::fem

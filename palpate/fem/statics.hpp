@@ -28,46 +28,50 @@ struct Constraint {
 };
 
 struct Boundary {
-  std::vector<Constraint> constraints;        ///< at most one a node
-  Eigen::SparseMatrix<double> forces;         ///< 3n x k, newton per unit coefficient
-  Eigen::SparseMatrix<double> motions;        ///< 3n x m, metres per unit coefficient, non-zero on constrained nodes only
-  bool inertia_relief = false;                ///< free object: rigid motions projected out, no constraints
+  std::vector<Constraint> constraints;  ///< at most one a node
+  Eigen::SparseMatrix<double> forces;   ///< 3n x k, newton per unit coefficient
+  Eigen::SparseMatrix<double> motions;  ///< 3n x m, metres per unit coefficient, non-zero on constrained nodes only
+  bool inertia_relief = false;          ///< free object: rigid motions projected out, no constraints
 };
 
 struct StaticsOptions {
   double residual_tolerance = 1e-9;  ///< on free dofs, relative to the largest of external and internal force norms
   int max_newton_steps = 60;
-  int max_load_steps = 400;          ///< in the continuation that is started when plain Newton fails
+  int max_load_steps = 400;  ///< in the continuation that is started when plain Newton fails
   int threads = 1;
 };
 
 /// A state of the body. `converged` false is a result, not an exception; `reason` says why in plain words.
 struct Equilibrium {
-  VectorX displacement_m;            ///< 3n, node-major (x0 y0 z0 x1 ...)
+  VectorX displacement_m;  ///< 3n, node-major (x0 y0 z0 x1 ...)
   double young_modulus_pa = 0, poisson_ratio = 0;
+  VectorX extra;  ///< the material's further parameters
   VectorX force_coefficients, motion_coefficients;
-  VectorX motion_reaction;           ///< m: work-conjugate to the motion coefficients, M' (f_int - F a), newton
+  VectorX motion_reaction;  ///< m: work-conjugate to the motion coefficients, M' (f_int - F a), newton
   bool converged = false;
-  std::string reason;
+  std::string reason;  ///< why it did not converge, or what is odd about the state (inverted elements)
   int newton_steps = 0;
   int factorisations = 0;
   int inverted_elements = 0;
-  double residual = 0;               ///< relative, as in StaticsOptions
+  double residual = 0;  ///< relative, as in StaticsOptions
 };
 
 /// Exact derivatives from the tangent's factor at the equilibrium (implicit function theorem).
 struct Sensitivity {
-  VectorX d_log_young;               ///< 3n: du / d log E
-  VectorX d_poisson;                 ///< 3n: du / d nu
-  MatrixX d_force;                   ///< 3n x k: du / d a
-  MatrixX d_motion;                  ///< 3n x m: du / d b
-  VectorX reaction_d_log_young;      ///< m
-  VectorX reaction_d_poisson;        ///< m
-  MatrixX reaction_d_force;          ///< m x k
-  MatrixX reaction_d_motion;         ///< m x m
+  VectorX d_log_young;           ///< 3n: du / d log E
+  VectorX d_poisson;             ///< 3n: du / d nu
+  MatrixX d_extra;               ///< 3n x e: du / d extra
+  MatrixX d_force;               ///< 3n x k: du / d a
+  MatrixX d_motion;              ///< 3n x m: du / d b
+  VectorX reaction_d_log_young;  ///< m
+  VectorX reaction_d_poisson;    ///< m
+  MatrixX reaction_d_extra;      ///< m x e
+  MatrixX reaction_d_force;      ///< m x k
+  MatrixX reaction_d_motion;     ///< m x m
 };
 
-/// Immutable description (mesh, element, material, boundary) plus the symbolic analysis that all solves share.
+/// Immutable description (mesh, element, material, boundary) plus the symbolic analysis that all solves share. Calls are
+/// const but share scratch memory and the last factor: use one Statics a thread.
 class Statics {
  public:
   /// @param mesh   linear (4 columns) or quadratic (10 columns) tetrahedra; the columns choose the element
@@ -80,7 +84,9 @@ class Statics {
   Statics& operator=(Statics&&) noexcept;
 
   /// @param extra  values of the material's further parameters (e.g. alpha of the foam law), in its table's order
-  /// @param start  displacement to start Newton from (nullptr: zero, or loads are stepped when that fails)
+  /// Newton's method with a line search on the potential energy; when it fails from `start`, the loads are stepped from
+  /// rest.
+  /// @param start  displacement to start Newton from (nullptr: zero)
   Equilibrium solve(double young_modulus_pa, double poisson_ratio, const VectorX& force_coefficients,
                     const VectorX& motion_coefficients, const VectorX* start = nullptr, const VectorX& extra = {}) const;
 

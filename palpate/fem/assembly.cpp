@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/assembly.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/tetrahedron.hpp"
+
+namespace palpate::fem {
+
+VectorX multiply(const BlockPattern& pattern, const BlockValues& values, const Eigen::Ref<const VectorX>& x) {
+  VectorX y = VectorX::Zero(x.size());
+  for (Index j = 0; j < pattern.nodes; ++j) {
+    const Vec3 xj = x.segment<3>(3 * j);
+    Vec3 yj = Vec3::Zero();
+    Index p = pattern.column_start[j];
+    yj += Eigen::Map<const Mat3>(&values[9 * p]) * xj;
+    for (++p; p < pattern.column_start[j + 1]; ++p) {
+      const Index i = pattern.row[p];
+      const Eigen::Map<const Mat3> block(&values[9 * p]);
+      y.segment<3>(3 * i).noalias() += block * xj;
+      yj.noalias() += block.transpose() * x.segment<3>(3 * i);
+    }
+    y.segment<3>(3 * j) += yj;
+  }
+  return y;
+}
+
+Assembly::Assembly(const TetMesh& mesh) {
+  const Index n = static_cast<Index>(mesh.nodes_m.rows());
+  const Index elements = static_cast<Index>(mesh.tetrahedra.rows());
+  const int nodes = static_cast<int>(mesh.tetrahedra.cols());
+  if (nodes != 4 && nodes != 10) throw Error("needs 4 or 10 columns, has " + std::to_string(nodes), "mesh.tetrahedra");
+  if (elements == 0) throw Error("is empty", "mesh.tetrahedra");
+  if (!mesh.nodes_m.allFinite()) throw Error("holds NaN or infinity", "mesh.nodes_m");
+  pattern_.nodes = n;
+  connectivity_ = mesh.tetrahedra;
+  const auto quadrature = nodes == 4 ? tet_quadrature_1() : tet_quadrature_4();
+  const auto points = static_cast<Index>(quadrature.size());
+  gradients_.resize(static_cast<std::size_t>(elements) * points * nodes * 3);
+  weights_.resize(static_cast<std::size_t>(elements) * points);
+  const Vec3 extent = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).transpose();
+  const double tiny_volume = 1e-18 * std::pow(extent.maxCoeff(), 3);
+
+  double* gradient = gradients_.data();
+  for (Index e = 0; e < elements; ++e) {
+    Eigen::Matrix<double, Eigen::Dynamic, 3> x(nodes, 3);
+    std::array<int, 10> order{};
+    std::iota(order.begin(), order.begin() + nodes, 0);
+    for (int a = 0; a < nodes; ++a) {
+      const Index node = mesh.tetrahedra(e, a);
+      if (node < 0 || node >= n)
+        throw Error("names node " + std::to_string(node) + ", the mesh has " + std::to_string(n),
+                    "mesh.tetrahedra row " + std::to_string(e));
+      x.row(a) = mesh.nodes_m.row(node);
+    }
+    std::sort(order.begin(), order.begin() + nodes,
+              [&](int a, int b) { return mesh.tetrahedra(e, a) < mesh.tetrahedra(e, b); });
+    for (int a = 0; a < nodes; ++a) connectivity_(e, a) = mesh.tetrahedra(e, order[a]);
+    for (int a = 1; a < nodes; ++a)
+      if (connectivity_(e, a) == connectivity_(e, a - 1))
+        throw Error("names a node twice", "mesh.tetrahedra row " + std::to_string(e));
+    for (Index q = 0; q < points; ++q) {
+      const auto d = tet_shape_gradient(nodes, quadrature[q].barycentric);
+      const Mat3 jacobian = x.transpose() * d;  // dx_i / dxi_j
+      const double volume = jacobian.determinant() * quadrature[q].weight;
+      if (!(volume > tiny_volume))
+        throw Error(
+            jacobian.determinant() < 0 ? "the element is inside out (swap two of its corners)" : "the element has no volume",
+            "mesh.tetrahedra row " + std::to_string(e));
+      const Eigen::Matrix<double, Eigen::Dynamic, 3> g = d * jacobian.inverse();
+      for (int a = 0; a < nodes; ++a)
+        for (int i = 0; i < 3; ++i) *gradient++ = g(order[a], i);
+      weights_[static_cast<std::size_t>(e) * points + q] = volume;
+      volume_ += volume;
+    }
+  }
+  build_pattern();
+}
+
+void Assembly::build_pattern() {
+  const Index n = pattern_.nodes;
+  const int nodes = static_cast<int>(connectivity_.cols());
+  std::vector<std::vector<Index>> rows(n);
+  for (Index e = 0; e < connectivity_.rows(); ++e)
+    for (int b = 0; b < nodes; ++b)
+      for (int a = b + 1; a < nodes; ++a) rows[connectivity_(e, b)].push_back(connectivity_(e, a));
+  pattern_.column_start.assign(1, 0);
+  for (Index j = 0; j < n; ++j) {
+    auto& r = rows[j];
+    std::sort(r.begin(), r.end());
+    r.erase(std::unique(r.begin(), r.end()), r.end());
+    pattern_.row.push_back(j);
+    pattern_.row.insert(pattern_.row.end(), r.begin(), r.end());
+    pattern_.column_start.push_back(static_cast<Index>(pattern_.row.size()));
+  }
+  block_of_.reserve(static_cast<std::size_t>(connectivity_.rows()) * nodes * (nodes + 1) / 2);
+  for (Index e = 0; e < connectivity_.rows(); ++e)
+    for (int b = 0; b < nodes; ++b) {
+      const Index j = connectivity_(e, b);
+      const auto begin = pattern_.row.begin() + pattern_.column_start[j],
+                 end = pattern_.row.begin() + pattern_.column_start[j + 1];
+      for (int a = b; a < nodes; ++a)
+        block_of_.push_back(static_cast<Index>(std::lower_bound(begin, end, connectivity_(e, a)) - pattern_.row.begin()));
+    }
+}
+
+// Calls function(element, gradients (N x 3), weight, displacement gradient) at every quadrature point until it returns
+// false.
+template <int N, int Q, typename Function>
+void Assembly::for_each_point(const VectorX& u, Function&& function) const {
+  using Gradients = Eigen::Matrix<double, N, 3, Eigen::RowMajor>;
+  const double* gradient = gradients_.data();
+  const double* weight = weights_.data();
+  for (Index e = 0; e < connectivity_.rows(); ++e) {
+    Eigen::Matrix<double, 3, N> ue;
+    for (int a = 0; a < N; ++a) ue.col(a) = u.segment<3>(3 * connectivity_(e, a));
+    for (int q = 0; q < Q; ++q, gradient += 3 * N, ++weight) {
+      const Eigen::Map<const Gradients> g(gradient);
+      const Mat3 h = ue * g;
+      if (!function(e, g, *weight, h)) return;
+    }
+  }
+}
+
+template <int N, int Q>
+double Assembly::energy_and_forces_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, VectorX& forces,
+                                      int* inverted) const {
+  forces.setZero(u.size());
+  double energy = 0;
+  Index last_inverted = -1;
+  if (inverted) *inverted = 0;
+  Mat3 stress;
+  for_each_point<N, Q>(u, [&](Index e, const auto& g, double weight, const Mat3& h) {
+    const double density = law.energy_and_stress(m, h, stress);
+    if (!(density < std::numeric_limits<double>::infinity())) {
+      energy = std::numeric_limits<double>::infinity();
+      return false;
+    }
+    energy += weight * density;
+    const Eigen::Matrix<double, 3, N> f = (weight * stress) * g.transpose();
+    for (int a = 0; a < N; ++a) forces.segment<3>(3 * connectivity_(e, a)) += f.col(a);
+    if (inverted && e != last_inverted && volume_change(h) <= -1) {
+      ++*inverted;
+      last_inverted = e;
+    }
+    return true;
+  });
+  return energy;
+}
+
+template <int N, int Q>
+void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const {
+  blocks.assign(9 * static_cast<std::size_t>(pattern_.block_count()), 0.0);
+  constexpr int kPairs = N * (N + 1) / 2;
+  alignas(64) double local[kPairs * 9];
+  int point = 0;
+  Mat9 c;
+  for_each_point<N, Q>(u, [&](Index e, const auto& g, double weight, const Mat3& h) {
+    if (point == 0) std::fill(local, local + kPairs * 9, 0.0);
+    law.tangent(m, h, c);
+    c *= weight;
+    double* block = local;
+    for (int b = 0; b < N; ++b) {
+      // D(ij, k) = sum_l C(ij, kl) G_bl, then K_ab(i, k) = sum_j G_aj D(ij, k).
+      Eigen::Matrix<double, 9, 3> d;
+      d.noalias() =
+          g(b, 0) * c.template leftCols<3>() + g(b, 1) * c.template middleCols<3>(3) + g(b, 2) * c.template rightCols<3>();
+      for (int a = b; a < N; ++a, block += 9)
+        Eigen::Map<Mat3>(block).noalias() +=
+            g(a, 0) * d.template topRows<3>() + g(a, 1) * d.template middleRows<3>(3) + g(a, 2) * d.template bottomRows<3>();
+    }
+    if (++point == Q) {
+      point = 0;
+      const Index* target = &block_of_[static_cast<std::size_t>(e) * kPairs];
+      for (int p = 0; p < kPairs; ++p) {
+        double* to = &blocks[9 * static_cast<std::size_t>(target[p])];
+        for (int i = 0; i < 9; ++i) to[i] += local[9 * p + i];
+      }
+    }
+    return true;
+  });
+}
+
+template <typename Stress>
+VectorX Assembly::forces_of(const VectorX& u, Stress&& stress) const {
+  VectorX forces = VectorX::Zero(u.size());
+  const auto add = [&](Index e, const auto& g, double weight, const Mat3& h) {
+    const Mat3 p = weight * stress(h);
+    for (int a = 0; a < g.rows(); ++a) forces.segment<3>(3 * connectivity_(e, a)) += p * g.row(a).transpose();
+    return true;
+  };
+  if (connectivity_.cols() == 4)
+    for_each_point<4, 1>(u, add);
+  else
+    for_each_point<10, 4>(u, add);
+  return forces;
+}
+
+double Assembly::energy_and_forces(const MaterialLaw& law, const Moduli& m, const VectorX& u, VectorX& forces,
+                                   int* inverted) const {
+  return connectivity_.cols() == 4 ? energy_and_forces_of<4, 1>(law, m, u, forces, inverted)
+                                   : energy_and_forces_of<10, 4>(law, m, u, forces, inverted);
+}
+
+void Assembly::tangent(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const {
+  if (connectivity_.cols() == 4)
+    tangent_of<4, 1>(law, m, u, blocks);
+  else
+    tangent_of<10, 4>(law, m, u, blocks);
+}
+
+VectorX Assembly::forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const {
+  return forces_of(u, [&](const Mat3& h) { return law.stress_d_poisson(m, h); });
+}
+
+VectorX Assembly::forces_d_extra(const MaterialLaw& law, const Moduli& m, const VectorX& u, int index) const {
+  return forces_of(u, [&](const Mat3& h) { return law.stress_d_extra(m, h, index); });
+}
+
+}  // namespace palpate::fem

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// From nodal displacements to internal forces, energy and tangent. Everything that depends on the mesh alone (shape function
+// gradients, sparsity, where each element block goes) is computed once.
+#pragma once
+
+#include <vector>
+
+#include "palpate/core/math.hpp"
+#include "palpate/core/mesh.hpp"
+#include "palpate/fem/materials.hpp"
+
+namespace palpate::fem {
+
+/// Symmetric matrix of 3 x 3 blocks, lower triangle by block columns (row block >= column block, rows ascending, the
+/// diagonal block first and stored whole). Blocks are column-major.
+struct BlockPattern {
+  Index nodes = 0;
+  std::vector<Index> column_start;  ///< nodes + 1
+  std::vector<Index> row;           ///< one a block
+  Index block_count() const { return static_cast<Index>(row.size()); }
+};
+using BlockValues = std::vector<double>;  ///< 9 a block
+
+/// y = A x of a symmetric block matrix.
+VectorX multiply(const BlockPattern& pattern, const BlockValues& values, const Eigen::Ref<const VectorX>& x);
+
+class Assembly {
+ public:
+  /// @throws Error on indices out of range, an inside-out or degenerate element, or a column count other than 4 or 10.
+  explicit Assembly(const TetMesh& mesh);
+
+  Index node_count() const { return pattern_.nodes; }
+  Index element_count() const { return static_cast<Index>(connectivity_.rows()); }
+  const BlockPattern& pattern() const { return pattern_; }
+  double volume_m3() const { return volume_; }
+
+  /// Energy [J] and internal forces (3n, newton) of the displacement u (3n). Infinity, and forces undefined, where the law
+  /// does not exist. `inverted` counts elements with J <= 0 at a quadrature point.
+  double energy_and_forces(const MaterialLaw& law, const Moduli& m, const VectorX& u, VectorX& forces,
+                           int* inverted = nullptr) const;
+
+  /// Tangent stiffness in the pattern's blocks.
+  void tangent(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
+
+  /// d(internal forces)/dnu at constant E and u.
+  VectorX forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const;
+  /// d(internal forces)/d extra[index] at constant u.
+  VectorX forces_d_extra(const MaterialLaw& law, const Moduli& m, const VectorX& u, int index) const;
+
+ private:
+  template <int N, int Q, typename Function>
+  void for_each_point(const VectorX& u, Function&& function) const;
+  template <int N, int Q>
+  double energy_and_forces_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, VectorX& forces,
+                              int* inverted) const;
+  template <int N, int Q>
+  void tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
+  template <typename Stress>
+  VectorX forces_of(const VectorX& u, Stress&& stress) const;
+
+  void build_pattern();
+
+  Tetrahedra connectivity_;        // nodes of an element in ascending order: local block a >= b is then a lower block
+  std::vector<double> gradients_;  // element, quadrature point, node, 3
+  std::vector<double> weights_;    // element, quadrature point
+  std::vector<Index> block_of_;    // element, pairs a >= b
+  BlockPattern pattern_;
+  double volume_ = 0;
+};
+
+}  // namespace palpate::fem

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// Traction over a patch of the boundary, with consistent nodal forces.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <queue>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+
+namespace palpate::fem {
+namespace {
+
+constexpr int kDepth = 8;  // a face that the rim crosses is halved this often along the rim: 1/256 of an edge
+
+VectorX face_shape(Index nodes, const Vec3& l) {
+  if (nodes == 3) return l;
+  VectorX n(6);
+  n << l(0) * (2 * l(0) - 1), l(1) * (2 * l(1) - 1), l(2) * (2 * l(2) - 1), 4 * l(0) * l(1), 4 * l(1) * l(2),
+      4 * l(2) * l(0);
+  return n;
+}
+
+class Patch {
+ public:
+  Patch(const TetMesh& mesh, const Tetrahedra& faces, const Vec3& centre, double radius)
+      : mesh_(mesh), faces_(faces), centre_(centre), radius_(radius) {}
+
+  // Integral of the face's shape functions over the part of the face inside the sphere.
+  VectorX integrate(Index face) const {
+    VectorX sum = VectorX::Zero(faces_.cols());
+    add(face, Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ(), 0, sum);
+    return sum;
+  }
+
+  Vec3 at(Index face, const Vec3& l) const {
+    const VectorX n = face_shape(static_cast<Index>(faces_.cols()), l);
+    Vec3 x = Vec3::Zero();
+    for (Index k = 0; k < n.size(); ++k) x += n(k) * mesh_.nodes_m.row(faces_(face, k)).transpose();
+    return x;
+  }
+
+  // Nearest point of the flat triangle of a face's corners to the centre, squared distance.
+  double distance2(Index face) const {
+    double best = std::numeric_limits<double>::infinity();
+    const int n = 8;
+    for (int i = 0; i <= n; ++i)
+      for (int j = 0; i + j <= n; ++j) {
+        const Vec3 l(1.0 - double(i + j) / n, double(i) / n, double(j) / n);
+        best = std::min(best, (at(face, l) - centre_).squaredNorm());
+      }
+    return best;
+  }
+
+ private:
+  void add(Index face, const Vec3& a, const Vec3& b, const Vec3& c, int depth, VectorX& sum) const {
+    const Vec3 xa = at(face, a), xb = at(face, b), xc = at(face, c);
+    const Vec3 middle = (xa + xb + xc) / 3;
+    const double reach =
+        std::sqrt(std::max({(xa - middle).squaredNorm(), (xb - middle).squaredNorm(), (xc - middle).squaredNorm()}));
+    const double distance = (middle - centre_).norm();
+    if (distance > radius_ + 1.1 * reach) return;
+    const bool inside = distance < radius_ - 1.1 * reach;
+    if (depth < kDepth && !(inside && depth >= (faces_.cols() == 6 ? 2 : 0))) {
+      const Vec3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
+      add(face, a, ab, ca, depth + 1, sum);
+      add(face, ab, b, bc, depth + 1, sum);
+      add(face, ca, bc, c, depth + 1, sum);
+      add(face, ab, bc, ca, depth + 1, sum);
+      return;
+    }
+    if (!inside && distance > radius_) return;
+    // Three-point rule, exact for the quadratic shape functions of a flat face.
+    const double area = 0.5 * (xb - xa).cross(xc - xa).norm();
+    const Eigen::Index n = faces_.cols();
+    for (const Vec3& l : {Vec3(0.5 * (a + b)), Vec3(0.5 * (b + c)), Vec3(0.5 * (c + a))})
+      sum += area / 3 * face_shape(static_cast<Index>(n), l);
+  }
+
+  const TetMesh& mesh_;
+  const Tetrahedra& faces_;
+  Vec3 centre_;
+  double radius_;
+};
+
+}  // namespace
+
+Eigen::SparseMatrix<double> spread_over_patch(const TetMesh& mesh, const Vec3& centre_m, double radius_m) {
+  if (!(radius_m > 0)) throw Error("must be positive, is " + std::to_string(radius_m), "radius_m");
+  const Tetrahedra faces = boundary_faces(mesh);
+  const Patch patch(mesh, faces, centre_m, radius_m);
+  const Index n = static_cast<Index>(mesh.nodes_m.rows());
+
+  std::map<Index, VectorX> share;  // faces that the sphere reaches
+  Index nearest = -1;
+  double nearest2 = std::numeric_limits<double>::infinity();
+  for (Index f = 0; f < faces.rows(); ++f) {
+    const VectorX sum = patch.integrate(f);
+    if (sum.cwiseAbs().sum() == 0) continue;
+    share[f] = sum;
+    const double d2 = patch.distance2(f);
+    if (d2 < nearest2) {
+      nearest2 = d2;
+      nearest = f;
+    }
+  }
+  if (nearest < 0)
+    throw Error(
+        "no boundary face lies within " + std::to_string(radius_m) + " m of the contact point: is it in the mesh's frame?",
+        "contact_m");
+
+  // Walk over shared edges from the nearest face.
+  std::map<std::pair<Index, Index>, std::vector<Index>> by_edge;
+  for (const auto& [f, sum] : share)
+    for (int k = 0; k < 3; ++k) by_edge[std::minmax(faces(f, k), faces(f, (k + 1) % 3))].push_back(f);
+  std::map<Index, bool> reached{{nearest, true}};
+  std::queue<Index> front;
+  front.push(nearest);
+  while (!front.empty()) {
+    const Index f = front.front();
+    front.pop();
+    for (int k = 0; k < 3; ++k)
+      for (Index other : by_edge[std::minmax(faces(f, k), faces(f, (k + 1) % 3))])
+        if (!reached.count(other)) {
+          reached[other] = true;
+          front.push(other);
+        }
+  }
+
+  VectorX weight = VectorX::Zero(n);
+  for (const auto& [f, flag] : reached)
+    for (Index k = 0; k < faces.cols(); ++k) weight(faces(f, k)) += share[f](k);
+  const double area = weight.sum();
+  std::vector<Eigen::Triplet<double>> triplets;
+  for (Index i = 0; i < n; ++i)
+    if (weight(i) != 0)
+      for (int k = 0; k < 3; ++k) triplets.emplace_back(3 * i + k, k, weight(i) / area);
+  Eigen::SparseMatrix<double> columns(3 * n, 3);
+  columns.setFromTriplets(triplets.begin(), triplets.end());
+  return columns;
+}
+
+}  // namespace palpate::fem

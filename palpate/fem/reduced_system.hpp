@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// The tangent on the degrees of freedom that may move: clamped nodes are left out, the axes of partly held nodes are
+// rotated, rigid motions of a free object are kept out by a border. One symbolic analysis serves every factorisation.
+#pragma once
+
+#include <Eigen/SparseCore>
+#include <optional>
+#include <vector>
+
+#include "palpate/core/math.hpp"
+#include "palpate/fem/assembly.hpp"
+#include "palpate/fem/sparse_factor.hpp"
+#include "palpate/fem/statics.hpp"
+
+namespace palpate::fem {
+
+class ReducedSystem {
+ public:
+  /// @param rigid_border  3n x 6 mass-weighted rigid motions of a free object, or 3n x 0
+  ReducedSystem(const BlockPattern& pattern, const std::vector<Constraint>& constraints, MatrixX rigid_border,
+                const Points& nodes_m, int threads);
+
+  /// Part of a displacement (3n) along prescribed directions.
+  VectorX prescribed_part(const VectorX& u) const;
+  /// Removes from a residual (3n) what supports carry: prescribed directions, or rigid-body inertia of a free object.
+  VectorX free_part(const VectorX& force) const;
+
+  /// Factorises blocks + shift * diagonal. False when the matrix is not positive definite.
+  bool factorise(const BlockPattern& pattern, const BlockValues& blocks, double shift = 0);
+  /// The same for the tangent of an unstable state (some negative pivots). False when it is singular.
+  bool factorise_indefinite(const BlockPattern& pattern, const BlockValues& blocks);
+
+  /// du (3n x c) with K_ff du_f = rhs_f, du_c = 0 (free object: rigid part of du zero, inertia balances rhs).
+  MatrixX solve(const MatrixX& right_hand_sides) const;
+
+ private:
+  void analyse(const BlockPattern& pattern);
+  void fill(const BlockPattern& pattern, const BlockValues& blocks, double shift);
+  MatrixX reduce(const MatrixX& full) const;
+  MatrixX expand(const MatrixX& reduced) const;
+  bool complete_border();
+  void solve_reduced(MatrixX& reduced) const;
+
+  Index nodes_ = 0;
+  std::vector<Index> kept_;        // reduced node of a node, or -1
+  std::vector<Index> kept_nodes_;  // node of a reduced node
+  std::vector<int> special_;       // per node: index into partial_ or -1
+  struct Partial {
+    Mat3 axes;
+    int count;
+  };
+  std::vector<Partial> partial_;
+  std::vector<Constraint> constraints_;
+  Eigen::SparseMatrix<double> lower_;
+  SparseFactor factor_;
+  std::optional<SparseFactor> indefinite_;  // made when a tangent is first met that is not positive definite
+  bool use_indefinite_ = false;
+  int threads_ = 1;
+  // Free object: K = K_s - spring E E' with nine springs at three nodes, and the border B.
+  MatrixX border_;
+  std::vector<Index> spring_dofs_;
+  double spring_ = 0;
+  MatrixX border_solution_;  // K_s^-1 [B E]
+  Eigen::MatrixXd schur_inverse_;
+};
+
+/// Orthonormal rigid motions about the origin of the nodes' bounding box, 3n x 6: translations along x, y, z, rotations
+/// about x, y, z.
+MatrixX rigid_motions(const Points& nodes_m);
+
+/// @throws Error that names a rigid motion which the constraints leave free, for every connected part of the mesh.
+void check_supported(const TetMesh& mesh, const std::vector<Constraint>& constraints);
+
+}  // namespace palpate::fem

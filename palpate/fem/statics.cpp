@@ -1,0 +1,409 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/statics.hpp"
+
+#include <Eigen/QR>
+#include <cmath>
+#include <limits>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/assembly.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/fem/materials.hpp"
+#include "palpate/fem/reduced_system.hpp"
+
+namespace palpate::fem {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Completes the axes to an orthonormal basis, holds nodes that no element uses, checks indices and motions.
+Boundary checked(const TetMesh& mesh, Boundary boundary) {
+  const Index n = static_cast<Index>(mesh.nodes_m.rows());
+  std::vector<char> used(n, 0), constrained(n, 0);
+  for (Index e = 0; e < mesh.tetrahedra.rows(); ++e)
+    for (int a = 0; a < mesh.tetrahedra.cols(); ++a) used[mesh.tetrahedra(e, a)] = 1;
+  for (Constraint& c : boundary.constraints) {
+    if (c.node < 0 || c.node >= n)
+      throw Error("names node " + std::to_string(c.node) + ", the mesh has " + std::to_string(n), "boundary.constraints");
+    if (c.count < 0 || c.count > 3) throw Error("count must be 0 to 3", "boundary.constraints");
+    if (constrained[c.node]) throw Error("node " + std::to_string(c.node) + " is constrained twice", "boundary.constraints");
+    constrained[c.node] = 1;
+    const auto given = c.axes.leftCols(c.count);
+    if (!(given.transpose() * given).isApprox(MatrixX::Identity(c.count, c.count), 1e-6) && c.count > 0)
+      throw Error("axes of node " + std::to_string(c.node) + " are not orthonormal", "boundary.constraints");
+    if (c.count > 0) {
+      const Eigen::HouseholderQR<Eigen::Matrix<double, 3, Eigen::Dynamic>> qr(given);
+      const Mat3 q = qr.householderQ();
+      c.axes.rightCols(3 - c.count) = q.rightCols(3 - c.count);
+      if (c.count == 3) c.axes.setIdentity();
+    }
+  }
+  if (boundary.inertia_relief && !boundary.constraints.empty())
+    throw Error("a free object (inertia relief) cannot have constraints as well", "boundary.inertia_relief");
+  for (Index i = 0; i < n; ++i)
+    if (!used[i] && !constrained[i]) boundary.constraints.push_back({i, Mat3::Identity(), 3});
+  const auto sized = [n](Eigen::SparseMatrix<double>& columns, const char* name) {
+    if (columns.cols() == 0) columns.resize(3 * n, 0);
+    if (columns.rows() != 3 * n)
+      throw Error("needs " + std::to_string(3 * n) + " rows, has " + std::to_string(columns.rows()), name);
+  };
+  sized(boundary.forces, "boundary.forces");
+  sized(boundary.motions, "boundary.motions");
+  for (Index k = 0; k < boundary.motions.outerSize(); ++k)
+    for (Eigen::SparseMatrix<double>::InnerIterator it(boundary.motions, k); it; ++it)
+      if (it.value() != 0 && !constrained[it.row() / 3])
+        throw Error("moves node " + std::to_string(it.row() / 3) + ", which no constraint holds", "boundary.motions");
+  return boundary;
+}
+
+}  // namespace
+
+struct Statics::Impl {
+  Impl(const TetMesh& mesh_in, const std::string& material, Boundary boundary_in, StaticsOptions options_in)
+      : mesh(mesh_in),
+        law(material_law(material)),
+        options(options_in),
+        assembly(mesh_in),
+        boundary(checked(mesh_in, std::move(boundary_in))),
+        free(boundary.inertia_relief),
+        system(assembly.pattern(), boundary.constraints,
+               free ? mass_times(mesh_in, rigid_motions(mesh_in.nodes_m)) : MatrixX::Zero(3 * mesh_in.nodes_m.rows(), 0),
+               mesh_in.nodes_m, options_in.threads) {
+    if (!free) check_supported(mesh, boundary.constraints);
+    motions = MatrixX(boundary.motions);
+    for (Index k = 0; k < motions.cols(); ++k) motions.col(k) = system.prescribed_part(motions.col(k));
+    diameter_m = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
+    if (law.is_linear()) {
+      Moduli unit;
+      const VectorX rest = VectorX::Zero(3 * assembly.node_count());
+      unit.lambda = 1;
+      assembly.tangent(law, unit, rest, blocks_lambda);
+      unit.lambda = 0;
+      unit.mu = 1;
+      assembly.tangent(law, unit, rest, blocks_mu);
+    }
+  }
+
+  // ---- the problem of one set of parameters and coefficients
+  struct Problem {
+    Moduli m;
+    VectorX external;    // F a
+    VectorX prescribed;  // P_c M b
+  };
+
+  struct State {
+    VectorX u, internal;
+    double energy = 0;    // strain energy minus work of the dead loads
+    double residual = 0;  // relative
+    VectorX unbalanced;   // free part of f_int - F a
+    int inverted = 0;
+  };
+
+  // False where the law does not exist.
+  bool evaluate(const Problem& p, State& s) const {
+    const double strain_energy = assembly.energy_and_forces(law, p.m, s.u, s.internal, &s.inverted);
+    if (!(strain_energy < kInfinity)) return false;
+    s.energy = strain_energy - p.external.dot(s.u);
+    s.unbalanced = system.free_part(s.internal - p.external);
+    const double scale = std::max(p.external.norm(), s.internal.norm());
+    s.residual = scale > 0 ? s.unbalanced.norm() / scale : 0;
+    return std::isfinite(s.energy) && std::isfinite(s.residual);
+  }
+
+  bool factorise_tangent(const Problem& p, const VectorX& u, int& factorisations, bool* shifted = nullptr) {
+    assembly.tangent(law, p.m, u, blocks);
+    factored_u.resize(0);
+    // The exact tangent first; a shifted one only where it is not positive definite (clamping every element would destroy
+    // quadratic convergence). Under a limit load the shift keeps descent towards a stable equilibrium.
+    for (double shift = 0; shift < 1e3; shift = shift == 0 ? 1e-3 : shift * 8) {
+      ++factorisations;
+      if (system.factorise(assembly.pattern(), blocks, shift)) {
+        if (shifted) *shifted = shift > 0;
+        if (shift == 0) {
+          factored_u = u;
+          factored_moduli = p.m;
+        }
+        return true;
+      }
+    }
+    return false;
+  }
+
+  // Newton from s (evaluated) towards p. Returns an empty string when it converged, else the reason.
+  std::string newton(const Problem& p, State& s, Equilibrium& out, int max_steps) {
+    State trial;
+    for (int step = 0;; ++step) {
+      const VectorX jump = p.prescribed - system.prescribed_part(s.u);
+      const bool at_target = jump.lpNorm<Eigen::Infinity>() <= 1e-14 * diameter_m;
+      if (at_target && s.residual <= options.residual_tolerance) return {};
+      if (step == max_steps) return "Newton's method did not converge in " + std::to_string(max_steps) + " steps";
+      bool shifted = false;
+      if (!factorise_tangent(p, s.u, out.factorisations, &shifted)) return "the tangent could not be factorised";
+      VectorX rhs = -(s.internal - p.external);
+      if (!at_target) rhs -= multiply(assembly.pattern(), blocks, jump);
+      const VectorX d_free = system.solve(rhs);
+      if (!d_free.allFinite()) return "the Newton step is not finite";
+      ++out.newton_steps;
+      const double slope = s.unbalanced.dot(d_free);  // negative for a descent direction
+      bool accepted = false;
+      for (double alpha = 1; alpha > 1e-6; alpha *= 0.5) {
+        trial.u = s.u + alpha * d_free;
+        if (!at_target) trial.u += alpha * jump;
+        if (!evaluate(p, trial)) continue;
+        const bool falls = trial.energy <= s.energy + 1e-4 * alpha * slope;
+        const bool smaller = trial.residual <= (1 - 0.1 * alpha) * s.residual && !shifted;
+        if (!at_target || falls || smaller) {
+          accepted = true;
+          break;
+        }
+        // Rounding: the energy can no longer tell, and the step is far below any length that matters.
+        if (s.residual < 1e-6 && alpha * d_free.lpNorm<Eigen::Infinity>() < 1e-11 * diameter_m) return {};
+      }
+      if (!accepted) return "the line search found no admissible step";
+      std::swap(s, trial);
+    }
+  }
+
+  // Steps the loads from `from` (an equilibrium at fraction 0) to p, shrinking the step when Newton fails.
+  std::string continuation(const Problem& p, State& s, Equilibrium& out) {
+    Problem part = p;
+    const Problem target = p;
+    s.u.setZero(3 * assembly.node_count());
+    part.external.setZero();
+    part.prescribed.setZero();
+    if (!evaluate(part, s)) return "the law does not exist at rest";
+    State last = s;
+    VectorX before_last = s.u;
+    double t = 0, last_t = 0, dt = 0.25;
+    std::string reason;
+    for (int step = 0; step < options.max_load_steps; ++step) {
+      const double next = std::min(1.0, t + dt);
+      part.external = next * target.external;
+      part.prescribed = next * target.prescribed;
+      // Secant predictor, dropped where it leaves the law's domain.
+      const double stretch = t > last_t ? (next - t) / (t - last_t) : 0;
+      s.u = last.u + stretch * (last.u - before_last);
+      bool usable = evaluate(part, s);
+      if (!usable) {
+        s.u = last.u;
+        usable = evaluate(part, s);
+      }
+      const int before = out.newton_steps;
+      reason =
+          usable ? newton(part, s, out, std::min(25, options.max_newton_steps)) : "the law does not exist at the last state";
+      if (reason.empty()) {
+        before_last = last.u;
+        last_t = t;
+        last = s;
+        t = next;
+        if (t >= 1) return {};
+        if (out.newton_steps - before < 8) dt *= 1.7;
+      } else {
+        dt *= 0.4;
+        if (dt < 1e-5) break;
+      }
+    }
+    s = last;
+    return "no equilibrium was found beyond " + std::to_string(100 * t) + " % of the load (" + reason + ")";
+  }
+
+  Problem problem(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const {
+    if (a.size() != boundary.forces.cols())
+      throw Error("needs " + std::to_string(boundary.forces.cols()) + " values, has " + std::to_string(a.size()),
+                  "force_coefficients");
+    if (b.size() != motions.cols())
+      throw Error("needs " + std::to_string(motions.cols()) + " values, has " + std::to_string(b.size()),
+                  "motion_coefficients");
+    if (!a.allFinite() || !b.allFinite()) throw Error("holds NaN or infinity", "coefficients");
+    const auto further = law.extra_parameters();
+    VectorX values = extra;
+    if (values.size() == 0) {
+      values.resize(static_cast<Index>(further.size()));
+      for (std::size_t i = 0; i < further.size(); ++i) values(static_cast<Index>(i)) = further[i].initial;
+    }
+    if (values.size() != static_cast<Index>(further.size()))
+      throw Error("needs " + std::to_string(further.size()) + " values, has " + std::to_string(values.size()), "extra");
+    Problem p;
+    p.m = moduli(young, poisson, values);
+    p.external = boundary.forces * a;
+    p.prescribed = motions * b;
+    return p;
+  }
+
+  Equilibrium blank(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const {
+    Equilibrium out;
+    out.young_modulus_pa = young;
+    out.poisson_ratio = poisson;
+    out.force_coefficients = a;
+    out.motion_coefficients = b;
+    out.extra = extra;
+    return out;
+  }
+
+  void finish(const Problem& p, State& s, Equilibrium& out) const {
+    out.displacement_m = s.u;
+    out.residual = s.residual;
+    out.inverted_elements = s.inverted;
+    out.motion_reaction = motions.transpose() * (s.internal - p.external);
+  }
+
+  Equilibrium solve(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX* start,
+                    const VectorX& extra) {
+    const Problem p = problem(young, poisson, a, b, extra);
+    Equilibrium out = blank(young, poisson, a, b, p.m.extra);
+    State s;
+    s.u = VectorX::Zero(3 * assembly.node_count());
+    if (start) {
+      if (start->size() != s.u.size()) throw Error("needs " + std::to_string(s.u.size()) + " values", "start");
+      s.u = *start;
+    }
+    bool usable = evaluate(p, s);
+    std::string reason = usable ? newton(p, s, out, options.max_newton_steps) : "the start has inverted elements";
+    if (!reason.empty()) reason = continuation(p, s, out);
+    out.converged = reason.empty();
+    out.reason = reason;
+    if (out.converged && s.inverted > 0)
+      out.reason =
+          std::to_string(s.inverted) + " elements are inside out: the equilibrium of the equations is not one of a body";
+    finish(p, s, out);
+    return out;
+  }
+
+  // ---- linear material: one factor a nu, at E = 1
+  void factorise_linear(double poisson, int* factorisations) {
+    if (linear_poisson == poisson) return;
+    const Moduli unit = moduli(1.0, poisson);
+    blocks.resize(blocks_mu.size());
+    for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] = unit.lambda * blocks_lambda[i] + unit.mu * blocks_mu[i];
+    linear_poisson = std::numeric_limits<double>::quiet_NaN();
+    if (!system.factorise(assembly.pattern(), blocks))
+      throw Error("the stiffness matrix is not positive definite: is the mesh degenerate?", "mesh");
+    if (factorisations) ++*factorisations;
+    linear_poisson = poisson;
+  }
+
+  std::vector<Equilibrium> solve_linear(double young, double poisson, const MatrixX& a, const MatrixX& b) {
+    std::vector<Equilibrium> all;
+    std::vector<Problem> problems;
+    int factorisations = 0;
+    for (Index c = 0; c < a.cols(); ++c) {
+      problems.push_back(problem(young, poisson, a.col(c), b.col(c), {}));
+      all.push_back(blank(young, poisson, a.col(c), b.col(c), {}));
+    }
+    if (all.empty()) return all;
+    factorise_linear(poisson, &factorisations);
+    MatrixX rhs(3 * assembly.node_count(), a.cols());
+    for (Index c = 0; c < a.cols(); ++c) {
+      rhs.col(c) = problems[c].external / young;
+      if (motions.cols() > 0) rhs.col(c) -= multiply(assembly.pattern(), blocks, problems[c].prescribed);
+    }
+    const MatrixX u = system.solve(rhs);
+    for (Index c = 0; c < a.cols(); ++c) {
+      State s;
+      s.u = u.col(c) + problems[c].prescribed;
+      evaluate(problems[c], s);
+      all[c].converged = true;
+      all[c].newton_steps = 1;
+      all[c].factorisations = c == 0 ? factorisations : 0;
+      finish(problems[c], s, all[c]);
+    }
+    return all;
+  }
+
+  Sensitivity sensitivity(const Equilibrium& at) {
+    const Problem p =
+        problem(at.young_modulus_pa, at.poisson_ratio, at.force_coefficients, at.motion_coefficients, at.extra);
+    const VectorX& u = at.displacement_m;
+    if (u.size() != 3 * assembly.node_count()) throw Error("is not a state of this mesh", "sensitivity.at");
+    double scale = 1;
+    if (law.is_linear()) {
+      factorise_linear(at.poisson_ratio, nullptr);
+      scale = at.young_modulus_pa;
+    } else {
+      const bool same = factored_u.size() == u.size() && factored_u == u && factored_moduli.young_pa == p.m.young_pa &&
+                        factored_moduli.poisson == p.m.poisson && factored_moduli.extra == p.m.extra;
+      if (!same) {
+        factored_u.resize(0);
+        assembly.tangent(law, p.m, u, blocks);
+        if (system.factorise(assembly.pattern(), blocks)) {
+          factored_u = u;
+          factored_moduli = p.m;
+        } else if (!system.factorise_indefinite(assembly.pattern(), blocks)) {
+          throw Error("the tangent is singular at this state: it has no derivatives", "sensitivity.at");
+        }
+      }
+    }
+    const Index k = static_cast<Index>(boundary.forces.cols()), m = static_cast<Index>(motions.cols());
+    const Index x = static_cast<Index>(p.m.extra.size());
+    // K du = -df/dtheta (material), F (forces), -K M (motions)
+    MatrixX rhs(3 * assembly.node_count(), 2 + x + k + m);
+    VectorX internal;
+    assembly.energy_and_forces(law, p.m, u, internal);
+    rhs.col(0) = -internal;
+    rhs.col(1) = -assembly.forces_d_poisson(law, p.m, u);
+    for (Index i = 0; i < x; ++i) rhs.col(2 + i) = -assembly.forces_d_extra(law, p.m, u, static_cast<int>(i));
+    rhs.middleCols(2 + x, k) = MatrixX(boundary.forces);
+    for (Index j = 0; j < m; ++j) rhs.col(2 + x + k + j) = -scale * multiply(assembly.pattern(), blocks, motions.col(j));
+    MatrixX du = system.solve(rhs) / scale;
+    // Reactions: M' (K du - rhs), with K du of the whole displacement.
+    MatrixX reaction(m, du.cols());
+    for (Index j = 0; m > 0 && j < du.cols(); ++j)
+      reaction.col(j) = motions.transpose() * (scale * multiply(assembly.pattern(), blocks, du.col(j)) - rhs.col(j));
+    du.rightCols(m) += motions;
+    Sensitivity out;
+    out.d_log_young = du.col(0);
+    out.d_poisson = du.col(1);
+    out.d_extra = du.middleCols(2, x);
+    out.d_force = du.middleCols(2 + x, k);
+    out.d_motion = du.rightCols(m);
+    out.reaction_d_log_young = reaction.col(0);
+    out.reaction_d_poisson = reaction.col(1);
+    out.reaction_d_extra = reaction.middleCols(2, x);
+    out.reaction_d_force = reaction.middleCols(2 + x, k);
+    out.reaction_d_motion = reaction.rightCols(m);
+    return out;
+  }
+
+  TetMesh mesh;
+  const MaterialLaw& law;
+  StaticsOptions options;
+  Assembly assembly;
+  Boundary boundary;
+  bool free;
+  ReducedSystem system;
+  MatrixX motions;  // along prescribed directions only
+  double diameter_m = 0;
+  // Scratch that const calls share (a Statics is not thread-safe).
+  BlockValues blocks, blocks_lambda, blocks_mu;
+  VectorX factored_u;  // where the factor is the exact tangent; empty: nowhere
+  Moduli factored_moduli;
+  double linear_poisson = std::numeric_limits<double>::quiet_NaN();
+};
+
+Statics::Statics(const TetMesh& mesh, const std::string& material, Boundary boundary, StaticsOptions options)
+    : impl_(std::make_unique<Impl>(mesh, material, std::move(boundary), options)) {}
+Statics::~Statics() = default;
+Statics::Statics(Statics&&) noexcept = default;
+Statics& Statics::operator=(Statics&&) noexcept = default;
+
+Equilibrium Statics::solve(double young_modulus_pa, double poisson_ratio, const VectorX& force_coefficients,
+                           const VectorX& motion_coefficients, const VectorX* start, const VectorX& extra) const {
+  if (is_linear())
+    return impl_->solve_linear(young_modulus_pa, poisson_ratio, force_coefficients, motion_coefficients).front();
+  return impl_->solve(young_modulus_pa, poisson_ratio, force_coefficients, motion_coefficients, start, extra);
+}
+
+std::vector<Equilibrium> Statics::solve_many(double young_modulus_pa, double poisson_ratio,
+                                             const MatrixX& force_coefficients, const MatrixX& motion_coefficients) const {
+  if (!is_linear()) throw Error("solves many cases with one factor only for a linear material", "Statics::solve_many");
+  if (force_coefficients.cols() != motion_coefficients.cols())
+    throw Error("force and motion coefficients need the same number of columns (cases)", "Statics::solve_many");
+  return impl_->solve_linear(young_modulus_pa, poisson_ratio, force_coefficients, motion_coefficients);
+}
+
+Sensitivity Statics::sensitivity(const Equilibrium& at) const { return impl_->sensitivity(at); }
+bool Statics::is_linear() const { return impl_->law.is_linear(); }
+const TetMesh& Statics::mesh() const { return impl_->mesh; }
+const Boundary& Statics::boundary() const { return impl_->boundary; }
+
+}  // namespace palpate::fem
