@@ -1,24 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/fem/sparse_factor.hpp"
 
-#include <Eigen/SparseCholesky>
-
 #include "palpate/core/error.hpp"
-#include "palpate/fem/linear_solver/elimination_order.hpp"
+#include "palpate/fem/linear_solver/front_factor.hpp"
 
 namespace palpate::fem {
-namespace {
-// Below this number of nodes minimum degree gives less fill than nested dissection on volume meshes.
-constexpr Index kNestedDissectionFrom = 1200;
-}  // namespace
 
 struct SparseFactor::Impl {
   Options options;
-  bool analysed = false, factorised = false;
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, Index> to_factor;
-  Eigen::SparseMatrix<double> permuted;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<Index>> kernel;
-  int negative = 0;
+  std::unique_ptr<FrontFactor<double>> factor;
+  bool factorised = false;
 };
 
 SparseFactor::SparseFactor() : SparseFactor(Options{}) {}
@@ -31,49 +22,31 @@ void SparseFactor::analyse(const Eigen::SparseMatrix<double>& lower) {
   if (lower.rows() != lower.cols() || !lower.isCompressed()) {
     throw Error("the matrix must be square and compressed", "SparseFactor::analyse");
   }
-  const QuotientGraph graph = quotient_graph(lower, impl_->options.block);
-  const std::vector<Index> order =
-      graph.group_count() < kNestedDissectionFrom ? minimum_degree_order(graph) : nested_dissection_order(graph);
-  impl_->to_factor.resize(lower.rows());
-  Index position = 0;
-  for (const Index group : order) {
-    for (Index unknown = graph.first_unknown[static_cast<std::size_t>(group)];
-         unknown < graph.first_unknown[static_cast<std::size_t>(group) + 1]; ++unknown) {
-      impl_->to_factor.indices()[unknown] = position++;
-    }
-  }
-  impl_->permuted.resize(lower.rows(), lower.cols());
-  impl_->permuted.selfadjointView<Eigen::Lower>() = lower.selfadjointView<Eigen::Lower>().twistedBy(impl_->to_factor);
-  impl_->kernel.analyzePattern(impl_->permuted);
-  impl_->analysed = true;
   impl_->factorised = false;
+  auto tree = std::make_shared<const FrontTree>(build_front_tree(lower, impl_->options.block));
+  impl_->factor = std::make_unique<FrontFactor<double>>(std::move(tree), impl_->options.threads);
 }
 
 bool SparseFactor::factorise(const Eigen::SparseMatrix<double>& lower) {
-  if (!impl_->analysed || lower.rows() != impl_->permuted.rows()) {
+  if (impl_->factor == nullptr || lower.cols() != impl_->factor->tree().size ||
+      lower.nonZeros() != impl_->factor->tree().entries_of_matrix) {
     throw Error("call analyse() with this matrix's pattern first", "SparseFactor::factorise");
   }
-  impl_->permuted.selfadjointView<Eigen::Lower>() = lower.selfadjointView<Eigen::Lower>().twistedBy(impl_->to_factor);
-  impl_->kernel.factorize(impl_->permuted);
-  impl_->factorised = false;
-  if (impl_->kernel.info() != Eigen::Success || !impl_->kernel.vectorD().allFinite()) return false;
-  impl_->negative = static_cast<int>((impl_->kernel.vectorD().array() < 0).count());
-  if (!impl_->options.indefinite && !(impl_->kernel.vectorD().array() > 0).all()) return false;
-  impl_->factorised = true;
-  return true;
+  impl_->factorised = impl_->factor->factorise(lower.valuePtr(), !impl_->options.indefinite);
+  return impl_->factorised;
 }
 
 void SparseFactor::solve_in_place(Eigen::Ref<MatrixX> right_hand_sides) const {
   if (!impl_->factorised) throw Error("no factorisation to solve with", "SparseFactor::solve_in_place");
-  if (right_hand_sides.rows() != impl_->permuted.rows()) {
-    throw Error("right-hand sides have " + std::to_string(right_hand_sides.rows()) + " rows, the matrix has " +
-                    std::to_string(impl_->permuted.rows()),
-                "SparseFactor::solve_in_place");
+  const Index size = impl_->factor->tree().size;
+  if (right_hand_sides.rows() != size) {
+    throw Error(
+        "right-hand sides have " + std::to_string(right_hand_sides.rows()) + " rows, the matrix has " + std::to_string(size),
+        "SparseFactor::solve_in_place");
   }
-  const MatrixX permuted = impl_->to_factor * right_hand_sides;
-  right_hand_sides = impl_->to_factor.inverse() * impl_->kernel.solve(permuted);
+  impl_->factor->solve(right_hand_sides.data(), right_hand_sides.cols(), right_hand_sides.outerStride());
 }
 
-int SparseFactor::negative_pivots() const { return impl_->negative; }
+int SparseFactor::negative_pivots() const { return impl_->factorised ? impl_->factor->negative_pivots() : 0; }
 
 }  // namespace palpate::fem
