@@ -133,16 +133,22 @@ void ReducedSystem::fill(const BlockPattern& pattern, const BlockValues& blocks,
 bool ReducedSystem::factorise(const BlockPattern& pattern, const BlockValues& blocks, double shift) {
   use_indefinite_ = false;
   fill(pattern, blocks, shift);
-  return factor_.factorise(lower_) && complete_border();
+  if (factor_.factorise(lower_)) return complete_border();
+  // A free body under compression may be stable although its springs alone do not hold it: the inertia of the whole bordered
+  // matrix decides. Stable means that exactly the six multipliers are negative.
+  if (border_.cols() == 0 || !factorise_indefinite(pattern, blocks, shift)) return false;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(schur_, Eigen::EigenvaluesOnly);
+  const auto negative = indefinite_->negative_pivots() + (eigen.eigenvalues().array() > 0).count();
+  return negative == border_.cols();
 }
 
-bool ReducedSystem::factorise_indefinite(const BlockPattern& pattern, const BlockValues& blocks) {
+bool ReducedSystem::factorise_indefinite(const BlockPattern& pattern, const BlockValues& blocks, double shift) {
   if (!indefinite_) {
     indefinite_.emplace(SparseFactor::Options{true, 3, threads_});
     indefinite_->analyse(lower_);
   }
   use_indefinite_ = true;
-  fill(pattern, blocks, 0);
+  fill(pattern, blocks, shift);
   return indefinite_->factorise(lower_) && complete_border();
 }
 
@@ -159,9 +165,9 @@ bool ReducedSystem::complete_border() {
   for (Index s = 0; s < springs; ++s) columns(spring_dofs_[s], border + s) = -1;
   border_solution_ = columns;
   solve_reduced(border_solution_);
-  Eigen::MatrixXd schur = columns.transpose() * border_solution_;
-  schur.bottomRightCorner(springs, springs).diagonal().array() -= 1 / spring_;
-  schur_inverse_ = schur.inverse();
+  schur_ = columns.transpose() * border_solution_;
+  schur_.bottomRightCorner(springs, springs).diagonal().array() -= 1 / spring_;
+  schur_inverse_ = schur_.inverse();
   return schur_inverse_.allFinite();
 }
 

@@ -28,7 +28,7 @@ class ReducedSystem {
   /// Factorises blocks + shift * diagonal. False when the matrix is not positive definite.
   bool factorise(const BlockPattern& pattern, const BlockValues& blocks, double shift = 0);
   /// The same for the tangent of an unstable state (some negative pivots). False when it is singular.
-  bool factorise_indefinite(const BlockPattern& pattern, const BlockValues& blocks);
+  bool factorise_indefinite(const BlockPattern& pattern, const BlockValues& blocks, double shift = 0);
 
   /// du (3n x c) with K_ff du_f = rhs_f, du_c = 0 (free object: rigid part of du zero, inertia balances rhs).
   MatrixX solve(const MatrixX& right_hand_sides) const;
@@ -60,8 +60,8 @@ class ReducedSystem {
   MatrixX border_;
   std::vector<Index> spring_dofs_;
   double spring_ = 0;
-  MatrixX border_solution_;  // K_s^-1 [B E]
-  Eigen::MatrixXd schur_inverse_;
+  MatrixX border_solution_;                // K_s^-1 [B E]
+  Eigen::MatrixXd schur_, schur_inverse_;  // of the border, with the sign turned
 };
 
 /// Orthonormal rigid motions about the origin of the nodes' bounding box, 3n x 6: translations along x, y, z, rotations
