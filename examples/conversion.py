@@ -26,6 +26,7 @@ def run(convert, description, add_options=lambda parser: None):
     parser.add_argument("recording", help="folder to write the recording into (made if absent)")
     add_options(parser)
     options = parser.parse_args()
+    recording = None
     try:
         if not os.path.isdir(options.set_folder):
             raise BadInput(f"{options.set_folder}: no such folder; give the folder of the data set")
@@ -33,6 +34,8 @@ def run(convert, description, add_options=lambda parser: None):
         convert(options.set_folder, options.sequence, recording, options)
         recording.finish()
     except BadInput as error:
+        if recording:
+            recording.discard()
         print(f"{os.path.basename(os.path.dirname(os.path.abspath(sys.argv[0])))}/convert: {error}", file=sys.stderr)
         sys.exit(3)
 
@@ -81,20 +84,24 @@ class Recording:
 
     def __init__(self, folder, name):
         self.folder = folder
+        self.written = []
         self.index = {"format": "palpate-recording/1", "name": name}
         if os.path.exists(folder) and not os.path.isdir(folder):
             raise BadInput(f"{folder}: is a file; give a folder")
-        if os.path.isdir(folder) and os.listdir(folder) and not os.path.exists(self.path("recording.yaml")):
+        index = os.path.join(folder, "recording.yaml")
+        if os.path.isdir(folder) and os.listdir(folder) and not os.path.exists(index):
             raise BadInput(f"{folder}: is not empty and no recording; give a new folder")
         try:
             os.makedirs(folder, exist_ok=True)
-            if os.path.exists(self.path("recording.yaml")):
-                os.remove(self.path("recording.yaml"))
+            if os.path.exists(index):
+                os.remove(index)
         except OSError as error:
             raise BadInput(f"{folder}: {error.strerror}; give a folder that can be written") from None
 
     def path(self, name):
+        """Where to write a file of this name."""
         path = os.path.join(self.folder, name)
+        self.written.append(path)
         if os.path.dirname(name):
             os.makedirs(os.path.dirname(path), exist_ok=True)
         return path
@@ -121,7 +128,17 @@ class Recording:
         np.savetxt(self.path(name), np.asarray(values, dtype=int), fmt="%d")
         return name
 
+    def discard(self):
+        """Takes back what was written, so that a second try finds the folder as it was."""
+        for path in self.written:
+            if os.path.exists(path):
+                os.remove(path)
+        for folder in sorted({os.path.dirname(path) for path in self.written} | {self.folder}, key=len, reverse=True):
+            if os.path.isdir(folder) and not os.listdir(folder):
+                os.rmdir(folder)
+
     def finish(self):
+        """Writes the index."""
         with open(self.path("recording.yaml"), "w") as file:
             file.write("\n".join(_block(self.index)) + "\n")
 
