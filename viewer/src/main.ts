@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+import "./style.css";
+import { decode, type Report, type Step } from "./data";
+import { budget, heldOut, nuisances, perPush, posterior, sparkline } from "./figures_answer";
+import { convergence, forceTravel, histogram, rmsBySteps } from "./figures_fit";
+import { citation, provenance, recordingFacts } from "./provenance";
+import { viewer3d } from "./viewer3d";
+import { count, datum, digits, el, known, plural, quantity } from "./words";
+
+type Draw = (width: number) => SVGElement | null;
+
+/** A figure that is drawn anew for every width. Returns null when there is nothing to draw. */
+class Panel {
+  readonly node: HTMLElement;
+  private readonly holder = el("div", { class: "plot-holder" });
+  private width = 0;
+
+  static make(title: string, caption: string, draw: Draw, wide = false): Panel | null {
+    return draw(400) ? new Panel(title, caption, draw, wide) : null;
+  }
+  private constructor(title: string, caption: string, private readonly draw: Draw, wide: boolean) {
+    this.node = el("figure", { class: wide ? "panel wide" : "panel" }, el("h3", {}, title), this.holder, el("figcaption", {}, caption));
+    new ResizeObserver(() => this.redraw()).observe(this.holder);
+  }
+  redraw(force = false): void {
+    const width = Math.floor(this.holder.clientWidth);
+    if (width < 50 || (width === this.width && !force)) return;
+    this.width = width;
+    const plot = this.draw(width);
+    this.holder.replaceChildren(...(plot ? [plot] : []));
+  }
+}
+
+function header(report: Report): HTMLElement {
+  const theme = el("button", { type: "button", class: "quiet", "aria-label": "Switch between light and dark" }, "\u25d0");
+  theme.addEventListener("click", () => {
+    const root = document.documentElement;
+    const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+    root.dataset.theme = dark ? "light" : "dark";
+  });
+  const print = el("button", { type: "button", class: "quiet" }, "Print");
+  print.addEventListener("click", () => window.print());
+  return el("header", {}, el("div", { class: "brand" }, el("span", { class: "wordmark" }, "palpate"), el("span", { class: "title" }, report.title)), el("div", { class: "tools" }, theme, print));
+}
+
+function answer(report: Report): HTMLElement {
+  const section = el("section", { id: "answer" }, el("p", { class: "lead" }, report.answer));
+  const cards = el("div", { class: "cards" });
+  for (const p of report.parameters) {
+    const card = el(
+      "div",
+      { class: p.determined ? "card" : "card open", "data-name": p.name, "data-region": p.region },
+      el("h2", {}, p.title),
+      el("p", { class: "value" }, datum(p.value, p.text, "value"), p.determined ? null : el("span", { class: "flag" }, "not determined")),
+      el("p", { class: "interval" }, "95 %: ", datum(p.lower_95, p.interval_text, "interval")),
+    );
+    const shape = sparkline(report, p);
+    if (shape) card.append(shape);
+    cards.append(card);
+  }
+  section.append(cards);
+  const list = el("ul", { class: "verdicts", "aria-label": "Verdicts" });
+  for (const verdict of report.verdicts) {
+    list.append(el("li", {}, el("span", { class: "sign", "aria-hidden": "true" }, "!"), el("span", {}, verdict.message, " ", el("code", {}, verdict.code))));
+  }
+  if (!report.converged) {
+    list.prepend(el("li", { class: "bad" }, el("span", { class: "sign", "aria-hidden": "true" }, "\u00d7"), el("span", {}, `The fit ${report.termination}. ${report.message}`)));
+  }
+  if (list.children.length > 0) section.append(list);
+  else section.append(el("p", { class: "fine" }, "No verdict speaks against this answer."));
+  section.append(facts(report));
+  return section;
+}
+
+function facts(report: Report): HTMLElement {
+  const f = report.fit;
+  const list = el("dl", { class: "facts" });
+  const add = (name: string, ...text: (string | HTMLElement)[]): void => void list.append(el("div", {}, el("dt", {}, name), el("dd", {}, ...text)));
+  add("residual", datum(f.rms_m, `${quantity(f.rms_m, "m")} rms`, "rms_m"));
+  add("\u03c7\u00b2 per degree of freedom", datum(f.chi2_per_dof, known(f.chi2_per_dof) ? digits(f.chi2_per_dof, 3) : "unknown", "chi2_per_dof"));
+  add("data", `${plural(f.points_used, "point")}, ${plural(f.steps, "step")}, ${plural(f.pushes, "push")}`);
+  add("material law", report.material.replaceAll("_", " ") || "unknown");
+  add("method", report.method === "paper" ? "the paper's (IROS 2010)" : report.method);
+  add("fit", `${report.termination}, ${plural(f.iterations, "iteration")}, ${count(f.solves)} solves`);
+  const total = Object.values(report.timing_s).filter(known).reduce((a, b) => a + b, 0);
+  if (total > 0) add("time", quantity(total, "s"));
+  return list;
+}
+
+function build(report: Report): void {
+  document.title = `${report.title} \u2013 palpate`;
+  const page = document.getElementById("page")!;
+  let selected: Step | null = null;
+  const linked: Panel[] = [];
+  const viewer = viewer3d(report, (step) => {
+    selected = step;
+    for (const panel of linked) panel.redraw(true);
+  });
+  const select = (step: Step): void => viewer.select(step);
+
+  const many = report.pushes.length > 1;
+  const curve = Panel.make("Force against travel", `Marks: measured${many ? ", one colour and shape a push" : ""}. Line: the fitted model; band: its 95 % interval. Click a mark to see that step above.`, (w) => forceTravel(report, w, selected, select));
+  const region = Panel.make("What the data say about E and \u03bd together", "Regions that hold 68 % (dark) and 95 % (light) of the posterior; cross: medians; thin lines: each parameter alone. A long ridge means that the two trade off against each other.", (w) => posterior(report, w));
+  const residuals = Panel.make("Residuals", `Observed points against the simulated surface${report.histogram && report.histogram.beyond > 0 ? `; ${count(report.histogram.beyond)} beyond the axis` : ""}. Line: a normal distribution of the fit's rms.`, (w) => histogram(report, w));
+  const steps = Panel.make("Residual of every step", "A step that stands out is one to look at in 3D: click it.", (w) => rmsBySteps(report, w, selected, select));
+  const single = Panel.make("Each push on its own", "Young's modulus with 95 % interval from each push (or region) alone; shaded: all together. Intervals that do not overlap speak for an object that is not homogeneous.", (w) => perPush(report, w));
+  const inputs = Panel.make("Error budget", "How far one standard deviation of each input moves the answer. The longest bar is what to calibrate next.", (w) => budget(report, w));
+  const p = report.prediction;
+  const unseenPush = Panel.make("Prediction of what was held out", `Fitted without ${p.what || "it"}, then predicted${known(p.force_error) ? `; force off by ${digits(100 * Math.abs(p.force_error), 2)} %` : ""}. Grey: trivial guesses.`, (w) => heldOut(report, w));
+  const pulls = Panel.make("Nuisances against their priors", "Estimate with 95 % interval in prior standard deviations. Within the shaded band all is as expected; beyond \u00b13 the prior or the model is wrong.", (w) => nuisances(report, w));
+  const path = Panel.make("Convergence", "Young's modulus over the iterations; thin line: the cost.", (w) => convergence(report, w));
+  linked.push(...[curve, steps].filter((x): x is Panel => x !== null));
+
+  const figures = el("section", { class: "figures", "aria-label": "Figures" });
+  for (const panel of [curve, region, residuals, steps, single, inputs, unseenPush, pulls, path]) if (panel) figures.append(panel.node);
+  const main = el("main", {}, answer(report), viewer.node, figures, recordingFacts(report), provenance(report), citation(report));
+  page.append(header(report), main);
+  document.documentElement.dataset.ready = "true";
+}
+
+const source = document.getElementById("palpate-data");
+if (source?.textContent) build(decode(source.textContent));
+else document.getElementById("page")!.append(el("p", { class: "note" }, "This is the empty template of a report; palpate writes the data into it."));
