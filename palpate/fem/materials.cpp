@@ -11,9 +11,9 @@ namespace palpate::fem {
 
 const std::vector<const MaterialLaw*>& material_table() {
   static const std::vector<const MaterialLaw*> table = {
-      &linear_law(),
-      &corotational_law(),
-      &neo_hookean_law(),
+      &linear_law(),      &corotational_law(),       &st_venant_kirchhoff_law(),
+      &neo_hookean_law(), &neo_hookean_stable_law(), &neo_hookean_isochoric_law(),
+      &foam_law(),
   };
   return table;
 }
@@ -57,6 +57,28 @@ Mat3 MaterialLaw::stress_d_poisson(const Moduli& m, const Mat3& gradient) const 
 
 Mat3 MaterialLaw::stress_d_extra(const Moduli&, const Mat3&, int) const {
   throw Error("the law has no further parameters", std::string(name()));
+}
+
+bool MaterialLaw::volumetric_part(const Moduli&, const Mat3&, bool, VolumetricPart&) const { return false; }
+
+// d(F^-1)_ji / dF_kl = -F^-1_jk F^-1_li
+void inverse_transposed_derivative(const Mat3& inverse, Mat9& out) {
+  for (int l = 0; l < 3; ++l)
+    for (int k = 0; k < 3; ++k)
+      for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < 3; ++i) out(i + 3 * j, k + 3 * l) = -inverse(j, k) * inverse(l, i);
+}
+
+// cof F_ij = 1/2 e_ikm e_jln F_kl F_mn
+void cofactor_derivative(const Mat3& f, Mat9& out) {
+  out.setZero();
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int a = 1; a < 3; ++a)
+        for (int b = 1; b < 3; ++b) {
+          const double sign = a == b ? 1 : -1;
+          out(i + 3 * j, (i + a) % 3 + 3 * ((j + b) % 3)) = sign * f((i + 3 - a) % 3, (j + 3 - b) % 3);
+        }
 }
 
 double volume_change(const Mat3& h) {

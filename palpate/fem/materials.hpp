@@ -34,6 +34,14 @@ struct ExtraParameter {
   double initial = 0, lower = 0, upper = 0;
 };
 
+/// The part of an energy that locks near nu = 0.5, kappa/2 theta^2 with theta a measure of volume change.
+struct VolumetricPart {
+  double modulus = 0, modulus_d_poisson = 0;  ///< kappa and its derivative to nu, Pa
+  double theta = 0;
+  Mat3 gradient;  ///< dtheta/dF
+  Mat9 hessian;   ///< d2theta/dF2, written when asked for
+};
+
 /// A hyperelastic law W(F). The energy is proportional to E in every law of the table (what makes d/dlogE free).
 class MaterialLaw {
  public:
@@ -53,6 +61,10 @@ class MaterialLaw {
   /// dP/dnu at constant E [Pa].
   virtual Mat3 stress_d_poisson(const Moduli& m, const Mat3& gradient) const;
 
+  /// Splits kappa/2 theta^2 off the energy, for elements that average theta. False: the law has no such part (it is meant
+  /// for compressible bodies) and elements leave it as it is.
+  virtual bool volumetric_part(const Moduli& m, const Mat3& gradient, bool with_hessian, VolumetricPart& out) const;
+
   /// dP/d extra[index].
   virtual Mat3 stress_d_extra(const Moduli& m, const Mat3& gradient, int index) const;
 };
@@ -65,5 +77,13 @@ const MaterialLaw& material_law(std::string_view name);
 
 /// J - 1 of F = I + H without cancellation.
 double volume_change(const Mat3& gradient);
+
+/// d(F^-T)/dF from F^-1, d(cof F)/dF from F.
+void inverse_transposed_derivative(const Mat3& inverse, Mat9& out);
+void cofactor_derivative(const Mat3& f, Mat9& out);
+/// A matrix as the vector that indexes Mat9.
+inline Eigen::Map<const Eigen::Matrix<double, 9, 1>> as_vector(const Mat3& a) {
+  return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(a.data());
+}
 
 }  // namespace palpate::fem

@@ -120,6 +120,35 @@ TEST_P(MaterialContract, IsObjectiveAndIsotropic) {
   }
 }
 
+// What is left when kappa/2 theta^2 is taken off must not grow without bound near nu = 0.5.
+TEST_P(MaterialContract, VolumetricPartHoldsWhatLocks) {
+  VolumetricPart part;
+  const Moduli m = at(kYoung, kPoisson);
+  if (!law().volumetric_part(m, Mat3::Zero(), true, part)) GTEST_SKIP() << "meant for compressible bodies";
+  EXPECT_EQ(part.theta, 0);
+  for (const Mat3& h : gradients()) {
+    law().volumetric_part(m, h, true, part);
+    for (int k = 0; k < 9; ++k) {
+      Mat3 d = Mat3::Zero();
+      d(k) = 1e-5;
+      VolumetricPart up, down;
+      law().volumetric_part(m, h + d, false, up);
+      law().volumetric_part(m, h - d, false, down);
+      EXPECT_NEAR(part.gradient(k), (up.theta - down.theta) / 2e-5, 1e-6);
+      const Mat3 difference = (up.gradient - down.gradient) / 2e-5;
+      for (int i = 0; i < 9; ++i) EXPECT_NEAR(part.hessian(i, k), difference(i), 1e-5);
+    }
+    const Moduli stiff = at(kYoung, 0.49999);
+    law().volumetric_part(stiff, h, false, part);
+    EXPECT_LT((stress(stiff, h) - part.modulus * part.theta * part.gradient).norm(), 20 * kYoung);
+    VolumetricPart up, down;
+    law().volumetric_part(at(kYoung, kPoisson + 1e-5), h, false, up);
+    law().volumetric_part(at(kYoung, kPoisson - 1e-5), h, false, down);
+    law().volumetric_part(m, h, false, part);
+    EXPECT_NEAR(part.modulus_d_poisson, (up.modulus - down.modulus) / 2e-5, 1e-5 * part.modulus_d_poisson);
+  }
+}
+
 TEST_P(MaterialContract, SmallStrainsAreNotLostInRounding) {
   const Moduli m = at(kYoung, kPoisson);
   Mat3 h;

@@ -38,6 +38,24 @@ Mat3 stretch_minus_identity(const Mat3& h, const Mat3& rotation) {
   return 0.5 * (strain + strain.transpose());
 }
 
+// dR/dF: dR = R [w]x with (tr(S) I - S) w = axial(R'dF - dF'R).
+void rotation_derivative(const Mat3& r, const Mat3& strain, Mat9& out) {
+  Mat3 spin = -strain;
+  spin.diagonal().array() += strain.trace() + 2;
+  const Mat3 spin_inverse = spin.inverse();
+  for (int l = 0; l < 3; ++l)
+    for (int k = 0; k < 3; ++k) {
+      // R'dF for dF = e_k e_l' has the column l equal to row k of R.
+      const Vec3 row = r.row(k).transpose();
+      const Vec3 axial = Vec3::Unit(l).cross(row);
+      const Vec3 w = spin_inverse * axial;
+      Mat3 cross;
+      cross << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+      const Mat3 d = r * cross;
+      out.col(k + 3 * l) = as_vector(d);
+    }
+}
+
 class Corotational final : public MaterialLaw {
  public:
   std::string_view name() const override { return "corotational"; }
@@ -54,29 +72,24 @@ class Corotational final : public MaterialLaw {
     return m.mu * strain.squaredNorm() + 0.5 * m.lambda * trace * trace;
   }
 
-  // dP = 2 mu dF + (lambda tr(S - I) - 2 mu) dR + lambda (R : dF) R with dR = R [w]x,
-  // (tr(S) I - S) w = axial(R'dF - dF'R).
+  // dP = 2 mu dF + (lambda tr(S - I) - 2 mu) dR + lambda (R : dF) R
   void tangent(const Moduli& m, const Mat3& h, Mat9& out) const override {
     const Mat3 r = polar_rotation(Mat3::Identity() + h);
     const Mat3 strain = stretch_minus_identity(h, r);
-    const double trace = strain.trace();
-    Mat3 spin = -strain;
-    spin.diagonal().array() += trace + 2;
-    const Mat3 spin_inverse = spin.inverse();
-    const double c = m.lambda * trace - 2 * m.mu;
-    for (int l = 0; l < 3; ++l)
-      for (int k = 0; k < 3; ++k) {
-        // R'dF for dF = e_k e_l' has the column l equal to row k of R.
-        const Vec3 row = r.row(k).transpose();
-        const Vec3 axial = Vec3::Unit(l).cross(row);
-        const Vec3 w = spin_inverse * axial;
-        Mat3 cross;
-        cross << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
-        Mat3 d = m.lambda * r(k, l) * r;
-        d.noalias() += c * (r * cross);
-        d(k, l) += 2 * m.mu;
-        out.col(k + 3 * l) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(d.data());
-      }
+    rotation_derivative(r, strain, out);
+    out *= m.lambda * strain.trace() - 2 * m.mu;
+    out.noalias() += m.lambda * as_vector(r) * as_vector(r).transpose();
+    out.diagonal().array() += 2 * m.mu;
+  }
+
+  bool volumetric_part(const Moduli& m, const Mat3& h, bool with_hessian, VolumetricPart& out) const override {
+    out.gradient = polar_rotation(Mat3::Identity() + h);
+    const Mat3 strain = stretch_minus_identity(h, out.gradient);
+    out.modulus = m.lambda;
+    out.modulus_d_poisson = m.lambda_d_poisson;
+    out.theta = strain.trace();
+    if (with_hessian) rotation_derivative(out.gradient, strain, out.hessian);
+    return true;
   }
 };
 

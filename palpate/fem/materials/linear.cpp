@@ -26,6 +26,15 @@ class Linear final : public MaterialLaw {
         out(i + 3 * i, j + 3 * j) += m.lambda;
       }
   }
+
+  bool volumetric_part(const Moduli& m, const Mat3& h, bool with_hessian, VolumetricPart& out) const override {
+    out.modulus = m.lambda;
+    out.modulus_d_poisson = m.lambda_d_poisson;
+    out.theta = h.trace();
+    out.gradient.setIdentity();
+    if (with_hessian) out.hessian.setZero();
+    return true;
+  }
 };
 
 }  // namespace

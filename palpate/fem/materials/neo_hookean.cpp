@@ -38,6 +38,16 @@ class NeoHookean final : public MaterialLaw {
             out(i + 3 * j, k + 3 * l) = c * inverse(j, k) * inverse(l, i) + m.lambda * inverse(j, i) * inverse(l, k);
     out.diagonal().array() += m.mu;
   }
+
+  bool volumetric_part(const Moduli& m, const Mat3& h, bool with_hessian, VolumetricPart& out) const override {
+    const Mat3 inverse = (Mat3::Identity() + h).inverse();
+    out.modulus = m.lambda;
+    out.modulus_d_poisson = m.lambda_d_poisson;
+    out.theta = std::log1p(volume_change(h));
+    out.gradient = inverse.transpose();
+    if (with_hessian) inverse_transposed_derivative(inverse, out.hessian);
+    return true;
+  }
 };
 
 }  // namespace
