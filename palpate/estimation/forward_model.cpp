@@ -1,0 +1,452 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/forward_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/load_columns.hpp"
+#include "palpate/fem/boundary.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+const std::vector<std::string> xyz{"_x", "_y", "_z"};
+
+std::string key_of(const Load& load) {
+  std::string key = load.tool;
+  for (int d = 0; d < 3; ++d) key += "," + std::to_string(load.contact_m(d));
+  return key;
+}
+
+/// Tools whose motion is prescribed in a push.
+std::set<std::string> driven_tools(const Push& push) {
+  std::set<std::string> names;
+  for (const auto& step : push.steps) {
+    for (const auto& load : step.loads) {
+      if (load.travel_m) names.insert(load.tool);
+    }
+  }
+  return names;
+}
+
+std::string body_key(const Push& push) {
+  std::string key;
+  for (const auto& name : driven_tools(push)) key += name + "\n";
+  return key;
+}
+
+}  // namespace
+
+struct ForwardModel::Body {
+  std::map<std::string, int> force_column;   // of a load's key: first of three
+  std::map<std::string, int> motion_column;  // of a platen
+  int gravity_column = -1;
+  MatrixX free_motions;
+  Eigen::SparseMatrix<double> forces;
+  std::unique_ptr<fem::Statics> statics;
+};
+
+struct ForwardModel::Coefficients {
+  VectorX force, motion;
+  std::vector<int> columns;        // unknowns other than log E and nu that force or motion depend on
+  MatrixX d_force, d_motion;       // coefficients x columns
+};
+
+struct ForwardModel::Memory {
+  bool valid = false;
+  VectorX unknowns;
+  VectorX displacement_m;
+  std::vector<int> columns;
+  MatrixX derivative;              // 3n x columns, object frame
+};
+
+ForwardModel::~ForwardModel() = default;
+
+ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options)
+    : recording_(&recording), object_(std::move(object)), options_(options) {
+  unknowns.add({"young_modulus", "log Pa", 0, std::numeric_limits<double>::infinity()});
+  unknowns.add({"poisson_ratio", "1", 0, std::numeric_limits<double>::infinity(), recording.model.poisson_lower,
+                recording.model.poisson_upper});
+  force_scale_ = unknowns.add_block("force_scale", "1", recording.force_scale_std, {""});
+  const bool weight_acts = recording.rest.state == RestState::stress_free && recording.environment.gravity_m_s2.norm() > 0;
+  if (weight_acts) {
+    if (!(recording.density_kg_m3 > 0)) throw Error("gravity acts, so the density is needed", "density_kg_m3");
+    density_ = unknowns.add_block("density", "kg/m3", recording.density_std_kg_m3, {""});
+    if (density_ >= 0) unknowns[density_].prior_mean = recording.density_kg_m3;
+  }
+
+  // The clamp moves with everything that it holds: one rigid offset of the object in the base frame.
+  const Support* clamp = nullptr;
+  for (const auto& support : recording.supports) {
+    if (support.pose_std_m > 0 || support.pose_std_rad > 0) {
+      if (clamp != nullptr) throw Error("only one support may have an uncertain pose", "supports." + support.name);
+      clamp = &support;
+    }
+  }
+  const auto add_clamp = [&](const std::string& suffix) {
+    const int first = unknowns.size();
+    for (const auto& axis : xyz) unknowns.add({"clamp" + axis + suffix, "m", 0, clamp->pose_std_m, -1, 1, clamp->pose_std_m <= 0});
+    for (const auto& axis : xyz) {
+      unknowns.add({"clamp_rotation" + axis + suffix, "rad", 0, clamp->pose_std_rad, -1, 1, clamp->pose_std_rad <= 0});
+    }
+    return first;
+  };
+  if (clamp != nullptr) {
+    const auto held = fem::support_nodes(object_.mesh, *clamp);
+    for (Index node : held) clamp_pivot_m_ += object_.mesh.nodes_m.row(node).transpose() / static_cast<double>(held.size());
+  }
+  int common_clamp = clamp != nullptr && clamp->pose_varies == PoseVaries::never ? add_clamp("") : -1;
+
+  for (std::size_t p = 0; p < recording.pushes.size(); ++p) {
+    const Push& push = recording.pushes[p];
+    const std::string in_push = "[" + push.name + "]";
+    int push_clamp = clamp != nullptr && clamp->pose_varies == PoseVaries::push ? add_clamp(in_push) : common_clamp;
+    // A single-axis load cell has a tare along its axis only.
+    Vec3 axis = Vec3::Zero();
+    for (const auto& step : push.steps) {
+      for (const auto& observation : step.observations) {
+        if (const auto* wrench = std::get_if<Wrench>(&observation)) axis = wrench->along;
+      }
+    }
+    tare_axis_.push_back(axis);
+    tare_.push_back(unknowns.add_block("force_tare" + in_push, "N", push.force_tare_std_n,
+                                       axis.norm() > 0 ? std::vector<std::string>{""} : xyz));
+    travel_offset_.push_back(unknowns.add_block("travel_offset" + in_push, "m", push.travel_offset_std_m, {""}));
+    for (std::size_t s = 0; s < push.steps.size(); ++s) {
+      steps_.push_back({p, s});
+      const std::string in_step = "[" + push.name + ":" + std::to_string(s) + "]";
+      clamp_.push_back(clamp != nullptr && clamp->pose_varies == PoseVaries::step ? add_clamp(in_step) : push_clamp);
+      std::vector<int> errors;
+      for (const auto& load : push.steps[s].loads) {
+        const double std_n = load.force_n ? std::hypot(load.force_std_n, load.force_relative_std * load.force_n->norm()) : 0;
+        errors.push_back(unknowns.add_block("force_error" + in_step, "N", std_n, xyz));
+      }
+      force_error_.push_back(errors);
+    }
+  }
+  memory_.resize(steps_.size());
+  for (const auto& push : recording.pushes) body_of(push);
+}
+
+const Step& ForwardModel::step(std::size_t s) const { return push(s).steps[steps_[s].step]; }
+const Push& ForwardModel::push(std::size_t s) const { return recording_->pushes[steps_[s].push]; }
+
+void ForwardModel::forget() {
+  for (auto& memory : memory_) memory = Memory{};
+}
+
+ForwardModel::Body& ForwardModel::body_of(const Push& push) {
+  auto& body = bodies_[body_key(push)];
+  if (body) return *body;
+  body = std::make_unique<Body>();
+
+  const auto tool_of = [&](const Load& load) -> const Tool& {
+    for (const auto& tool : recording_->tools) {
+      if (tool.name == load.tool) return tool;
+    }
+    throw Error("no tool of this name", "loads.tool " + load.tool);
+  };
+
+  std::vector<const Tool*> platens;
+  for (const auto& tool : recording_->tools) {
+    if (driven_tools(push).count(tool.name) == 0) continue;
+    if (tool.shape != ToolShape::platen) {
+      throw Error("only a platen's motion can be imposed; give the force of this tool and its travel as an observation",
+                  "tools." + tool.name);
+    }
+    body->motion_column[tool.name] = static_cast<int>(platens.size());
+    platens.push_back(&tool);
+  }
+
+  // Columns of every contact of the pushes that share this body.
+  std::vector<Eigen::SparseMatrix<double>> parts;
+  for (const auto& other : recording_->pushes) {
+    if (body_key(other) != body_key(push)) continue;
+    for (const auto& step : other.steps) {
+      for (const auto& load : step.loads) {
+        if (load.travel_m || load.force_n.value_or(Vec3::Zero()).norm() + load.force_std_n == 0) continue;
+        if (!body->force_column.emplace(key_of(load), static_cast<int>(3 * parts.size())).second) continue;
+        parts.push_back(load_columns(object_.mesh, tool_of(load), load));
+      }
+    }
+  }
+  if (recording_->rest.state == RestState::stress_free && recording_->environment.gravity_m_s2.norm() > 0) {
+    body->gravity_column = static_cast<int>(3 * parts.size());
+    parts.push_back(fem::body_force(object_.mesh));
+  }
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t part = 0; part < parts.size(); ++part) {
+    for (int c = 0; c < 3; ++c) {
+      for (Eigen::SparseMatrix<double>::InnerIterator it(parts[part], c); it; ++it) {
+        entries.emplace_back(static_cast<int>(it.row()), static_cast<int>(3 * part) + c, it.value());
+      }
+    }
+  }
+
+  fem::Boundary boundary;
+  boundary.forces.resize(3 * object_.mesh.nodes_m.rows(), static_cast<Index>(3 * parts.size()));
+  boundary.forces.setFromTriplets(entries.begin(), entries.end());
+  boundary.inertia_relief = recording_->free;
+  if (recording_->free) {
+    boundary.motions.resize(3 * object_.mesh.nodes_m.rows(), 0);
+  } else {
+    HeldBody held = hold(object_.mesh, recording_->supports, platens);
+    boundary.constraints = std::move(held.constraints);
+    boundary.motions = std::move(held.motions);
+    body->free_motions = std::move(held.free_motions);
+  }
+  body->forces = boundary.forces;
+  body->statics = std::make_unique<fem::Statics>(object_.mesh, object_.material, std::move(boundary), options_);
+  return *body;
+}
+
+RigidOffset ForwardModel::clamp_offset(std::size_t s, const VectorX& unknowns) const {
+  RigidOffset offset;
+  offset.pivot_m = clamp_pivot_m_;
+  if (clamp_[s] >= 0) {
+    offset.translation_m = unknowns.segment<3>(clamp_[s]);
+    offset.rotation_rad = unknowns.segment<3>(clamp_[s] + 3);
+  }
+  return offset;
+}
+
+ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const {
+  Coefficients c;
+  c.force = VectorX::Zero(body.forces.cols());
+  c.motion = VectorX::Zero(static_cast<Index>(body.motion_column.size()));
+  std::map<int, int> column_of;
+  const auto column = [&](int unknown) {
+    const auto [it, fresh] = column_of.emplace(unknown, static_cast<int>(c.columns.size()));
+    if (fresh) {
+      c.columns.push_back(unknown);
+      c.d_force.conservativeResize(c.force.size(), static_cast<Index>(c.columns.size()));
+      c.d_motion.conservativeResize(c.motion.size(), static_cast<Index>(c.columns.size()));
+      c.d_force.rightCols<1>().setZero();
+      c.d_motion.rightCols<1>().setZero();
+    }
+    return it->second;
+  };
+  const RigidOffset clamp = clamp_offset(s, unknowns);
+  const Mat3 into_object = clamp.rotation().transpose();
+  const auto add_vector = [&](int first, const Vec3& base) {
+    c.force.segment<3>(first) += into_object * base;
+    if (clamp_[s] < 0) return;
+    const Mat3 d = clamp.inverse_rotation_derivative(base);
+    for (int k = 0; k < 3; ++k) {
+      const int at = column(clamp_[s] + 3 + k);
+      c.d_force.block<3, 1>(first, at) += d.col(k);
+    }
+  };
+
+  const std::size_t p = steps_[s].push;
+  const Step& now = step(s);
+  for (std::size_t l = 0; l < now.loads.size(); ++l) {
+    const Load& load = now.loads[l];
+    if (load.travel_m) {
+      const int at = body.motion_column.at(load.tool);
+      c.motion(at) = *load.travel_m;
+      if (travel_offset_[p] >= 0) {
+        c.motion(at) += unknowns(travel_offset_[p]);
+        const int offset = column(travel_offset_[p]);
+        c.d_motion(at, offset) = 1;
+      }
+      continue;
+    }
+    const auto found = body.force_column.find(key_of(load));
+    if (found == body.force_column.end()) continue;
+    const int first = found->second;
+    const int error = force_error_[s][l];
+    Vec3 measured = load.force_n.value_or(Vec3::Zero());
+    if (error >= 0) measured += unknowns.segment<3>(error);
+    const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
+    Vec3 tare = Vec3::Zero();
+    if (tare_[p] >= 0) tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
+    add_vector(first, scale * measured + tare);
+    if (error >= 0) {
+      for (int k = 0; k < 3; ++k) {
+        const int at = column(error + k);
+        c.d_force.block<3, 1>(first, at) += scale * into_object.col(k);
+      }
+    }
+    if (force_scale_ >= 0) {
+      const int at = column(force_scale_);
+      c.d_force.block<3, 1>(first, at) += into_object * measured;
+    }
+    if (tare_[p] >= 0) {
+      for (int k = 0; k < (tare_axis_[p].norm() > 0 ? 1 : 3); ++k) {
+        const int at = column(tare_[p] + k);
+        c.d_force.block<3, 1>(first, at) += into_object * (tare_axis_[p].norm() > 0 ? tare_axis_[p] : Vec3(Vec3::Unit(k)));
+      }
+    }
+  }
+  if (body.gravity_column >= 0) {
+    const double density = density_ >= 0 ? unknowns(density_) : recording_->density_kg_m3;
+    const Vec3& gravity = recording_->environment.gravity_m_s2;
+    add_vector(body.gravity_column, density * gravity);
+    if (density_ >= 0) {
+      const int at = column(density_);
+      c.d_force.block<3, 1>(body.gravity_column, at) += into_object * gravity;
+    }
+  }
+  // A translation of the clamp changes no load, but it moves the surface.
+  if (clamp_[s] >= 0) {
+    for (int k = 0; k < 3; ++k) column(clamp_[s] + k);
+  }
+  return c;
+}
+
+StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns) {
+  Body& body = body_of(push(s));
+  const Coefficients c = coefficients(s, body, unknowns);
+  if (body.free_motions.cols() > 0 && c.force.size() > 0) {
+    const VectorX load = body.forces * c.force;
+    if ((body.free_motions.transpose() * load).cwiseAbs().maxCoeff() > 1e-6 * (load.lpNorm<1>() + 1e-12)) {
+      throw Error("the supports leave the object free to slide where a load acts on it; add the support that holds it, or give "
+                  "the load's normal component alone",
+                  step(s).source.empty() ? "supports" : step(s).source);
+    }
+  }
+
+  // Start from the last solution of this step, or else of the step before, moved along its derivatives.
+  Memory& memory = memory_[s];
+  const Memory* from = memory.valid ? &memory : nullptr;
+  VectorX start;
+  if (from != nullptr) {
+    start = from->displacement_m;
+    for (std::size_t k = 0; k < from->columns.size(); ++k) {
+      const double change = unknowns(from->columns[k]) - from->unknowns(from->columns[k]);
+      if (change != 0) start += change * from->derivative.col(static_cast<Index>(k));
+    }
+  } else if (s > 0 && steps_[s - 1].push == steps_[s].push && memory_[s - 1].valid) {
+    start = memory_[s - 1].displacement_m;
+  }
+
+  const double young_pa = std::exp(unknowns(log_young));
+  const auto solve = [&](const VectorX* guess) {
+    auto at = body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion, guess);
+    ++solves_;
+    factorisations_ += at.factorisations;
+    return at;
+  };
+  fem::Equilibrium at = solve(start.size() > 0 ? &start : nullptr);
+  if (!at.converged && start.size() > 0) at = solve(nullptr);
+
+  StepPrediction out;
+  out.converged = at.converged;
+  out.reason = at.reason;
+  out.inverted_elements = at.inverted_elements;
+  if (!at.converged) return out;
+
+  const fem::Sensitivity d = body.statics->sensitivity(at);
+  out.columns = {log_young, poisson};
+  out.columns.insert(out.columns.end(), c.columns.begin(), c.columns.end());
+  const Index count = static_cast<Index>(out.columns.size());
+  const Index nodal = at.displacement_m.size();
+  MatrixX field(nodal, count);
+  field.col(0) = d.d_log_young;
+  field.col(1) = d.d_poisson;
+  for (Index k = 2; k < count; ++k) {
+    field.col(k).setZero();
+    if (c.force.size() > 0) field.col(k) += d.d_force * c.d_force.col(k - 2);
+    if (c.motion.size() > 0) field.col(k) += d.d_motion * c.d_motion.col(k - 2);
+  }
+  memory = {true, unknowns, at.displacement_m, out.columns, field};
+
+  // Into the base frame: x = T(X + u).
+  const RigidOffset clamp = clamp_offset(s, unknowns);
+  const Mat3 rotation = clamp.rotation();
+  const TriMesh& rest = object_.surface.rest();
+  const VectorX moved = object_.surface.restrict(at.displacement_m);
+  out.d_surface = object_.surface.restrict(field);
+  out.surface_m.resize(rest.vertices_m.rows(), 3);
+  for (Index v = 0; v < rest.vertices_m.rows(); ++v) {
+    const Vec3 in_object = rest.vertices_m.row(v).transpose() + moved.segment<3>(3 * v);
+    out.surface_m.row(v) = clamp.apply(in_object);
+    if (clamp_[s] < 0) continue;
+    out.d_surface.middleRows<3>(3 * v) = (rotation * out.d_surface.middleRows<3>(3 * v)).eval();
+    const auto rigid = clamp.derivative(in_object);
+    for (Index k = 2; k < count; ++k) {
+      const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s];
+      if (component >= 0 && component < 6) out.d_surface.block<3, 1>(3 * v, k) += rigid.col(component);
+    }
+  }
+
+  // What the tools should read.
+  const std::size_t p = steps_[s].push;
+  const Step& now = step(s);
+  const Index loads = static_cast<Index>(now.loads.size());
+  out.travel_m = VectorX::Zero(loads);
+  out.d_travel = MatrixX::Zero(loads, count);
+  out.force_n.assign(now.loads.size(), Vec3::Zero());
+  out.d_force.assign(now.loads.size(), Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, count));
+  const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
+  for (Index l = 0; l < loads; ++l) {
+    const auto at_load = static_cast<std::size_t>(l);
+    const Load& load = now.loads[at_load];
+    if (load.travel_m) {
+      const Vec3 direction = load.direction.normalized();
+      const int m = body.motion_column.at(load.tool);
+      const double reaction = at.motion_reaction(m);
+      Eigen::RowVectorXd d_reaction(count);
+      d_reaction(0) = d.reaction_d_log_young(m);
+      d_reaction(1) = d.reaction_d_poisson(m);
+      for (Index k = 2; k < count; ++k) {
+        d_reaction(k) = (c.force.size() > 0 ? d.reaction_d_force.row(m).dot(c.d_force.col(k - 2)) : 0.0) +
+                        d.reaction_d_motion.row(m).dot(c.d_motion.col(k - 2));
+      }
+      out.force_n[at_load] = scale * reaction * direction;
+      out.d_force[at_load] = scale * direction * d_reaction;
+      for (Index k = 2; k < count; ++k) {
+        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += reaction * direction;
+      }
+      out.travel_m(l) = c.motion(m);
+      for (Index k = 2; k < count; ++k) out.d_travel(l, k) = c.d_motion(m, k - 2);
+    } else {
+      out.force_n[at_load] = load.force_n.value_or(Vec3::Zero());
+      const auto found = body.force_column.find(key_of(load));
+      if (found == body.force_column.end()) continue;
+      const MatrixX columns = MatrixX(body.forces.middleCols(found->second, 3));
+      const Vec3 direction = rotation.transpose() * load.direction.normalized();
+      const VectorX weights = columns * direction;
+      out.travel_m(l) = weights.dot(at.displacement_m);
+      out.d_travel.row(l) = weights.transpose() * field;
+    }
+  }
+
+  // The readings of a driven platen carry the sensor's tare and scale; those of an imposed force are the load itself.
+  const auto reading_column = [&](int unknown) {
+    const auto it = std::find(out.columns.begin(), out.columns.end(), unknown);
+    if (it != out.columns.end()) return static_cast<Index>(it - out.columns.begin());
+    out.columns.push_back(unknown);
+    const Index wider = static_cast<Index>(out.columns.size());
+    const auto widen = [&](auto& matrix) {
+      matrix.conservativeResize(matrix.rows(), wider);
+      matrix.rightCols(1).setZero();
+    };
+    widen(out.d_surface);
+    widen(out.d_travel);
+    for (auto& block : out.d_force) widen(block);
+    return wider - 1;
+  };
+  for (std::size_t l = 0; l < now.loads.size(); ++l) {
+    if (!now.loads[l].travel_m) continue;
+    if (force_scale_ >= 0 && std::find(c.columns.begin(), c.columns.end(), force_scale_) == c.columns.end()) {
+      const Index at_scale = reading_column(force_scale_);
+      out.d_force[l].col(at_scale) += out.force_n[l] / scale;
+    }
+    if (tare_[p] < 0) continue;
+    const bool along = tare_axis_[p].norm() > 0;
+    for (int k = 0; k < (along ? 1 : 3); ++k) {
+      const Index at_tare = reading_column(tare_[p] + k);
+      const Vec3 axis = along ? tare_axis_[p] : Vec3(Vec3::Unit(k));
+      out.force_n[l] += unknowns(tare_[p] + k) * axis;
+      out.d_force[l].col(at_tare) += axis;
+    }
+  }
+  return out;
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the unknowns to what the sensors should see: one static equilibrium a step, its surface in the base frame, the platens'
+// reactions, and the exact derivatives of all of it to every unknown that the step depends on.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "palpate/core/recording.hpp"
+#include "palpate/estimation/rigid_offset.hpp"
+#include "palpate/estimation/simulated_surface.hpp"
+#include "palpate/estimation/unknowns.hpp"
+#include "palpate/fem/statics.hpp"
+
+namespace palpate::estimation {
+
+struct StepIndex {
+  std::size_t push = 0, step = 0;
+};
+
+/// One column of every derivative below is one unknown.
+struct StepPrediction {
+  bool converged = false;
+  std::string reason;
+  Points surface_m;             ///< simulated surface vertices, base frame
+  std::vector<int> columns;     ///< unknowns that the step depends on
+  MatrixX d_surface;            ///< 3v x columns
+  VectorX travel_m;             ///< a load: mean motion of its patch along the load's direction (work-conjugate)
+  MatrixX d_travel;             ///< loads x columns
+  std::vector<Vec3> force_n;    ///< a load: resultant on the object, base frame
+  std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> d_force;  ///< a load: 3 x columns
+  int inverted_elements = 0;
+};
+
+/// The object as the solver sees it.
+struct SimulatedObject {
+  TetMesh mesh;
+  SimulatedSurface surface;
+  std::string material = "neo_hookean";
+};
+
+class ForwardModel {
+ public:
+  /// Registers log E, nu and every nuisance that belongs to loads and supports in `unknowns` (which must be empty).
+  /// `recording` must outlive this object.
+  /// @throws Error when a load names no tool, or supports leave a motion free that a load works on.
+  ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options = {});
+  ~ForwardModel();
+
+  std::size_t step_count() const { return steps_.size(); }
+  const Step& step(std::size_t s) const;
+  const Push& push(std::size_t s) const;
+  StepIndex index(std::size_t s) const { return steps_[s]; }
+  const SimulatedObject& object() const { return object_; }
+
+  /// Solves step s. Starts from the last solution of this step, moved along its derivatives to the new unknowns.
+  StepPrediction predict(std::size_t s, const VectorX& unknowns);
+
+  /// Forgets warm starts, so that the next answer does not depend on what was asked before.
+  void forget();
+
+  int solves() const { return solves_; }
+  int factorisations() const { return factorisations_; }
+
+ private:
+  struct Body;         // one Statics: a set of platens and its columns of loads
+  struct Coefficients;  // of a step: a, b and their derivatives
+  struct Memory;       // of a step: where it was last solved
+
+  Body& body_of(const Push& push);
+  Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
+  RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;
+
+  const Recording* recording_;
+  SimulatedObject object_;
+  fem::StaticsOptions options_;
+  std::vector<StepIndex> steps_;
+  std::map<std::string, std::unique_ptr<Body>> bodies_;
+  std::vector<Memory> memory_;
+
+  Vec3 clamp_pivot_m_ = Vec3::Zero();
+  std::vector<int> clamp_;                        // a step: first of six unknowns, or -1
+  std::vector<std::vector<int>> force_error_;     // a step and load: first of three unknowns, or -1
+  std::vector<int> tare_, travel_offset_;         // a push: first of three, the one; or -1
+  std::vector<Vec3> tare_axis_;                   // a push: zero = three unknowns, else one along this axis
+  int force_scale_ = -1, density_ = -1;
+  int solves_ = 0, factorisations_ = 0;
+};
+
+}  // namespace palpate::estimation

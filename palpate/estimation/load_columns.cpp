@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/load_columns.hpp"
+
+#include <vector>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// A line load: points along the line, each carried by the boundary triangle nearest to it.
+Eigen::SparseMatrix<double> along_line(const TetMesh& mesh, const Vec3& centre_m, const Vec3& axis, double length_m) {
+  const geometry::TriangleTree tree({mesh.nodes_m, fem::boundary_triangles(mesh)});
+  constexpr int samples = 200;
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int s = 0; s < samples; ++s) {
+    const double along_m = ((s + 0.5) / samples - 0.5) * length_m;
+    const auto hit = tree.closest(centre_m + along_m * axis.normalized());
+    for (int k = 0; k < 3; ++k) {
+      const Index node = tree.mesh().triangles(hit.triangle, k);
+      for (int d = 0; d < 3; ++d) entries.emplace_back(3 * node + d, d, hit.barycentric(k) / samples);
+    }
+  }
+  Eigen::SparseMatrix<double> columns(3 * mesh.nodes_m.rows(), 3);
+  columns.setFromTriplets(entries.begin(), entries.end());
+  return columns;
+}
+
+}  // namespace
+
+Eigen::SparseMatrix<double> load_columns(const TetMesh& mesh, const Tool& tool, const Load& load) {
+  switch (tool.shape) {
+    case ToolShape::vertices:
+      return fem::spread_over_nodes(static_cast<Index>(mesh.nodes_m.rows()), tool.vertices);
+    case ToolShape::sphere:
+    case ToolShape::disc:
+      return fem::spread_over_patch(mesh, load.contact_m, tool.radius_m);
+    case ToolShape::edge:
+    case ToolShape::capsule:
+      return along_line(mesh, load.contact_m, tool.axis, tool.length_m);
+    case ToolShape::mesh:
+    case ToolShape::platen:
+      break;
+  }
+  throw Error("a force can be spread under vertices, a sphere, a disc, an edge or a capsule; give the motion (travel_m) of a "
+              "platen, or describe the contact patch of a mesh tool by a disc of its radius",
+              "tools." + tool.name + ".shape");
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/objective.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::estimation {
+
+double tukey_rho(double residual, double cut) {
+  const double t = residual / cut;
+  if (!(std::abs(t) < 1)) return cut * cut / 6;
+  const double keep = 1 - t * t;
+  return cut * cut / 6 * (1 - keep * keep * keep);
+}
+
+double tukey_weight(double residual, double cut) {
+  const double t = residual / cut;
+  if (!(std::abs(t) < 1)) return 0;
+  const double keep = 1 - t * t;
+  return keep * keep;
+}
+
+double tukey_information_factor(double cut) {
+  double weight = 0, psi_squared = 0, psi_slope = 0;
+  constexpr int steps = 4000;
+  for (int i = 0; i < steps; ++i) {
+    const double r = cut * (2 * (i + 0.5) / steps - 1);
+    const double density = std::exp(-0.5 * r * r) / std::sqrt(2 * EIGEN_PI) * 2 * cut / steps;
+    const double t2 = r * r / (cut * cut);
+    const double w = (1 - t2) * (1 - t2);
+    weight += density * w;
+    psi_squared += density * w * w * r * r;
+    psi_slope += density * (1 - t2) * (1 - 5 * t2);
+  }
+  return psi_slope * psi_slope / (psi_squared * weight);
+}
+
+Objective::Objective(ForwardModel& model, const std::vector<std::vector<TermInput>>& inputs, Unknowns& unknowns)
+    : model_(model), unknowns_(unknowns) {
+  std::size_t terms = 0;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    terms_.emplace_back();
+    for (const auto& input : inputs[s]) {
+      if (auto term = make_term(input, {model, s, unknowns, shared_})) terms_.back().push_back(std::move(term));
+    }
+    terms += terms_.back().size();
+  }
+  if (terms == 0) throw Error("no step has an observation that says anything about the object", "pushes");
+}
+
+Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const OnProgress& progress) {
+  const Index count = unknowns_.size();
+  Evaluation out;
+  out.hessian = MatrixX::Zero(count, count);
+  out.gradient = VectorX::Zero(count);
+  rows_.assign(model_.step_count(), {});
+  predictions_.assign(model_.step_count(), {});
+  for (std::size_t s = 0; s < model_.step_count(); ++s) {
+    if (progress && !progress("fit", static_cast<double>(s) / static_cast<double>(model_.step_count()))) {
+      out.reason = "cancelled";
+      return out;
+    }
+    if (terms_[s].empty()) continue;
+    predictions_[s] = model_.predict(s, unknowns);
+    if (!predictions_[s].converged) {
+      out.reason = "step " + std::to_string(model_.index(s).step) + " of " + model_.push(s).name + ": " + predictions_[s].reason;
+      return out;
+    }
+    for (const auto& term : terms_[s]) {
+      TermRows rows = term->rows(predictions_[s], unknowns, loss.along_rays);
+      const double relevance = rows.cell.empty() ? 1 : loss.surface_weight;
+      VectorX weight = VectorX::Constant(rows.residual.size(), relevance);
+      for (Index i = 0; i < rows.residual.size(); ++i) {
+        if (rows.robust) {
+          out.cost += relevance * tukey_rho(rows.residual(i), loss.tukey);
+          weight(i) *= tukey_weight(rows.residual(i), loss.tukey);
+        } else {
+          out.cost += relevance * 0.5 * rows.residual(i) * rows.residual(i);
+        }
+      }
+      VectorX finite = rows.residual;
+      for (Index i = 0; i < finite.size(); ++i) {
+        if (weight(i) == 0) finite(i) = 0;
+      }
+      const MatrixX weighted = weight.asDiagonal() * rows.jacobian;
+      const MatrixX block = rows.jacobian.transpose() * weighted;
+      const VectorX slope = weighted.transpose() * finite;
+      for (std::size_t a = 0; a < rows.unknowns.size(); ++a) {
+        out.gradient(rows.unknowns[a]) += slope(static_cast<Index>(a));
+        for (std::size_t b = 0; b < rows.unknowns.size(); ++b) {
+          out.hessian(rows.unknowns[a], rows.unknowns[b]) += block(static_cast<Index>(a), static_cast<Index>(b));
+        }
+      }
+      rows_[s].push_back(std::move(rows));
+    }
+  }
+  for (Index k = 0; k < count; ++k) {
+    const Unknown& unknown = unknowns_[static_cast<int>(k)];
+    if (!std::isfinite(unknown.prior_std) || unknown.fixed) continue;
+    const double precision = 1 / (unknown.prior_std * unknown.prior_std);
+    const double off = unknowns(k) - unknown.prior_mean;
+    out.cost += 0.5 * precision * off * off;
+    out.gradient(k) += precision * off;
+    out.hessian(k, k) += precision;
+  }
+  out.usable = std::isfinite(out.cost);
+  return out;
+}
+
+double Objective::cost_of(const std::vector<StepPrediction>& predictions, const VectorX& unknowns, const Loss& loss) const {
+  double cost = 0;
+  for (std::size_t s = 0; s < predictions.size(); ++s) {
+    if (predictions[s].surface_m.rows() == 0) continue;
+    for (const auto& term : terms_[s]) {
+      const TermRows rows = term->rows(predictions[s], unknowns, loss.along_rays);
+      for (Index i = 0; i < rows.residual.size(); ++i) {
+        cost += rows.robust ? tukey_rho(rows.residual(i), loss.tukey) : 0.5 * rows.residual(i) * rows.residual(i);
+      }
+    }
+  }
+  return cost;
+}
+
+double Objective::residual_scale() const {
+  std::vector<double> sizes;
+  for (const auto& step : rows_) {
+    for (const auto& rows : step) {
+      if (!rows.robust) continue;
+      for (Index i = 0; i < rows.residual.size(); ++i) sizes.push_back(std::abs(rows.residual(i)));
+    }
+  }
+  if (sizes.empty()) return 0;
+  auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle / 0.6745;
+}
+
+ResidualSummary Objective::summarise(const Loss& loss) const {
+  ResidualSummary summary;
+  double between = 0, total = 0;
+  std::size_t cells = 0, in_cells = 0;
+  for (const auto& step : rows_) {
+    for (const auto& rows : step) {
+      std::map<int, std::pair<double, std::size_t>> cell_sums;
+      for (Index i = 0; i < rows.residual.size(); ++i) {
+        const double r = rows.residual(i);
+        ++summary.rows;
+        if (rows.robust) ++summary.points;
+        const bool inside = std::abs(r) < loss.tukey;
+        if (rows.robust && !inside) {
+          ++summary.outliers;
+          summary.missed += std::isinf(r);
+        }
+        summary.chi2 += rows.robust ? std::min(r * r, loss.tukey * loss.tukey) : r * r;
+        if (rows.unit == "m" && (inside || !rows.robust)) {
+          summary.sum_squared_m2 += std::pow(r * rows.sigma(i), 2);
+          ++summary.lengths;
+        }
+        if (!rows.cell.empty() && inside) {
+          auto& [sum, n] = cell_sums[rows.cell[static_cast<std::size_t>(i)]];
+          sum += r;
+          ++n;
+          total += r * r;
+          ++in_cells;
+        }
+      }
+      for (const auto& [cell, sums] : cell_sums) {
+        between += sums.first * sums.first / static_cast<double>(sums.second);
+        ++cells;
+      }
+    }
+  }
+  if (cells > 0 && total > 0) {
+    summary.variance_inflation =
+        std::max(1.0, (between / static_cast<double>(cells)) / (total / static_cast<double>(in_cells)));
+  }
+  return summary;
+}
+
+}  // namespace palpate::estimation

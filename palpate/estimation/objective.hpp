@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// Minus twice the log posterior (up to a constant) of a recording's steps as a robust least-squares problem, with its normal
+// equations. One evaluation solves every step once.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "palpate/core/progress.hpp"
+#include "palpate/estimation/forward_model.hpp"
+#include "palpate/estimation/terms/term.hpp"
+
+namespace palpate::estimation {
+
+/// How residuals are weighed in one evaluation.
+struct Loss {
+  double tukey = 4.685;    ///< cut of Tukey's biweight in standard deviations, 95 % efficient on clean data
+  bool along_rays = true;  ///< depth residuals along the ray (else closest point)
+  double surface_weight = 1;  ///< of rows with neighbours whose errors are correlated: 1 / variance inflation
+};
+
+struct Evaluation {
+  bool usable = false;     ///< every step has an equilibrium
+  std::string reason;
+  double cost = 0;         ///< sum of rho + prior, half of minus twice the log posterior
+  MatrixX hessian;         ///< Gauss-Newton, priors included
+  VectorX gradient;
+};
+
+/// What the residuals at an optimum look like.
+struct ResidualSummary {
+  std::size_t points = 0;        ///< robust rows
+  std::size_t outliers = 0;      ///< of them, beyond the cut
+  std::size_t missed = 0;        ///< of the outliers, rays that pass the object by
+  std::size_t rows = 0;          ///< all rows
+  double chi2 = 0;               ///< all rows, each at most the cut squared
+  double sum_squared_m2 = 0;     ///< of length residuals inside the cut
+  std::size_t lengths = 0;
+  double variance_inflation = 1; ///< of cell means: above 1 where neighbours err together
+};
+
+class Objective {
+ public:
+  Objective(ForwardModel& model, const std::vector<std::vector<TermInput>>& inputs, Unknowns& unknowns);
+
+  Evaluation evaluate(const VectorX& unknowns, const Loss& loss, const OnProgress& progress = {});
+
+  /// Cost of a prediction that was made elsewhere (start search): no derivative, no prior.
+  double cost_of(const std::vector<StepPrediction>& predictions, const VectorX& unknowns, const Loss& loss) const;
+
+  ResidualSummary summarise(const Loss& loss) const;            ///< of the last evaluation
+  const std::vector<std::vector<TermRows>>& last_rows() const { return rows_; }  ///< a step: its terms
+  const std::vector<StepPrediction>& last_predictions() const { return predictions_; }
+
+  const Unknowns& unknowns() const { return unknowns_; }
+  /// Keeps nu where it is in the fits that follow (conditional optima of the quadrature).
+  void hold_poisson(bool held) { unknowns_[poisson].fixed = held; }
+  ForwardModel& model() { return model_; }
+  /// Median over robust terms of |residual| in standard deviations, of the last evaluation (closest points).
+  double residual_scale() const;
+
+ private:
+  ForwardModel& model_;
+  Unknowns& unknowns_;
+  std::map<std::string, int> shared_;
+  std::vector<std::vector<std::unique_ptr<Term>>> terms_;
+  std::vector<std::vector<TermRows>> rows_;
+  std::vector<StepPrediction> predictions_;
+};
+
+/// Tukey's biweight: rho (half a square near zero) and weight.
+double tukey_rho(double residual, double cut);
+double tukey_weight(double residual, double cut);
+
+/// What Gauss-Newton's weighted Hessian must be multiplied by so that its inverse is the covariance of the robust estimate
+/// under clean Gaussian data: E[psi']^2 / (E[psi^2] E[w]) (Huber and Ronchetti, Robust Statistics, eq. 6.5).
+double tukey_information_factor(double cut);
+
+}  // namespace palpate::estimation

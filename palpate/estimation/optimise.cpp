@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/optimise.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::estimation {
+namespace {
+
+MatrixX pick(const MatrixX& matrix, const std::vector<int>& which) {
+  MatrixX out(static_cast<Index>(which.size()), static_cast<Index>(which.size()));
+  for (std::size_t a = 0; a < which.size(); ++a) {
+    for (std::size_t b = 0; b < which.size(); ++b) out(static_cast<Index>(a), static_cast<Index>(b)) = matrix(which[a], which[b]);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<int> free_unknowns(const Unknowns& unknowns) {
+  std::vector<int> moving;
+  for (int k = 0; k < unknowns.size(); ++k) {
+    if (!unknowns[k].fixed) moving.push_back(k);
+  }
+  return moving;
+}
+
+Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, const OptimiseOptions& options,
+                 const OnProgress& progress) {
+  const Unknowns& unknowns = objective.unknowns();
+  Optimum best;
+  best.unknowns = start;
+  best.evaluation = objective.evaluate(start, loss, progress);
+  if (!best.evaluation.usable) {
+    best.termination = best.evaluation.reason == "cancelled" ? Termination::cancelled : Termination::failed;
+    best.message = best.evaluation.reason;
+    return best;
+  }
+  double damping = 1e-6;
+  for (best.iterations = 1; best.iterations <= options.max_iterations; ++best.iterations) {
+    // Hold nu where it sits on a bound that the gradient pushes against.
+    const double nu = best.unknowns(poisson);
+    const double slope = best.evaluation.gradient(poisson);
+    best.poisson_at_lower = nu <= unknowns[poisson].lower && slope > 0;
+    best.poisson_at_upper = nu >= unknowns[poisson].upper && slope < 0;
+    std::vector<int> moving = free_unknowns(unknowns);
+    if (best.poisson_at_lower || best.poisson_at_upper) moving.erase(std::remove(moving.begin(), moving.end(), poisson), moving.end());
+
+    const MatrixX hessian = pick(best.evaluation.hessian, moving);
+    VectorX gradient(static_cast<Index>(moving.size()));
+    for (std::size_t k = 0; k < moving.size(); ++k) gradient(static_cast<Index>(k)) = best.evaluation.gradient(moving[k]);
+    const VectorX scale = hessian.diagonal().cwiseMax(1e-300);
+
+    bool accepted = false;
+    for (int attempt = 0; attempt < 12 && !accepted; ++attempt) {
+      MatrixX damped = hessian;
+      damped.diagonal() += damping * scale;
+      VectorX move = damped.ldlt().solve(-gradient);
+      if (!move.allFinite()) {
+        damping = std::max(1e-3, damping * 100);
+        continue;
+      }
+      VectorX next = best.unknowns;
+      for (std::size_t k = 0; k < moving.size(); ++k) next(moving[k]) += move(static_cast<Index>(k));
+      // A step of log E beyond a factor of five leaves every linearisation behind.
+      const double jump = std::abs(next(log_young) - best.unknowns(log_young));
+      if (jump > 1.6) next = best.unknowns + (1.6 / jump) * (next - best.unknowns);
+      next(poisson) = std::clamp(next(poisson), unknowns[poisson].lower, unknowns[poisson].upper);
+
+      Evaluation trial = objective.evaluate(next, loss, progress);
+      if (trial.reason == "cancelled") {
+        best.termination = Termination::cancelled;
+        best.message = "stopped by the caller";
+        return best;
+      }
+      const double tiny = 1e-10 * (1 + std::abs(best.evaluation.cost));
+      if (!trial.usable || trial.cost > best.evaluation.cost + tiny) {
+        damping = std::max(1e-4, damping * 10);
+        if (!trial.usable) best.message = trial.reason;
+        continue;
+      }
+      accepted = true;
+      damping = std::max(1e-9, damping / 10);
+      const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
+      double largest = 0;
+      for (std::size_t k = 0; k < moving.size(); ++k) {
+        if (moving[k] > poisson) continue;
+        const double std_dev = std::sqrt(std::max(covariance(static_cast<Index>(k), static_cast<Index>(k)), 1e-24));
+        largest = std::max(largest, std::abs(next(moving[k]) - best.unknowns(moving[k])) / std::max(std_dev, 1e-9));
+      }
+      const double gain = best.evaluation.cost - trial.cost;
+      best.unknowns = next;
+      best.evaluation = std::move(trial);
+      if (largest < options.step_tolerance && gain < 1e-3) {
+        best.termination = Termination::converged;
+        best.message = "converged";
+        return best;
+      }
+    }
+    if (!accepted) {
+      // Correspondences that flip between triangles leave a floor; a step that nothing improves on is the end.
+      objective.evaluate(best.unknowns, loss, progress);
+      const VectorX newton = hessian.ldlt().solve(-gradient);
+      const double predicted_gain = -0.5 * gradient.dot(newton);
+      best.termination = predicted_gain < 0.5 ? Termination::converged : Termination::no_progress;
+      best.message = best.termination == Termination::converged ? "converged" : "no step improves the fit: " + best.message;
+      return best;
+    }
+  }
+  best.termination = Termination::max_iterations;
+  best.message = "stopped after " + std::to_string(options.max_iterations) + " iterations";
+  return best;
+}
+
+Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss& final_loss, const OptimiseOptions& options,
+                          const OnProgress& progress) {
+  Loss loss = final_loss;
+  loss.along_rays = false;
+  loss.surface_weight = 1;
+  loss.tukey = 1e6;
+  Optimum at;
+  at.unknowns = start;
+  const Evaluation first = objective.evaluate(start, loss, progress);
+  if (!first.usable) {
+    at.message = first.reason;
+    at.termination = first.reason == "cancelled" ? Termination::cancelled : Termination::failed;
+    return at;
+  }
+  int iterations = 0;
+  loss.tukey = std::max(final_loss.tukey, 4 * final_loss.tukey * objective.residual_scale());
+  OptimiseOptions rough = options;
+  rough.max_iterations = 4;
+  rough.step_tolerance = 0.1;
+  while (loss.tukey > 2 * final_loss.tukey) {
+    at = optimise(objective, at.unknowns, loss, rough, progress);
+    iterations += at.iterations;
+    if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
+    loss.tukey = std::max(final_loss.tukey, std::min(loss.tukey / 3, 4 * final_loss.tukey * objective.residual_scale()));
+  }
+  if (final_loss.along_rays) {
+    loss.tukey = 2 * final_loss.tukey;
+    loss.along_rays = true;
+    at = optimise(objective, at.unknowns, loss, rough, progress);
+    iterations += at.iterations;
+    if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
+  }
+  at = optimise(objective, at.unknowns, final_loss, options, progress);
+  at.iterations += iterations;
+  return at;
+}
+
+VectorX find_start(Objective& objective, double poisson_start) {
+  ForwardModel& model = objective.model();
+  const Unknowns& unknowns = objective.unknowns();
+  VectorX guess = unknowns.prior_mean();
+  guess(poisson) = std::clamp(poisson_start, unknowns[poisson].lower, unknowns[poisson].upper);
+
+  // A modulus at which the body hardly moves: non-linear materials are then linear too. Raised until every step solves.
+  guess(log_young) = std::log(1e9);
+  std::vector<StepPrediction> stiff(model.step_count());
+  const auto& rest = model.object().surface.rest().vertices_m;
+  const std::size_t stride = std::max<std::size_t>(1, model.step_count() / 24);  // a few steps of a long recording say enough
+  for (std::size_t s = 0; s < model.step_count(); s += stride) {
+    stiff[s] = model.predict(s, guess);
+    if (!stiff[s].converged) stiff[s] = {};
+  }
+  model.forget();
+
+  const double size_m = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
+  const Loss wide{1e3, false, 1};
+  double best_cost = std::numeric_limits<double>::infinity();
+  double best = std::log(1e5);
+  for (double decade = 1.5; decade <= 11.5; decade += 0.125) {
+    const double log_e = decade * std::log(10.0);
+    const double ratio = std::exp(guess(log_young) - log_e);
+    std::vector<StepPrediction> scaled = stiff;
+    bool sensible = true;
+    for (auto& prediction : scaled) {
+      if (prediction.surface_m.rows() == 0) continue;
+      // The part that scales with 1/E is the derivative to -log E; imposed motions do not scale.
+      const VectorX loaded = -prediction.d_surface.col(0);
+      for (Index v = 0; v < prediction.surface_m.rows(); ++v) {
+        prediction.surface_m.row(v) += (ratio - 1) * loaded.segment<3>(3 * v).transpose();
+      }
+      sensible = sensible && ratio * loaded.cwiseAbs().maxCoeff() < size_m;
+      for (std::size_t l = 0; l < prediction.force_n.size(); ++l) {
+        prediction.force_n[l] += (1 / ratio - 1) * prediction.d_force[l].col(0);
+        prediction.travel_m(static_cast<Index>(l)) -= (ratio - 1) * prediction.d_travel(static_cast<Index>(l), 0);
+      }
+    }
+    if (!sensible) continue;
+    const double cost = objective.cost_of(scaled, guess, wide);
+    if (cost < best_cost) {
+      best_cost = cost;
+      best = log_e;
+    }
+  }
+  guess(log_young) = best;
+  return guess;
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "palpate/core/identification.hpp"
+#include "palpate/estimation/objective.hpp"
+
+namespace palpate::estimation {
+
+struct OptimiseOptions {
+  int max_iterations = 60;
+  double step_tolerance = 1e-3;  ///< stop when log E and nu move by less than this share of their standard deviation
+};
+
+struct Optimum {
+  VectorX unknowns;
+  Evaluation evaluation;
+  Termination termination = Termination::failed;
+  std::string message;
+  int iterations = 0;
+  bool poisson_at_lower = false, poisson_at_upper = false;
+};
+
+/// Levenberg-Marquardt in log E, nu (kept inside its bounds by an active set) and all nuisances that are not fixed.
+Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, const OptimiseOptions& options,
+                 const OnProgress& progress);
+
+/// Whole way from a start: closest points with a wide robust loss first, then tightened to `final_loss`.
+Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss& final_loss, const OptimiseOptions& options,
+                          const OnProgress& progress);
+
+/// A start for log E from solutions at one guess: displacements of an elastic body scale with 1/E, reactions with E. Every
+/// other unknown starts at its prior mean. Nothing but the data decides: a grid over fourteen decades is searched.
+VectorX find_start(Objective& objective, double poisson_start);
+
+/// Indices of unknowns that may move.
+std::vector<int> free_unknowns(const Unknowns& unknowns);
+
+}  // namespace palpate::estimation

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/posterior.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::estimation {
+namespace {
+
+constexpr int grid_size = 401;
+
+double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
+
+/// Mean, standard deviation of log E and log determinant, all given nu, from the Hessian.
+struct Conditional {
+  double log_young = 0, std_dev = 0, log_determinant = 0, cost = 0, slope = 0;
+};
+
+/// Order: every free unknown but nu.
+Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& unknowns, const Unknowns& list, double factor) {
+  std::vector<int> others;
+  for (int k : free_unknowns(list)) {
+    if (k != poisson) others.push_back(k);
+  }
+  MatrixX hessian(static_cast<Index>(others.size()), static_cast<Index>(others.size()));
+  VectorX cross(static_cast<Index>(others.size()));
+  for (std::size_t a = 0; a < others.size(); ++a) {
+    cross(static_cast<Index>(a)) = evaluation.hessian(others[a], poisson);
+    for (std::size_t b = 0; b < others.size(); ++b) {
+      hessian(static_cast<Index>(a), static_cast<Index>(b)) = evaluation.hessian(others[a], others[b]);
+    }
+  }
+  const Eigen::LDLT<MatrixX> factorised(factor * hessian);
+  VectorX unit = VectorX::Zero(static_cast<Index>(others.size()));
+  unit(0) = 1;  // log E comes first
+  Conditional out;
+  out.log_young = unknowns(log_young);
+  out.std_dev = std::sqrt(std::max(factorised.solve(unit)(0), 1e-30));
+  out.log_determinant = factorised.vectorD().array().abs().max(1e-300).log().sum();
+  out.cost = factor * evaluation.cost;
+  out.slope = -factor * factorised.solve(cross)(0);  // d log E / d nu along the ridge
+  return out;
+}
+
+/// Natural cubic spline through (x, y), evaluated at `at`.
+VectorX spline(const VectorX& x, const VectorX& y, const VectorX& at) {
+  const Index n = x.size();
+  MatrixX system = MatrixX::Identity(n, n);
+  VectorX right = VectorX::Zero(n);
+  for (Index i = 1; i + 1 < n; ++i) {
+    const double before = x(i) - x(i - 1), after = x(i + 1) - x(i);
+    system(i, i - 1) = before / 6;
+    system(i, i) = (before + after) / 3;
+    system(i, i + 1) = after / 6;
+    right(i) = (y(i + 1) - y(i)) / after - (y(i) - y(i - 1)) / before;
+  }
+  const VectorX bend = system.partialPivLu().solve(right);
+  VectorX out(at.size());
+  for (Index k = 0; k < at.size(); ++k) {
+    Index i = 0;
+    while (i + 2 < n && at(k) > x(i + 1)) ++i;
+    const double h = x(i + 1) - x(i), a = (x(i + 1) - at(k)) / h, b = (at(k) - x(i)) / h;
+    out(k) = a * y(i) + b * y(i + 1) + ((a * a * a - a) * bend(i) + (b * b * b - b) * bend(i + 1)) * h * h / 6;
+  }
+  return out;
+}
+
+void finish(Posterior& posterior, const VectorX& log_density) {
+  posterior.weight = (log_density.array() - log_density.maxCoeff()).exp();
+  posterior.weight /= posterior.weight.sum();
+  const double nu = posterior.weight.dot(posterior.poisson);
+  const double log_e = posterior.weight.dot(posterior.log_young_mean);
+  const VectorX off_nu = posterior.poisson.array() - nu, off_e = posterior.log_young_mean.array() - log_e;
+  posterior.covariance.resize(2, 2);
+  posterior.covariance(1, 1) = posterior.weight.dot(off_nu.cwiseAbs2());
+  posterior.covariance(0, 0) = posterior.weight.dot(off_e.cwiseAbs2() + posterior.log_young_std.cwiseAbs2());
+  posterior.covariance(0, 1) = posterior.covariance(1, 0) = posterior.weight.dot(off_e.cwiseProduct(off_nu));
+}
+
+}  // namespace
+
+double Posterior::poisson_quantile(double probability) const {
+  if (poisson.size() == 1) return poisson(0);
+  // Weights are masses of cells about the nodes; inside a cell the density is flat.
+  double below = 0;
+  const double cell = (poisson(poisson.size() - 1) - poisson(0)) / static_cast<double>(poisson.size() - 1);
+  for (Index i = 0; i < poisson.size(); ++i) {
+    if (below + weight(i) >= probability) {
+      const double at = poisson(i) + cell * ((probability - below) / weight(i) - 0.5);
+      return std::clamp(at, poisson(0), poisson(poisson.size() - 1));
+    }
+    below += weight(i);
+  }
+  return poisson(poisson.size() - 1);
+}
+
+double Posterior::log_young_quantile(double probability) const {
+  double low = (log_young_mean - 9 * log_young_std).minCoeff(), high = (log_young_mean + 9 * log_young_std).maxCoeff();
+  for (int i = 0; i < 100; ++i) {
+    const double middle = 0.5 * (low + high);
+    double below = 0;
+    for (Index k = 0; k < weight.size(); ++k) below += weight(k) * normal_cdf((middle - log_young_mean(k)) / log_young_std(k));
+    (below < probability ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+double Posterior::poisson_std() const { return std::sqrt(std::max(covariance(1, 1), 0.0)); }
+double Posterior::log_young_std_total() const { return std::sqrt(std::max(covariance(0, 0), 0.0)); }
+
+Posterior explore_posterior(Objective& objective, const Optimum& optimum, const Loss& loss, double information_factor,
+                            const OnProgress& progress) {
+  const Unknowns& list = objective.unknowns();
+  const Conditional at = condition_on_poisson(optimum.evaluation, optimum.unknowns, list, information_factor);
+  const double nu = optimum.unknowns(poisson);
+  const double lower = list[poisson].lower, upper = list[poisson].upper;
+  Posterior posterior;
+  if (list[poisson].fixed) {
+    posterior.poisson = VectorX::Constant(1, nu);
+    posterior.log_young_mean = VectorX::Constant(1, at.log_young);
+    posterior.log_young_std = VectorX::Constant(1, at.std_dev);
+    finish(posterior, VectorX::Zero(1));
+    return posterior;
+  }
+
+  // Standard deviation of nu with everything else free.
+  std::vector<int> moving = free_unknowns(list);
+  MatrixX hessian(static_cast<Index>(moving.size()), static_cast<Index>(moving.size()));
+  for (std::size_t a = 0; a < moving.size(); ++a) {
+    for (std::size_t b = 0; b < moving.size(); ++b) {
+      hessian(static_cast<Index>(a), static_cast<Index>(b)) = information_factor * optimum.evaluation.hessian(moving[a], moving[b]);
+    }
+  }
+  VectorX unit = VectorX::Zero(hessian.rows());
+  unit(1) = 1;
+  const double variance = hessian.ldlt().solve(unit)(1);
+  const double std_nu = variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : upper - lower;
+  const bool inside = nu - 5 * std_nu > lower && nu + 5 * std_nu < upper;
+  if (inside && std_nu < 0.03) {
+    posterior.poisson = VectorX::LinSpaced(grid_size, nu - 5 * std_nu, nu + 5 * std_nu);
+    const VectorX off = posterior.poisson.array() - nu;
+    posterior.log_young_mean = (at.log_young + at.slope * off.array()).matrix();
+    posterior.log_young_std = VectorX::Constant(grid_size, at.std_dev);
+    finish(posterior, -0.5 * (off / std_nu).cwiseAbs2());
+    return posterior;
+  }
+
+  // Conditional optima outwards from the best one, each started from its neighbour.
+  posterior.quadrature = true;
+  const double from = std::max(lower, nu - 6 * std_nu), to = std::min(upper, nu + 6 * std_nu);
+  constexpr int nodes = 9;
+  VectorX node(nodes), density(nodes), mean(nodes), std_dev(nodes);
+  for (int i = 0; i < nodes; ++i) node(i) = 0.5 * (from + to) - 0.5 * (to - from) * std::cos(EIGEN_PI * i / (nodes - 1));
+  Index nearest = 0;
+  (node.array() - nu).abs().minCoeff(&nearest);
+  OptimiseOptions few;
+  few.max_iterations = 6;
+  few.step_tolerance = 0.02;
+  int done = 0;
+  const auto visit = [&](Index i, const VectorX& start) {
+    if (progress) progress("posterior", static_cast<double>(done++) / nodes);
+    VectorX begin = start;
+    begin(poisson) = node(i);
+    objective.hold_poisson(true);
+    const Optimum conditional = optimise(objective, begin, loss, few, {});
+    objective.hold_poisson(false);
+    if (!conditional.evaluation.usable) {
+      density(i) = -1e6;
+      mean(i) = start(log_young);
+      std_dev(i) = at.std_dev;
+      return start;
+    }
+    const Conditional c = condition_on_poisson(conditional.evaluation, conditional.unknowns, list, information_factor);
+    density(i) = -c.cost - 0.5 * c.log_determinant;
+    mean(i) = c.log_young;
+    std_dev(i) = c.std_dev;
+    return conditional.unknowns;
+  };
+  VectorX here = visit(nearest, optimum.unknowns);
+  VectorX walk = here;
+  for (Index i = nearest + 1; i < nodes; ++i) walk = visit(i, walk);
+  walk = here;
+  for (Index i = nearest - 1; i >= 0; --i) walk = visit(i, walk);
+
+  posterior.poisson = VectorX::LinSpaced(grid_size, from, to);
+  density.array() -= density.maxCoeff();
+  density = density.cwiseMax(-200);
+  posterior.log_young_mean = spline(node, mean, posterior.poisson);
+  posterior.log_young_std = spline(node, std_dev, posterior.poisson).cwiseMax(1e-3 * std_dev.minCoeff());
+  finish(posterior, spline(node, density, posterior.poisson));
+  return posterior;
+}
+
+PosteriorGrid posterior_grid(const Posterior& posterior) {
+  PosteriorGrid grid;
+  if (posterior.poisson.size() < 2) return grid;
+  constexpr int size = 61;
+  const double span = 4 * posterior.log_young_std_total();
+  const double middle = posterior.log_young_quantile(0.5);
+  grid.young_modulus_pa = VectorX::LinSpaced(size, middle - span, middle + span).array().exp();
+  const double nu_low = posterior.poisson_quantile(1e-4), nu_high = posterior.poisson_quantile(1 - 1e-4);
+  grid.poisson_ratio = VectorX::LinSpaced(size, nu_low, nu_high);
+  grid.density.resize(size, size);
+  const double step = (posterior.poisson(posterior.poisson.size() - 1) - posterior.poisson(0)) /
+                      static_cast<double>(posterior.poisson.size() - 1);
+  for (int j = 0; j < size; ++j) {
+    const Index at = std::clamp<Index>(static_cast<Index>(std::lround((grid.poisson_ratio(j) - posterior.poisson(0)) / step)), 0,
+                                       static_cast<Index>(posterior.poisson.size()) - 1);
+    for (int i = 0; i < size; ++i) {
+      const double z = (std::log(grid.young_modulus_pa(i)) - posterior.log_young_mean(at)) / posterior.log_young_std(at);
+      grid.density(i, j) = posterior.weight(at) / step * std::exp(-0.5 * z * z) /
+                           (std::sqrt(2 * EIGEN_PI) * posterior.log_young_std(at));
+    }
+  }
+  return grid;
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "palpate/core/identification.hpp"
+#include "palpate/estimation/optimise.hpp"
+
+namespace palpate::estimation {
+
+/// A distribution over nu on a grid, and given nu a normal one over log E: what every reported number is read from.
+struct Posterior {
+  VectorX poisson;            ///< grid
+  VectorX weight;             ///< of each grid node, sums to one
+  VectorX log_young_mean;     ///< given nu
+  VectorX log_young_std;
+  MatrixX covariance;         ///< 2 x 2 of (log E, nu)
+  bool quadrature = false;    ///< conditional optima were solved at several nu (else Laplace, cut at the bounds)
+
+  double poisson_quantile(double probability) const;
+  double log_young_quantile(double probability) const;
+  double poisson_std() const;
+  double log_young_std_total() const;
+};
+
+/// Laplace where nu is well determined and far from its bounds; elsewhere a quadrature over nu: at each of a few nodes all
+/// other unknowns are optimised again and integrated out (Laplace given nu), and the log posterior between nodes is a
+/// cubic polynomial (Rue, Martino and Chopin 2009, section 3, with one hyperparameter).
+Posterior explore_posterior(Objective& objective, const Optimum& optimum, const Loss& loss, double information_factor,
+                            const OnProgress& progress);
+
+PosteriorGrid posterior_grid(const Posterior& posterior);
+
+}  // namespace palpate::estimation

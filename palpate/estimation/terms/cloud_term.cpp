@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points of a cloud against the closest point of the deformed surface (point to triangle, never nearest vertex: that is biased
+// by the mesh's spacing). The whole boundary is searched, not only the part that sensors see: noise carries points over the
+// edge of the seen part, and clipping there would pull the surface outwards.
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/terms/surface_terms.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+class CloudTerm : public Term {
+ public:
+  CloudTerm(const PointCloud& cloud, const TriMesh& rest, int pose)
+      : points_m_(cloud.points_m), pose_(pose), tree_(rest), hints_(static_cast<std::size_t>(cloud.points_m.rows()), -1) {
+    sigma_m_ = cloud.sigma_m.size() == 1 ? VectorX::Constant(points_m_.rows(), cloud.sigma_m(0)).eval() : cloud.sigma_m;
+    centre_m_ = points_m_.colwise().mean();
+    typical_ = sigma_m_.mean();
+  }
+
+  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool) const override {
+    tree_.refit(predicted.surface_m);
+    RigidOffset frame;
+    frame.pivot_m = centre_m_;
+    if (pose_ >= 0) {
+      frame.translation_m = unknowns.segment<3>(pose_);
+      frame.rotation_rad = unknowns.segment<3>(pose_ + 3);
+    }
+    const Index count = static_cast<Index>(predicted.columns.size());
+    TermRows rows;
+    rows.unknowns = predicted.columns;
+    for (int k = 0; pose_ >= 0 && k < 6; ++k) rows.unknowns.push_back(pose_ + k);
+    rows.jacobian.resize(points_m_.rows(), static_cast<Index>(rows.unknowns.size()));
+    rows.residual.resize(points_m_.rows());
+    rows.sigma = sigma_m_;
+    rows.observed_m.resize(points_m_.rows(), 3);
+    rows.robust = true;
+    rows.unit = "m";
+    for (Index i = 0; i < points_m_.rows(); ++i) {
+      const Vec3 point = frame.apply(points_m_.row(i));
+      const auto hit = tree_.closest(point, hints_[static_cast<std::size_t>(i)]);
+      hints_[static_cast<std::size_t>(i)] = hit.triangle;
+      const auto triangle = tree_.mesh().triangles.row(hit.triangle);
+      const auto corner = [&](int k) { return Vec3(tree_.mesh().vertices_m.row(triangle(k))); };
+      Vec3 normal = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+      const Vec3 apart = point - hit.point_m;
+      const double side = normal.dot(apart) < 0 ? -1 : 1;
+      // The distance grows along `apart`; on the surface itself that direction is the face's normal.
+      if (apart.norm() > 1e-9) normal = side * apart.normalized();
+      rows.residual(i) = side * apart.norm() / sigma_m_(i);
+      rows.jacobian.row(i).head(count).setZero();
+      for (int k = 0; k < 3; ++k) {
+        rows.jacobian.row(i).head(count) -=
+            hit.barycentric(k) / sigma_m_(i) * (normal.transpose() * predicted.d_surface.middleRows<3>(3 * triangle(k)));
+      }
+      if (pose_ >= 0) rows.jacobian.row(i).tail<6>() = normal.transpose() * frame.derivative(points_m_.row(i)) / sigma_m_(i);
+      rows.observed_m.row(i) = point;
+    }
+    return rows;
+  }
+  double typical_sigma() const override { return typical_; }
+
+ private:
+  Points points_m_;
+  VectorX sigma_m_;
+  Vec3 centre_m_ = Vec3::Zero();
+  double typical_ = 0;
+  int pose_;
+  mutable geometry::TriangleTree tree_;  // refitted to the surface that is asked about
+  mutable std::vector<Index> hints_;     // last closest triangles: they only make the search faster
+};
+
+}  // namespace
+
+std::unique_ptr<Term> make_cloud_term(const PointCloud& cloud, const TermContext& context) {
+  const std::string where = context.model.step(context.step).source + " cloud";
+  if (cloud.points_m.rows() == 0) throw Error("the cloud is empty", where);
+  if (cloud.sigma_m.size() != 1 && cloud.sigma_m.size() != cloud.points_m.rows()) {
+    throw Error("give one standard deviation (sigma_m), or one a point", where);
+  }
+  if (!(cloud.sigma_m.minCoeff() > 0)) throw Error("sigma_m must be positive", where);
+  return std::make_unique<CloudTerm>(cloud, context.model.object().surface.rest(),
+                                     add_frame_pose(context, cloud.pose_std_m, cloud.pose_std_rad));
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// Depth along the camera ray against the exactly ray-cast deformed surface. Unlike a closest point, the residual lies where the
+// noise lies, so noise does not bias it. While the surface may still be far off, the closest point gives direction instead.
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/terms/surface_terms.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr double grazing_cosine = 0.17;  // beyond 80 degrees a depth says little and its noise model is void
+
+class RayTerm : public Term {
+ public:
+  RayTerm(const RayObservation& observation, const TriMesh& rest, int pose, int bias)
+      : rays_(observation.rays), pose_(pose), bias_(bias), tree_(rest), hints_(static_cast<std::size_t>(rays_.range_m.size()), -1) {
+    for (Index i = 0; i < rays_.range_m.size(); ++i) pivot_m_ += point(i) / static_cast<double>(rays_.range_m.size());
+    typical_ = rays_.sigma_m.mean();
+  }
+
+  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool along_rays) const override {
+    tree_.refit(predicted.surface_m);
+    RigidOffset frame;
+    frame.pivot_m = pivot_m_;
+    if (pose_ >= 0) {
+      frame.translation_m = unknowns.segment<3>(pose_);
+      frame.rotation_rad = unknowns.segment<3>(pose_ + 3);
+    }
+    const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
+    const Index count = static_cast<Index>(predicted.columns.size());
+    const Index pose_column = count;
+    const Index bias_column = count + (pose_ >= 0 ? 6 : 0);
+    TermRows rows;
+    rows.unknowns = predicted.columns;
+    for (int k = 0; pose_ >= 0 && k < 6; ++k) rows.unknowns.push_back(pose_ + k);
+    if (bias_ >= 0) rows.unknowns.push_back(bias_);
+    rows.jacobian = MatrixX::Zero(rays_.range_m.size(), static_cast<Index>(rows.unknowns.size()));
+    rows.residual.resize(rays_.range_m.size());
+    rows.sigma = rays_.sigma_m;
+    rows.observed_m.resize(rays_.range_m.size(), 3);
+    rows.robust = true;
+    rows.unit = "m";
+    rows.cell.resize(static_cast<std::size_t>(rays_.range_m.size()));
+
+    const Mat3 rotation = frame.rotation();
+    for (Index i = 0; i < rays_.range_m.size(); ++i) {
+      rows.cell[static_cast<std::size_t>(i)] = cell(i);
+      // The measured point, with the sensor's common offset taken out, where the corrected camera pose puts it.
+      const Vec3 measured = point(i) - bias_m * Vec3(rays_.directions.row(i));
+      const Vec3 observed = frame.apply(measured);
+      const Vec3 direction = rotation * rays_.directions.row(i).transpose();
+      rows.observed_m.row(i) = observed;
+
+      Index triangle = -1;
+      Vec3 barycentric, gradient;  // residual = (observed - surface) . gradient / sigma
+      double residual_m = 0;
+      Vec3 lever = measured;                // where the frame's pose acts: the hit, for a ray
+      if (along_rays) {
+        if (const auto hit = tree_.cast(frame.apply(rays_.origins_m.row(i)), direction)) {
+          const Vec3 normal = face_normal(hit->triangle);
+          const double cosine = normal.dot(direction);
+          if (std::abs(cosine) > grazing_cosine) {
+            triangle = hit->triangle;
+            barycentric = hit->barycentric;
+            gradient = normal / cosine;
+            residual_m = rays_.range_m(i) - bias_m - hit->range_m;
+            lever = measured - residual_m * Vec3(rays_.directions.row(i));
+          }
+        }
+      } else {
+        const auto hit = tree_.closest(observed, hints_[static_cast<std::size_t>(i)]);
+        hints_[static_cast<std::size_t>(i)] = hit.triangle;
+        triangle = hit.triangle;
+        barycentric = hit.barycentric;
+        const Vec3 apart = observed - hit.point_m;
+        gradient = apart.norm() > 1e-9 ? Vec3(apart.normalized()) : face_normal(hit.triangle);
+        residual_m = apart.norm();
+      }
+      if (triangle < 0) {  // the ray passes the object by: an outlier, at no gradient
+        rows.residual(i) = std::numeric_limits<double>::infinity();
+        continue;
+      }
+      const double sigma_m = rays_.sigma_m(i);
+      rows.residual(i) = residual_m / sigma_m;
+      for (int k = 0; k < 3; ++k) {
+        rows.jacobian.row(i).head(count) -=
+            barycentric(k) / sigma_m *
+            (gradient.transpose() * predicted.d_surface.middleRows<3>(3 * tree_.mesh().triangles(triangle, k)));
+      }
+      if (pose_ >= 0) {
+        rows.jacobian.block<1, 6>(i, pose_column) = gradient.transpose() * frame.derivative(lever) / sigma_m;
+      }
+      if (bias_ >= 0) rows.jacobian(i, bias_column) = -gradient.dot(direction) / sigma_m;
+    }
+    return rows;
+  }
+  double typical_sigma() const override { return typical_; }
+
+ private:
+  Vec3 point(Index i) const { return rays_.origins_m.row(i) + rays_.range_m(i) * rays_.directions.row(i); }
+  Vec3 face_normal(Index triangle) const {
+    const auto corner = [&](int k) { return Vec3(tree_.mesh().vertices_m.row(tree_.mesh().triangles(triangle, k))); };
+    return (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+  }
+  /// Square image cells of 16 pixels, numbered along rows of up to 4096 cells.
+  int cell(Index i) const { return rays_.pixel.rows() == 0 ? static_cast<int>(i) : (rays_.pixel(i, 1) / 16) * 4096 + rays_.pixel(i, 0) / 16; }
+
+  RayCloud rays_;
+  int pose_, bias_;
+  Vec3 pivot_m_ = Vec3::Zero();
+  double typical_ = 0;
+  mutable geometry::TriangleTree tree_;
+  mutable std::vector<Index> hints_;
+};
+
+}  // namespace
+
+std::unique_ptr<Term> make_ray_term(const RayObservation& observation, const TermContext& context) {
+  const std::string where = context.model.step(context.step).source + " depth";
+  if (observation.rays.range_m.size() == 0) throw Error("no pixel of the depth image shows the object", where);
+  if (!(observation.rays.sigma_m.minCoeff() > 0)) throw Error("the depth's standard deviation must be positive", where);
+  int bias = -1;
+  if (observation.bias_std_m > 0) {
+    const std::string name = "depth_bias[" + context.model.push(context.step).name + "]";
+    if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, observation.bias_std_m});
+    bias = context.shared[name];
+  }
+  const int pose = add_frame_pose(context, observation.pose_std_m, observation.pose_std_rad);
+  return std::make_unique<RayTerm>(observation, context.model.object().surface.rest(), pose, bias);
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// A measurement term: what one observation of one step says about the unknowns, as whitened residuals with exact derivatives.
+// A new sensor joins with one class and one line in terms/table.cpp; tests/estimation/term_contract_test.cpp checks every term's
+// derivatives against finite differences.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "palpate/core/recording.hpp"
+#include "palpate/estimation/forward_model.hpp"
+#include "palpate/estimation/unknowns.hpp"
+
+namespace palpate::estimation {
+
+/// Depth pixels of one frame as rays in the base frame (made by the room `sensing`).
+struct RayObservation {
+  RayCloud rays;
+  double pose_std_m = 0, pose_std_rad = 0;
+  double bias_std_m = 0;  ///< one common depth offset a push
+};
+
+using TermInput = std::variant<RayObservation, PointCloud, Markers, ToolTravel, Wrench>;
+
+/// Rows of one term: residual = (observed - predicted) / sigma, jacobian = d residual / d unknowns.
+struct TermRows {
+  std::vector<int> unknowns;  ///< columns of the jacobian
+  MatrixX jacobian;
+  VectorX residual;
+  bool robust = false;        ///< may hold outliers: goes through the robust loss
+  std::string unit = "1";     ///< of residual * sigma
+  VectorX sigma;              ///< a row
+  Points observed_m;          ///< at the fitted pose; empty for what is not a point
+  std::vector<int> cell;      ///< group of neighbours whose errors may be correlated (image or space cell); empty = independent
+};
+
+class Term {
+ public:
+  virtual ~Term() = default;
+  /// @param along_rays  false while the surface may still be far away: closest points are used instead of rays
+  virtual TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool along_rays) const = 0;
+  /// Standard deviation that residuals are divided by, a typical one (for the annealing of the robust loss).
+  virtual double typical_sigma() const = 0;
+};
+
+struct TermContext {
+  const ForwardModel& model;
+  std::size_t step = 0;
+  Unknowns& unknowns;
+  /// Unknowns that several terms share, by name (depth bias of a push, marker offsets): first index.
+  std::map<std::string, int>& shared;
+};
+
+/// Makes the term of an observation and registers its nuisances. nullptr when the observation adds nothing (the reading of a
+/// force that is imposed anyway). @throws Error when a standard deviation is missing or not positive.
+std::unique_ptr<Term> make_term(const TermInput& input, const TermContext& context);
+
+}  // namespace palpate::estimation

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the tool itself measures: its travel and, where the motion is imposed, its force.
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/terms/surface_terms.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+class TravelTerm : public Term {
+ public:
+  TravelTerm(double travel_m, double sigma_m, Index load, int offset)
+      : travel_m_(travel_m), sigma_m_(sigma_m), load_(load), offset_(offset) {}
+
+  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool) const override {
+    TermRows rows;
+    rows.unknowns = predicted.columns;
+    rows.jacobian = -predicted.d_travel.row(load_) / sigma_m_;
+    rows.residual.setConstant(1, (travel_m_ - predicted.travel_m(load_)) / sigma_m_);
+    if (offset_ >= 0) {  // the encoder's zero is not where contact began: reading = true travel + offset
+      rows.residual(0) -= unknowns(offset_) / sigma_m_;
+      rows.unknowns.push_back(offset_);
+      rows.jacobian.conservativeResize(1, rows.jacobian.cols() + 1);
+      rows.jacobian(0, rows.jacobian.cols() - 1) = -1 / sigma_m_;
+    }
+    rows.sigma.setConstant(1, sigma_m_);
+    rows.unit = "m";
+    return rows;
+  }
+  double typical_sigma() const override { return sigma_m_; }
+
+ private:
+  double travel_m_, sigma_m_;
+  Index load_;
+  int offset_;
+};
+
+class WrenchTerm : public Term {
+ public:
+  WrenchTerm(const Wrench& wrench, std::size_t load) : wrench_(wrench), load_(load) {
+    if (wrench.along.norm() > 0) {
+      axes_ = {wrench.along.normalized()};
+    } else {
+      axes_ = {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
+    }
+  }
+
+  TermRows rows(const StepPrediction& predicted, const VectorX&, bool) const override {
+    TermRows rows;
+    const Index count = static_cast<Index>(axes_.size());
+    rows.unknowns = predicted.columns;
+    rows.jacobian.resize(count, predicted.d_force[load_].cols());
+    rows.residual.resize(count);
+    for (Index k = 0; k < count; ++k) {
+      const Vec3& axis = axes_[static_cast<std::size_t>(k)];
+      rows.residual(k) = axis.dot(wrench_.force_n - predicted.force_n[load_]) / wrench_.force_sigma_n;
+      rows.jacobian.row(k) = -axis.transpose() * predicted.d_force[load_] / wrench_.force_sigma_n;
+    }
+    rows.sigma.setConstant(count, wrench_.force_sigma_n);
+    rows.unit = "N";
+    return rows;
+  }
+  double typical_sigma() const override { return wrench_.force_sigma_n; }
+
+ private:
+  Wrench wrench_;
+  std::size_t load_;
+  std::vector<Vec3> axes_;
+};
+
+}  // namespace
+
+std::unique_ptr<Term> make_travel_term(const ToolTravel& travel, const TermContext& context) {
+  const std::size_t load = load_of(context, travel.tool, "travel");
+  if (context.model.step(context.step).loads[load].travel_m) return nullptr;  // imposed, not observed
+  if (!(travel.sigma_m > 0)) {
+    throw Error("the travel needs its standard deviation (sigma_m > 0)", context.model.step(context.step).source + " travel");
+  }
+  const Push& push = context.model.push(context.step);
+  int offset = -1;
+  if (push.travel_offset_std_m > 0) {
+    const std::string name = "travel_zero[" + push.name + "]";
+    if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, push.travel_offset_std_m});
+    offset = context.shared[name];
+  }
+  return std::make_unique<TravelTerm>(travel.travel_m, travel.sigma_m, static_cast<Index>(load), offset);
+}
+
+std::unique_ptr<Term> make_wrench_term(const Wrench& wrench, const TermContext& context) {
+  const auto& loads = context.model.step(context.step).loads;
+  if (loads.empty()) return nullptr;
+  const std::size_t load = load_of(context, wrench.tool, "wrench");
+  if (!loads[load].travel_m) return nullptr;  // the force is imposed: the reading is the load itself
+  if (!(wrench.force_sigma_n > 0)) {
+    throw Error("the wrench needs its standard deviation (force_sigma_n > 0)",
+                context.model.step(context.step).source + " wrench");
+  }
+  return std::make_unique<WrenchTerm>(wrench, load);
+}
+
+}  // namespace palpate::estimation
