@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/error_budget.hpp"
+#include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/posterior.hpp"
+#include "palpate/estimation/verdicts.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr double z_95 = 1.959963984540054;
+
+std::vector<Parameter> parameters_from(const Posterior& posterior, const Unknown& nu) {
+  Parameter young{"young_modulus", "", "Pa"};
+  young.value = std::exp(posterior.log_young_quantile(0.5));
+  young.std = young.value * posterior.log_young_std_total();
+  young.lower_95 = std::exp(posterior.log_young_quantile(0.025));
+  young.upper_95 = std::exp(posterior.log_young_quantile(0.975));
+  Parameter ratio{"poisson_ratio", "", "1"};
+  ratio.value = posterior.poisson_quantile(0.5);
+  ratio.std = posterior.poisson_std();
+  ratio.lower_95 = posterior.poisson_quantile(0.025);
+  ratio.upper_95 = posterior.poisson_quantile(0.975);
+  // A uniform prior has the standard deviation range / sqrt(12); data that leave 60 % of it say little.
+  ratio.determined = nu.fixed || ratio.std < 0.6 * (nu.upper - nu.lower) / std::sqrt(12.0);
+  young.determined = posterior.log_young_std_total() < 0.5;
+  return {young, ratio};
+}
+
+std::vector<Nuisance> nuisances_from(const Unknowns& list, const Optimum& optimum, const MatrixX& covariance,
+                                     const std::vector<int>& moving) {
+  std::vector<Nuisance> out;
+  for (std::size_t k = 0; k < moving.size(); ++k) {
+    if (moving[k] <= poisson) continue;
+    const Unknown& unknown = list[moving[k]];
+    Nuisance nuisance;
+    nuisance.name = unknown.name;
+    nuisance.unit = unknown.unit;
+    nuisance.value = optimum.unknowns(moving[k]);
+    nuisance.std = std::sqrt(std::max(covariance(static_cast<Index>(k), static_cast<Index>(k)), 0.0));
+    nuisance.lower_95 = nuisance.value - z_95 * nuisance.std;
+    nuisance.upper_95 = nuisance.value + z_95 * nuisance.std;
+    nuisance.prior_std = unknown.prior_std;
+    nuisance.pull = (nuisance.value - unknown.prior_mean) / unknown.prior_std;
+    out.push_back(nuisance);
+  }
+  return out;
+}
+
+/// What figures need of every step.
+std::vector<StepFit> steps_from(const Objective& objective, ForwardModel& model) {
+  std::vector<StepFit> steps;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    const StepPrediction& predicted = objective.last_predictions()[s];
+    StepFit fit;
+    fit.push = model.push(s).name;
+    fit.step = static_cast<int>(model.index(s).step);
+    fit.used = predicted.surface_m.rows() > 0;
+    fit.surface_m = predicted.surface_m;
+    const auto& loads = model.step(s).loads;
+    if (!loads.empty() && fit.used) {
+      const Load& load = loads.front();
+      const Vec3 direction = load.direction.normalized();
+      fit.contact_m = load.contact_m;
+      fit.force_n = load.force_n.value_or(predicted.force_n.front());
+      fit.travel_predicted_m = predicted.travel_m(0);
+      if (load.force_n) fit.force_measured_n = load.force_n->dot(direction);
+      if (load.travel_m) {
+        fit.travel_m = *load.travel_m;
+        fit.force_predicted_n = predicted.force_n.front().dot(direction);
+      }
+      for (const auto& observation : model.step(s).observations) {
+        if (const auto* travel = std::get_if<ToolTravel>(&observation)) fit.travel_m = travel->travel_m;
+        if (const auto* wrench = std::get_if<Wrench>(&observation)) fit.force_measured_n = wrench->force_n.dot(direction);
+      }
+    }
+    Index points = 0;
+    for (const auto& rows : objective.last_rows()[s]) points += rows.robust ? rows.observed_m.rows() : 0;
+    fit.observed_m.resize(points, 3);
+    fit.residual_m.resize(points);
+    Index at = 0;
+    for (const auto& rows : objective.last_rows()[s]) {
+      if (!rows.robust) continue;
+      fit.observed_m.middleRows(at, rows.observed_m.rows()) = rows.observed_m;
+      fit.residual_m.segment(at, rows.residual.size()) = rows.residual.cwiseProduct(rows.sigma);
+      at += rows.observed_m.rows();
+    }
+    steps.push_back(std::move(fit));
+  }
+  return steps;
+}
+
+}  // namespace
+
+void check(const FitOptions& options) {
+  const auto demand = [](bool fine, const char* field, const char* cure) {
+    if (!fine) throw Error(cure, std::string("FitOptions.") + field);
+  };
+  demand(options.max_iterations >= 1, "max_iterations", "must be at least 1");
+  demand(options.tukey_cut > 1.5 && std::isfinite(options.tukey_cut), "tukey_cut", "must be a number above 1.5");
+  demand(!options.young_start_pa || (*options.young_start_pa > 0 && std::isfinite(*options.young_start_pa)), "young_start_pa",
+         "must be positive, in pascal");
+  demand(options.poisson_start > -1 && options.poisson_start < 0.5, "poisson_start", "must lie between -1 and 0.5");
+  demand(options.threads >= 1, "threads", "must be at least 1");
+}
+
+Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
+                   const OnProgress& progress) {
+  check(options);
+  Unknowns unknowns;
+  fem::StaticsOptions statics;
+  statics.threads = options.threads;
+  ForwardModel model(recording, object, unknowns, statics);
+  Objective objective(model, inputs, unknowns);
+  if (recording.model.poisson_fixed) unknowns[poisson].fixed = true;
+
+  const double nu_start = recording.model.poisson_fixed.value_or(options.poisson_start);
+  VectorX start = unknowns.prior_mean();
+  if (recording.model.poisson_fixed) {
+    unknowns[poisson].lower = std::min(unknowns[poisson].lower, nu_start);
+    unknowns[poisson].upper = std::max(unknowns[poisson].upper, nu_start);
+  }
+  if (options.young_start_pa) {
+    start(log_young) = std::log(*options.young_start_pa);
+    start(poisson) = std::clamp(nu_start, unknowns[poisson].lower, unknowns[poisson].upper);
+  } else {
+    start = find_start(objective, nu_start);
+  }
+
+  Loss loss;
+  loss.tukey = options.tukey_cut;
+  OptimiseOptions optimiser;
+  optimiser.max_iterations = options.max_iterations;
+  Optimum optimum = optimise_annealed(objective, start, loss, optimiser, progress);
+
+  Identification answer;
+  answer.material = object.material;
+  answer.surface = object.surface.rest();
+  answer.termination = optimum.termination;
+  answer.message = optimum.message;
+  answer.fit.pushes = recording.pushes.size();
+  answer.fit.steps = model.step_count();
+  if (!optimum.evaluation.usable) {
+    answer.fit.solves = model.solves();
+    answer.verdicts.push_back({"not_converged", "The simulation found no equilibrium (" + optimum.message +
+                                                    "): check the loads, the supports and the material."});
+    return answer;
+  }
+
+  // Neighbouring pixels err together: count them as fewer, and fit once more with that weight.
+  ResidualSummary residuals = objective.summarise(loss);
+  if (residuals.variance_inflation > 1.05) {
+    loss.surface_weight = 1 / residuals.variance_inflation;
+    optimum = optimise(objective, optimum.unknowns, loss, optimiser, progress);
+    if (optimum.termination == Termination::cancelled) {
+      answer.termination = optimum.termination;
+      answer.message = optimum.message;
+      return answer;
+    }
+    residuals = objective.summarise(loss);
+  }
+  answer.fit.iterations = optimum.iterations;
+
+  const double factor = residuals.points > 0 ? tukey_information_factor(loss.tukey) : 1;
+  const std::vector<int> moving = free_unknowns(unknowns);
+  MatrixX hessian(static_cast<Index>(moving.size()), static_cast<Index>(moving.size()));
+  for (std::size_t a = 0; a < moving.size(); ++a) {
+    for (std::size_t b = 0; b < moving.size(); ++b) {
+      hessian(static_cast<Index>(a), static_cast<Index>(b)) = optimum.evaluation.hessian(moving[a], moving[b]);
+    }
+  }
+  const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
+  answer.nuisances = nuisances_from(unknowns, optimum, covariance, moving);
+
+  double pulls = 0;
+  std::size_t flat = 0;
+  for (int k : moving) {
+    if (!std::isfinite(unknowns[k].prior_std)) {
+      ++flat;
+    } else {
+      pulls += std::pow((optimum.unknowns(k) - unknowns[k].prior_mean) / unknowns[k].prior_std, 2);
+    }
+  }
+  answer.fit.points_used = residuals.rows - residuals.outliers;
+  answer.fit.rms_m = residuals.lengths > 0 ? std::sqrt(residuals.sum_squared_m2 / static_cast<double>(residuals.lengths)) : 0;
+  answer.fit.chi2_per_dof =
+      (residuals.chi2 + pulls) / std::max(1.0, static_cast<double>(residuals.rows) - static_cast<double>(flat));
+  answer.steps = steps_from(objective, model);
+  answer.budget = error_budget(unknowns, hessian, moving);
+
+  const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
+  answer.parameters = parameters_from(posterior, unknowns[poisson]);
+  answer.covariance = posterior.covariance;
+  answer.posterior = posterior_grid(posterior);
+  objective.evaluate(optimum.unknowns, loss);  // the last evaluation is the optimum again: verdicts look at it
+  answer.fit.solves = model.solves();
+  answer.verdicts = judge({recording, objective, optimum, residuals, answer});
+  answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
+  return answer;
+}
+
+}  // namespace palpate::estimation

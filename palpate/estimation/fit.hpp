@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// The fit of a whole recording: all steps of all pushes at once, maximum a posteriori, with intervals, nuisances and verdicts.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/core/identification.hpp"
+#include "palpate/core/progress.hpp"
+#include "palpate/core/recording.hpp"
+#include "palpate/estimation/objective.hpp"
+
+namespace palpate::estimation {
+
+struct FitOptions {
+  int max_iterations = 60;
+  double tukey_cut = 4.685;               ///< standard deviations beyond which a point is an outlier
+  std::optional<double> young_start_pa;   ///< nothing: found from the data
+  double poisson_start = 0.3;             ///< moved into the prior's range
+  int threads = 1;
+};
+
+/// @throws Error naming the option that is out of range.
+void check(const FitOptions& options);
+
+/// What the sensors of one step contribute, in the recording's order of pushes and steps.
+using Inputs = std::vector<std::vector<TermInput>>;
+
+/// @param recording  loads, supports, priors; recording.model gives nu's prior range and whether it is fixed
+/// @param inputs     one list a step
+/// @throws Error when no answer can exist (no observation, supports that hold nothing, ...). Numbers that did not work out
+///         are said in `termination`, `message` and `verdicts`.
+Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
+                   const OnProgress& progress = {});
+
+}  // namespace palpate::estimation

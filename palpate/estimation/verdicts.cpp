@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/verdicts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::estimation {
+namespace {
+
+std::string number(double value, const char* format = "{:.3g}") { return fmt::format(fmt::runtime(format), value); }
+
+void judge_end(const VerdictInput& in, std::vector<Verdict>& out) {
+  if (in.optimum.termination == Termination::converged) return;
+  out.push_back({"not_converged", "The fit did not converge (" + in.optimum.message +
+                                      "): do not use the numbers. Check the loads, the supports and the material, or give "
+                                      "a start with --young-modulus-start."});
+}
+
+void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
+  const Unknown& nu = in.objective.unknowns()[poisson];
+  if (nu.fixed) return;
+  for (const auto& parameter : in.answer.parameters) {
+    if (parameter.name == "poisson_ratio" && !parameter.determined) {
+      out.push_back({"nu_not_determined",
+                     "These pushes hardly determine the Poisson ratio: its interval [" + number(parameter.lower_95) + ", " +
+                         number(parameter.upper_95) +
+                         "] is mostly the prior's. Push where the object can bulge sideways in view, or deeper, or from a "
+                         "second side."});
+    }
+  }
+  if (in.optimum.poisson_at_lower || in.optimum.poisson_at_upper) {
+    out.push_back({"nu_at_bound", "The best Poisson ratio lies at the end of its allowed range (" +
+                                      number(in.optimum.poisson_at_lower ? nu.lower : nu.upper, "{:.4g}") +
+                                      "). If the material is not known to be like that, the model or the supports are "
+                                      "likely wrong."});
+  }
+}
+
+void judge_fit(const VerdictInput& in, std::vector<Verdict>& out) {
+  const auto& r = in.residuals;
+  const double outlier_share = r.points > 0 ? static_cast<double>(r.outliers) / static_cast<double>(r.points) : 0;
+  const double rows = static_cast<double>(r.rows) / r.variance_inflation;
+  const double limit = 1.5 + 4 * std::sqrt(2 / std::max(rows, 1.0));
+  if (in.answer.fit.chi2_per_dof > limit) {
+    out.push_back({"model_does_not_fit",
+                   "The model does not fit: residuals are " + number(std::sqrt(in.answer.fit.chi2_per_dof), "{:.2g}") +
+                       " times what the sensors' standard deviations allow (chi2 per degree of freedom " +
+                       number(in.answer.fit.chi2_per_dof) +
+                       "). The intervals hold only for a model that fits. Check supports and their pose, the rest shape and "
+                       "the sensors' sigma."});
+  }
+  if (outlier_share > 0.15) {
+    out.push_back({"many_outliers", number(100 * outlier_share, "{:.0f}") +
+                                        " % of the observed points lie off the simulated surface by more than the noise "
+                                        "explains and were left out. Mask what is not the object (arm, table), or check "
+                                        "the rest shape."});
+  }
+  const double dof = rows - static_cast<double>(in.answer.parameters.size());
+  if (dof < 5) {
+    out.push_back({"too_few_points", "Only " + std::to_string(r.rows) +
+                                         " measured numbers: the fit cannot be tested against them. Record more steps or "
+                                         "points."});
+  }
+}
+
+void judge_nuisances(const VerdictInput& in, std::vector<Verdict>& out) {
+  for (const auto& nuisance : in.answer.nuisances) {
+    if (std::abs(nuisance.pull) <= 3) continue;
+    out.push_back({"nuisance_beyond_prior", nuisance.name + " ended at " + number(nuisance.value) + " " + nuisance.unit + ", " +
+                                                number(std::abs(nuisance.pull), "{:.1f}") +
+                                                " standard deviations of its prior away from what was expected (prior " +
+                                                number(nuisance.prior_std) + " " + nuisance.unit +
+                                                "). Something that the model takes for small is not: check it before "
+                                                "believing E."});
+  }
+}
+
+void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
+  int inverted = 0;
+  for (const auto& prediction : in.objective.last_predictions()) inverted += prediction.inverted_elements;
+  if (inverted > 0) {
+    out.push_back({"inverted_elements", std::to_string(inverted) +
+                                            " elements of the simulation are turned inside out: the load is beyond what "
+                                            "this material model describes. Use neo_hookean, or smaller forces."});
+  }
+  if (in.recording.rest.state == RestState::under_pressure) {
+    out.push_back({"apparent_modulus_only",
+                   "The object is inflated: a solid model gives an apparent modulus that depends on pressure and tool, not "
+                   "the elasticity of its skin."});
+  }
+}
+
+}  // namespace
+
+std::vector<Verdict> judge(const VerdictInput& input) {
+  std::vector<Verdict> verdicts;
+  judge_end(input, verdicts);
+  judge_fit(input, verdicts);
+  judge_poisson(input, verdicts);
+  judge_nuisances(input, verdicts);
+  judge_state(input, verdicts);
+  return verdicts;
+}
+
+}  // namespace palpate::estimation
