@@ -298,7 +298,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
   return c;
 }
 
-StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns) {
+StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
   Body& body = body_of(push(s));
   const Coefficients c = coefficients(s, body, unknowns);
   if (body.free_motions.cols() > 0 && c.force.size() > 0) {
@@ -339,6 +339,17 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns) {
   out.reason = at.reason;
   out.inverted_elements = at.inverted_elements;
   if (!at.converged) return out;
+
+  if (!derivatives) {
+    memory = {true, unknowns, at.displacement_m, {}, MatrixX(at.displacement_m.size(), 0)};
+    const VectorX moved = object_.surface.restrict(at.displacement_m);
+    const RigidOffset clamp = clamp_offset(s, unknowns);
+    out.surface_m = object_.surface.rest().vertices_m;
+    for (Index v = 0; v < out.surface_m.rows(); ++v) {
+      out.surface_m.row(v) = clamp.apply(out.surface_m.row(v).transpose() + moved.segment<3>(3 * v));
+    }
+    return out;
+  }
 
   const fem::Sensitivity d = body.statics->sensitivity(at);
   out.columns = {log_young, poisson};

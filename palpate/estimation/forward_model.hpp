@@ -56,7 +56,8 @@ class ForwardModel {
   const SimulatedObject& object() const { return object_; }
 
   /// Solves step s. Starts from the last solution of this step, moved along its derivatives to the new unknowns.
-  StepPrediction predict(std::size_t s, const VectorX& unknowns);
+  /// @param derivatives  false: surface and converged only (the paper's method differentiates numerically)
+  StepPrediction predict(std::size_t s, const VectorX& unknowns, bool derivatives = true);
 
   /// Forgets warm starts, so that the next answer does not depend on what was asked before.
   void forget();

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/paper_method.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/optimise.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// Vertices as degenerate triangles: the closest point of such a surface is the nearest vertex.
+TriMesh vertices_only(const Points& vertices_m) {
+  TriMesh mesh{vertices_m, Triangles(vertices_m.rows(), 3)};
+  for (Index v = 0; v < vertices_m.rows(); ++v) mesh.triangles.row(v).setConstant(v);
+  return mesh;
+}
+
+Points points_of(const std::vector<TermInput>& inputs) {
+  std::vector<Vec3> all;
+  for (const auto& input : inputs) {
+    if (const auto* cloud = std::get_if<PointCloud>(&input)) {
+      for (Index i = 0; i < cloud->points_m.rows(); ++i) all.emplace_back(cloud->points_m.row(i));
+    } else if (const auto* rays = std::get_if<RayObservation>(&input)) {
+      const RayCloud& r = rays->rays;
+      for (Index i = 0; i < r.range_m.size(); ++i) all.emplace_back(r.origins_m.row(i) + r.range_m(i) * r.directions.row(i));
+    }
+  }
+  Points points(static_cast<Index>(all.size()), 3);
+  for (std::size_t i = 0; i < all.size(); ++i) points.row(static_cast<Index>(i)) = all[i];
+  return points;
+}
+
+/// Besl and McKay's point-to-point ICP; returns the sum of squared distances to the nearest vertices at its end (eq. 6).
+double aligned_squared_distance(const geometry::TriangleTree& vertices, Points points, std::vector<Index>& nearest) {
+  double last = std::numeric_limits<double>::infinity();
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    Points targets(points.rows(), 3);
+    double sum = 0;
+    for (Index i = 0; i < points.rows(); ++i) {
+      const auto hit = vertices.closest(points.row(i), nearest[static_cast<std::size_t>(i)]);
+      nearest[static_cast<std::size_t>(i)] = hit.triangle;
+      targets.row(i) = hit.point_m;
+      sum += hit.squared_distance_m2;
+    }
+    if (sum > last * (1 - 1e-6)) return sum;
+    last = sum;
+    const Eigen::RowVector3d from = points.colwise().mean(), to = targets.colwise().mean();
+    const Mat3 correlation = (targets.rowwise() - to).transpose() * (points.rowwise() - from);
+    const Eigen::JacobiSVD<Mat3> svd(correlation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Mat3 sign = Mat3::Identity();
+    sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+    const Mat3 rotation = svd.matrixU() * sign * svd.matrixV().transpose();
+    points = ((points.rowwise() - from) * rotation.transpose()).rowwise() + to;
+  }
+  return last;
+}
+
+}  // namespace
+
+struct PaperError::Impl {
+  Unknowns unknowns;
+  std::unique_ptr<ForwardModel> model;
+  std::vector<std::size_t> steps;
+  std::vector<Points> points;
+  std::vector<std::vector<Index>> nearest;
+  std::unique_ptr<geometry::TriangleTree> tree;
+  std::size_t count = 0;
+  double start_pa = 0;
+};
+
+PaperError::PaperError(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
+                       const FitOptions& options)
+    : impl_(std::make_unique<Impl>()) {
+  fem::StaticsOptions statics;
+  statics.threads = options.threads;
+  impl_->model = std::make_unique<ForwardModel>(recording, object, impl_->unknowns, statics);
+  std::vector<std::size_t> with_points;
+  for (std::size_t s = 0; s < inputs.size(); ++s) {
+    if (points_of(inputs[s]).rows() > 0) with_points.push_back(s);
+  }
+  if (with_points.empty()) {
+    throw Error("the paper's method needs a point cloud or a depth image in at least one step", "--method paper");
+  }
+  const std::size_t samples = std::min(paper_samples, with_points.size());
+  for (std::size_t k = 0; k < samples; ++k) {
+    const std::size_t s = with_points[(k * with_points.size() + with_points.size() / 2) / samples];
+    impl_->steps.push_back(s);
+    impl_->points.push_back(points_of(inputs[s]));
+    impl_->nearest.emplace_back(static_cast<std::size_t>(impl_->points.back().rows()), -1);
+    impl_->count += static_cast<std::size_t>(impl_->points.back().rows());
+  }
+  impl_->tree = std::make_unique<geometry::TriangleTree>(vertices_only(object.surface.rest().vertices_m));
+  if (options.young_start_pa) {
+    impl_->start_pa = *options.young_start_pa;
+  } else {  // the same start as the other method's, so that only the methods differ
+    Unknowns list;
+    ForwardModel model(recording, object, list, statics);
+    Objective objective(model, inputs, list);
+    impl_->start_pa = std::exp(find_start(objective, options.poisson_start)(log_young));
+  }
+}
+
+PaperError::~PaperError() = default;
+double PaperError::start_young_modulus_pa() const { return impl_->start_pa; }
+std::size_t PaperError::samples() const { return impl_->steps.size(); }
+std::size_t PaperError::points() const { return impl_->count; }
+int PaperError::solves() const { return impl_->model->solves(); }
+
+double PaperError::operator()(double young_modulus_pa, double poisson_ratio) {
+  VectorX at = impl_->unknowns.prior_mean();
+  at(log_young) = std::log(young_modulus_pa);
+  at(poisson) = poisson_ratio;
+  double sum = 0;
+  for (std::size_t k = 0; k < impl_->steps.size(); ++k) {
+    const StepPrediction predicted = impl_->model->predict(impl_->steps[k], at, false);
+    if (!predicted.converged) return std::numeric_limits<double>::infinity();
+    impl_->tree->refit(predicted.surface_m);
+    sum += aligned_squared_distance(*impl_->tree, impl_->points[k], impl_->nearest[k]);
+  }
+  return sum / static_cast<double>(impl_->count);
+}
+
+Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
+                               const FitOptions& options, const OnProgress& progress) {
+  check(options);
+  PaperError error(recording, object, inputs, options);
+  const double nu_low = recording.model.poisson_lower, nu_high = recording.model.poisson_upper;
+  const bool nu_moves = !recording.model.poisson_fixed;
+  constexpr double difference = 1e-3;  // of log E and nu in the numerical derivatives
+
+  // Algorithm 1, in (log E, nu): gradient step, re-simulation, acceptance if the error falls.
+  Eigen::Vector2d x(std::log(error.start_young_modulus_pa()),
+                    std::clamp(recording.model.poisson_fixed.value_or(options.poisson_start), nu_low, nu_high));
+  const auto inside = [&](Eigen::Vector2d at) {
+    at(1) = std::clamp(at(1), nu_low, nu_high);
+    return at;
+  };
+  const auto value = [&](const Eigen::Vector2d& at) { return error(std::exp(at(0)), at(1)); };
+  Identification answer;
+  answer.material = object.material;
+  answer.surface = object.surface.rest();
+  double here = value(x);
+  double rate = -1;
+  answer.termination = Termination::max_iterations;
+  answer.message = "stopped after the largest number of iterations";
+  Eigen::Vector2d last_x = x, last_gradient = Eigen::Vector2d::Zero();
+  int iteration = 0;
+  for (; iteration < options.max_iterations && std::isfinite(here); ++iteration) {
+    if (progress && !progress("paper's method", static_cast<double>(iteration) / options.max_iterations)) {
+      answer.termination = Termination::cancelled;
+      answer.message = "stopped by the caller";
+      break;
+    }
+    answer.trace.push_back({std::exp(x(0)), x(1), here});
+    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+    for (int k = 0; k < (nu_moves ? 2 : 1); ++k) {
+      Eigen::Vector2d ahead = x, behind = x;
+      ahead(k) += difference;
+      behind(k) -= difference;
+      ahead = inside(ahead);
+      behind = inside(behind);
+      gradient(k) = (value(ahead) - value(behind)) / (ahead(k) - behind(k));
+    }
+    // First step: a tenth in log E; afterwards Barzilai and Borwein's length, still along the gradient.
+    if (rate < 0) {
+      rate = 0.1 / std::max(gradient.norm(), 1e-300);
+    } else {
+      const Eigen::Vector2d moved = x - last_x, change = gradient - last_gradient;
+      const double curvature = moved.dot(change);
+      if (curvature > 0) rate = moved.squaredNorm() / curvature;
+    }
+    last_x = x;
+    last_gradient = gradient;
+    bool improved = false;
+    for (int attempt = 0; attempt < 14; ++attempt, rate /= 3) {
+      Eigen::Vector2d move = -rate * gradient;
+      if (move.norm() > 1) move *= 1 / move.norm();
+      const Eigen::Vector2d next = inside(x + move);
+      const double there = value(next);
+      if (there < here) {
+        improved = true;
+        const double gain = (here - there) / here;
+        const double length = (next - x).norm();
+        x = next;
+        here = there;
+        if (gain < 1e-6 && length < 1e-4) improved = false;
+        break;
+      }
+    }
+    if (!improved) {
+      answer.termination = Termination::converged;
+      answer.message = "converged";
+      break;
+    }
+  }
+  if (!std::isfinite(here)) {
+    answer.termination = Termination::failed;
+    answer.message = "the simulation found no equilibrium at the start";
+  }
+  answer.fit.iterations = iteration;
+  answer.fit.solves = error.solves();
+  answer.fit.rms_m = std::sqrt(here);
+  answer.fit.points_used = error.points();
+  answer.fit.steps = error.samples();
+  answer.fit.pushes = recording.pushes.size();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  answer.parameters = {{"young_modulus", "", "Pa", std::exp(x(0)), nan, nan, nan, true},
+                       {"poisson_ratio", "", "1", x(1), nan, nan, nan, true}};
+  answer.verdicts.push_back({"no_uncertainty", "The paper's method gives no interval: use the default method for one."});
+  if (nu_moves && (x(1) <= nu_low || x(1) >= nu_high)) {
+    answer.verdicts.push_back({"nu_at_bound", "The Poisson ratio ended at the end of its range."});
+  }
+  return answer;
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The algorithm of Frank et al. (IROS 2010, section VI and algorithm 1) as a baseline: iterative closest point of every observed
+// surface to the simulated one, squared distances to the nearest vertices (eq. 5 and 6), gradient descent on (E, nu) with numerical
+// derivatives. Mesh, solver and loads are those of `fit`, so what differs is the method.
+#pragma once
+
+#include "palpate/estimation/fit.hpp"
+
+namespace palpate::estimation {
+
+/// Most samples (steps) that the baseline uses jointly, evenly spread: it re-simulates every one several times an iteration.
+inline constexpr std::size_t paper_samples = 10;
+
+/// @throws Error when no step has a point cloud or a depth image: the paper's method knows no other observation.
+Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
+                               const FitOptions& options, const OnProgress& progress = {});
+
+/// Its error function (m^2, mean over points) at given parameters: for grid searches.
+class PaperError {
+ public:
+  PaperError(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options);
+  ~PaperError();
+  /// Infinity where a sample has no equilibrium.
+  double operator()(double young_modulus_pa, double poisson_ratio);
+  double start_young_modulus_pa() const;
+  std::size_t samples() const;
+  std::size_t points() const;
+  int solves() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::estimation

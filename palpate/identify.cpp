@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/identify.hpp"
+
+#include <algorithm>
+
+#include "palpate/core/error.hpp"
+#include "palpate/core/version.hpp"
+#include "palpate/estimation/paper_method.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/sensing/back_projection.hpp"
+#include "palpate/sensing/plane_mask.hpp"
+
+namespace palpate {
+namespace {
+
+/// Corners of quadratic tetrahedra alone, renumbered only if midpoints stood between them.
+TetMesh to_linear(const TetMesh& mesh) {
+  TetMesh linear{mesh.nodes_m, mesh.tetrahedra.leftCols(4)};
+  if (linear.tetrahedra.maxCoeff() + 1 == linear.nodes_m.rows()) return linear;
+  std::vector<char> used(static_cast<std::size_t>(mesh.nodes_m.rows()), 0);
+  for (Index t = 0; t < linear.tetrahedra.rows(); ++t) {
+    for (int k = 0; k < 4; ++k) used[static_cast<std::size_t>(linear.tetrahedra(t, k))] = 1;
+  }
+  const auto corners = std::count(used.begin(), used.end(), 1);
+  if (!std::all_of(used.begin(), used.begin() + corners, [](char c) { return c == 1; })) {
+    throw Error("corners and midpoints are mixed in the node list, so linear elements would renumber the nodes that supports "
+                "and tools name; use --element tet10, or give the mesh with its corners first",
+                "model.element tet4");
+  }
+  linear.nodes_m = mesh.nodes_m.topRows(corners);
+  return linear;
+}
+
+std::map<std::string, std::string> provenance(const Recording& recording, const IdentifyOptions& options) {
+  std::map<std::string, std::string> said{{"version", version},
+                                          {"recording", recording.name},
+                                          {"method", options.method},
+                                          {"material", recording.model.material},
+                                          {"element", recording.model.element},
+                                          {"threads", std::to_string(options.fit.threads)}};
+  for (const auto& [file, hash] : recording.input_hashes) said["sha256 " + file] = hash;
+  return said;
+}
+
+}  // namespace
+
+Recording with_overrides(Recording recording, const IdentifyOptions& options) {
+  ModelDefaults& model = recording.model;
+  if (options.material) model.material = *options.material;
+  if (options.element) model.element = *options.element;
+  if (options.refine) model.refine = *options.refine;
+  if (options.poisson_range) {
+    model.poisson_lower = options.poisson_range->first;
+    model.poisson_upper = options.poisson_range->second;
+    model.poisson_fixed.reset();
+  }
+  if (options.poisson_fixed) model.poisson_fixed = options.poisson_fixed;
+  const auto demand = [](bool fine, const std::string& where, const std::string& cure) {
+    if (!fine) throw Error(cure, where);
+  };
+  demand(model.element == "tet4" || model.element == "tet10" || model.element == "auto", "model.element " + model.element,
+         "the elements are tet4, tet10 and auto");
+  demand(model.refine == "none" || model.refine == "auto", "model.refine " + model.refine, "refinement is none or auto");
+  demand(model.poisson_lower >= 0 && model.poisson_upper <= 0.4995 && model.poisson_lower < model.poisson_upper,
+         "poisson_range", "the range must lie within 0 and 0.4995, the lower end first");
+  demand(!model.poisson_fixed || (*model.poisson_fixed > -1 && *model.poisson_fixed <= 0.4995), "poisson_fixed",
+         "must lie above -1 and at most at 0.4995");
+  return recording;
+}
+
+estimation::Inputs observe(const Recording& recording) {
+  estimation::Inputs inputs;
+  for (const auto& push : recording.pushes) {
+    for (const auto& step : push.steps) {
+      auto& terms = inputs.emplace_back();
+      for (const auto& observation : step.observations) {
+        if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
+          const auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
+          terms.push_back(estimation::RayObservation{sensing::back_project(masked), frame->pose_std_m, frame->pose_std_rad,
+                                                     frame->noise.bias_std_m});
+        } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
+          terms.push_back(*cloud);
+        } else if (const auto* markers = std::get_if<Markers>(&observation)) {
+          terms.push_back(*markers);
+        } else if (const auto* travel = std::get_if<ToolTravel>(&observation)) {
+          terms.push_back(*travel);
+        } else if (const auto* wrench = std::get_if<Wrench>(&observation)) {
+          terms.push_back(*wrench);
+        }
+      }
+    }
+  }
+  return inputs;
+}
+
+estimation::SimulatedObject build_simulated_object(Recording& recording) {
+  if (!recording.rest.volume) throw Error("a volume mesh is needed", "rest.volume_mesh");
+  const TetMesh& given = *recording.rest.volume;
+  estimation::SimulatedObject object;
+  object.material = recording.model.material;
+  const bool quadratic = recording.model.element == "tet10" || recording.model.element == "auto";
+  if (!quadratic) {
+    object.mesh = to_linear(given);
+  } else {
+    object.mesh = given.tetrahedra.cols() == 10 ? given : fem::to_quadratic(given);
+  }
+  recording.model.element = quadratic ? "tet10" : "tet4";
+  object.surface = estimation::SimulatedSurface::boundary_of(
+      object.mesh, recording.rest.observed_triangles ? &*recording.rest.observed_triangles : nullptr);
+  return object;
+}
+
+Identified identify(const Recording& given, const IdentifyOptions& options, const OnProgress& progress) {
+  Recording recording = with_overrides(given, options);
+  const estimation::Inputs observed = observe(recording);                          // sec. IV-B: point clouds, robot masked
+  const estimation::SimulatedObject object = build_simulated_object(recording);   // sec. IV-C: tetrahedral model
+  Identified out;
+  out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
+                   ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
+                   : estimation::fit(recording, object, observed, options.fit, progress);
+  out.answer.method = options.method;
+  out.answer.provenance.merge(provenance(recording, options));
+  out.volume = object.mesh;
+  return out;
+}
+
+}  // namespace palpate

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// The door: a recording in, elasticity with intervals and verdicts out. The body of `identify` reads like the paper
+// (Frank et al., IROS 2010, section VI), one stage a line; each stage is public and may be called alone.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "palpate/core/identification.hpp"
+#include "palpate/core/progress.hpp"
+#include "palpate/core/recording.hpp"
+#include "palpate/estimation/fit.hpp"
+
+namespace palpate {
+
+struct IdentifyOptions {
+  std::string method = "palpate";  ///< or "paper": the paper's own algorithm, as a baseline
+  // What is set here overrides the recording's `model`.
+  std::optional<std::string> material, element, refine;
+  std::optional<std::pair<double, double>> poisson_range;
+  std::optional<double> poisson_fixed;
+  estimation::FitOptions fit;
+};
+
+struct Identified {
+  Identification answer;
+  TetMesh volume;  ///< the simulated mesh at rest, for a simulation-ready model
+};
+
+/// @throws Error when no answer can exist: what() names the file or field and the cure.
+Identified identify(const Recording& recording, const IdentifyOptions& options = {}, const OnProgress& progress = {});
+
+/// The recording with the options' overrides in its `model`. @throws Error for an unknown element, refinement or range.
+Recording with_overrides(Recording recording, const IdentifyOptions& options);
+
+/// Stage 1: what the sensors of each step say, in the base frame: depth images become rays, without the pixels that show
+/// planes of the environment or nothing near the object.
+estimation::Inputs observe(const Recording& recording);
+
+/// Stage 2: the object as the solver sees it: volume mesh, element, simulated surface. Says the chosen element in the recording's model.
+estimation::SimulatedObject build_simulated_object(Recording& recording);
+
+}  // namespace palpate
