@@ -91,8 +91,8 @@ std::vector<Index> nested_dissection_order(const QuotientGraph& graph) {
   options[METIS_OPTION_NUMBERING] = 0;
   options[METIS_OPTION_SEED] = 1;
   options[METIS_OPTION_COMPRESS] = 0;  // the quotient graph is compressed already
-  // Halves may differ in size by a factor of 1.4 (METIS: 1.2): smaller separators, 20 to 30 % less work on cubes of 4 k to 98 k
-  // tetrahedra, over several seeds.
+  // Halves may differ in size by a factor of 1.4 (METIS: 1.2): smaller separators, 20 to 30 % less work on cubes of 4 k to
+  // 98 k tetrahedra, over several seeds.
   options[METIS_OPTION_UFACTOR] = 400;
   // METIS draws from the C library's one random generator: one caller at a time keeps the order repeatable.
   static std::mutex one_caller;

@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <barrier>
 #include <cmath>
 #include <limits>
-#include <thread>
 
 namespace palpate::fem {
 namespace {
@@ -32,17 +30,6 @@ template <class T>
 struct FrontFactor<T>::Workspace {
   AlignedArray<T> stack[2];
   AlignedArray<T> strips, panels, diagonal_panels, diagonal_strip;
-};
-
-/// The threads that work on one front together; a team of one is free.
-template <class T>
-struct FrontFactor<T>::Team {
-  int id = 0, count = 1;
-  std::barrier<>* barrier = nullptr;
-  int* pivots_done = nullptr;
-  void meet() const {
-    if (barrier != nullptr) barrier->arrive_and_wait();
-  }
 };
 
 template <class T>
@@ -148,7 +135,8 @@ T* FrontFactor<T>::update_of(Index front, const Workspace& workspace) const {
 }
 
 template <class T>
-bool FrontFactor<T>::process(Index f, const double* values, bool definite, Workspace& workspace, Team& team) {
+bool FrontFactor<T>::process(Index f, const double* values, bool definite, Workspace& workspace, const ThreadTeam& team,
+                             int& pivots_done) {
   const FrontTree::Front& front = tree_->fronts[at(f)];
   const int k = front.pivots, m = front.height, below = front.below();
   T* const panel = values_.data() + front.panel;
@@ -204,11 +192,11 @@ bool FrontFactor<T>::process(Index f, const double* values, bool definite, Works
     const int count = std::min(block, k - j0), depth = round_up(count, panel_rows);
     T* const corner = panel + j0 + static_cast<std::ptrdiff_t>(j0) * m;
     if (team.id == 0) {
-      *team.pivots_done = kernels_.factor_diagonal(corner, m, count, depth, definite, floor + j0, inverse_pivots + j0,
-                                                   workspace.diagonal_panels.data(), workspace.diagonal_strip.data());
+      pivots_done = kernels_.factor_diagonal(corner, m, count, depth, definite, floor + j0, inverse_pivots + j0,
+                                             workspace.diagonal_panels.data(), workspace.diagonal_strip.data());
     }
     team.meet();
-    if (*team.pivots_done < count) return false;
+    if (pivots_done < count) return false;
 
     // Rows below the block: pivots still to come, then the rows of the update; each part starts a strip of its own.
     const int pivots_left = k - j0 - count;
@@ -260,34 +248,26 @@ template <class T>
 bool FrontFactor<T>::factorise(const double* values, bool definite) {
   std::atomic<std::size_t> next_task{0};
   std::atomic<bool> refused{false};
-  std::barrier<> barrier(threads_);
-  int pivots_done = 0;
-  const auto work = [&](int thread) {
-    int own_pivots = 0;
-    Team alone{0, 1, nullptr, &own_pivots};
-    Workspace& workspace = *workspaces_[static_cast<std::size_t>(thread)];
+  int pivots_of_top = 0;
+  run_team(threads_, [&](const ThreadTeam& team) {
+    int pivots_of_task = 0;
+    Workspace& workspace = *workspaces_[static_cast<std::size_t>(team.id)];
     while (!refused) {
       const std::size_t task = next_task++;
       if (task >= tasks_.size()) break;
-      for (Index f = tasks_[task].first; f <= tasks_[task].root; ++f) {
-        if (!process(f, values, definite, workspace, alone)) refused = true;
-        if (refused) break;
+      for (Index f = tasks_[task].first; f <= tasks_[task].root && !refused; ++f) {
+        if (!process(f, values, definite, workspace, ThreadTeam{}, pivots_of_task)) refused = true;
       }
     }
-    Team all{thread, threads_, threads_ > 1 ? &barrier : nullptr, &pivots_done};
-    all.meet();
+    team.meet();
     if (refused) return;
     for (const Index f : top_) {
-      if (!process(f, values, definite, *workspaces_[0], all)) {
+      if (!process(f, values, definite, *workspaces_[0], team, pivots_of_top)) {
         refused = true;  // every member sees the same pivot refused
         return;
       }
     }
-  };
-  std::vector<std::thread> helpers;
-  for (int thread = 1; thread < threads_; ++thread) helpers.emplace_back(work, thread);
-  work(0);
-  for (std::thread& helper : helpers) helper.join();
+  });
   if (refused) return false;
   negative_ = static_cast<int>(
       std::count_if(inverse_pivots_.data(), inverse_pivots_.data() + tree_->size, [](T pivot) { return pivot < 0; }));
@@ -295,57 +275,64 @@ bool FrontFactor<T>::factorise(const double* values, bool definite) {
 }
 
 template <class T>
-void FrontFactor<T>::solve(double* columns, Eigen::Index count, Eigen::Index stride) const {
+void FrontFactor<T>::sweep(double* columns, Eigen::Index stride, int used, int width, T* x, T* work) const {
   const auto& fronts = tree_->fronts;
-  Index tallest = 0;
-  for (const auto& front : fronts) tallest = std::max(tallest, front.height);
-  const int widest = count > 1 ? kernels_.solve_width : 1;
-  const AlignedArray<T> x_memory(at(tree_->size) * at(widest)), work_memory(at(tallest) * at(widest));
-  T* const x = x_memory.data();
-  T* const work = work_memory.data();
-  const auto sweep = [&](Eigen::Index first, int used, int width) {
-    const auto forward = width == 1 ? kernels_.forward_one : kernels_.forward_many;
-    const auto backward = width == 1 ? kernels_.backward_one : kernels_.backward_many;
-    const std::size_t row_bytes = at(width);
-    for (Index i = 0; i < tree_->size; ++i) {
-      T* const row = x + at(tree_->position[at(i)]) * row_bytes;
-      for (int c = 0; c < used; ++c) row[c] = static_cast<T>(columns[(first + c) * stride + i]);
-      for (int c = used; c < width; ++c) row[c] = 0;
-    }
-    for (const auto& front : fronts) {
-      T* const own = x + at(front.first) * row_bytes;
-      const std::size_t k = at(front.pivots) * row_bytes;
-      const Index* const rows = tree_->rows.data() + front.rows;
-      std::copy_n(own, k, work);
-      std::fill_n(work + k, at(front.below()) * row_bytes, T(0));
-      forward(values_.data() + front.panel, front.pivots, front.height, work);
-      std::copy_n(work, k, own);
-      for (Index i = 0; i < front.below(); ++i) {
-        T* const to = x + at(rows[i]) * row_bytes;
-        const T* const from = work + k + at(i) * row_bytes;
-        for (int c = 0; c < width; ++c) to[c] += from[c];
-      }
-    }
-    for (auto front = fronts.rbegin(); front != fronts.rend(); ++front) {
-      T* const own = x + at(front->first) * row_bytes;
-      const std::size_t k = at(front->pivots) * row_bytes;
-      const Index* const rows = tree_->rows.data() + front->rows;
-      std::copy_n(own, k, work);
-      for (Index i = 0; i < front->below(); ++i)
-        std::copy_n(x + at(rows[i]) * row_bytes, row_bytes, work + k + at(i) * row_bytes);
-      backward(values_.data() + front->panel, front->pivots, front->height, inverse_pivots_.data() + front->first, work);
-      std::copy_n(work, k, own);
-    }
-    for (Index i = 0; i < tree_->size; ++i) {
-      const T* const row = x + at(tree_->position[at(i)]) * row_bytes;
-      for (int c = 0; c < used; ++c) columns[(first + c) * stride + i] = row[c];
-    }
-  };
-  for (Eigen::Index first = 0; first < count;) {
-    const int used = static_cast<int>(std::min<Eigen::Index>(widest, count - first));
-    sweep(first, used, used == 1 ? 1 : widest);
-    first += used;
+  const auto forward = width == 1 ? kernels_.forward_one : kernels_.forward_many;
+  const auto backward = width == 1 ? kernels_.backward_one : kernels_.backward_many;
+  const std::size_t row_size = at(width);
+  for (Index i = 0; i < tree_->size; ++i) {
+    T* const row = x + at(tree_->position[at(i)]) * row_size;
+    for (int c = 0; c < used; ++c) row[c] = static_cast<T>(columns[c * stride + i]);
+    for (int c = used; c < width; ++c) row[c] = 0;
   }
+  for (const auto& front : fronts) {
+    T* const own = x + at(front.first) * row_size;
+    const std::size_t k = at(front.pivots) * row_size;
+    const Index* const rows = tree_->rows.data() + front.rows;
+    std::copy_n(own, k, work);
+    std::fill_n(work + k, at(front.below()) * row_size, T(0));
+    forward(values_.data() + front.panel, front.pivots, front.height, work);
+    std::copy_n(work, k, own);
+    for (Index i = 0; i < front.below(); ++i) {
+      T* const to = x + at(rows[i]) * row_size;
+      const T* const from = work + k + at(i) * row_size;
+      for (int c = 0; c < width; ++c) to[c] += from[c];
+    }
+  }
+  for (auto front = fronts.rbegin(); front != fronts.rend(); ++front) {
+    T* const own = x + at(front->first) * row_size;
+    const std::size_t k = at(front->pivots) * row_size;
+    const Index* const rows = tree_->rows.data() + front->rows;
+    std::copy_n(own, k, work);
+    for (Index i = 0; i < front->below(); ++i)
+      std::copy_n(x + at(rows[i]) * row_size, row_size, work + k + at(i) * row_size);
+    backward(values_.data() + front->panel, front->pivots, front->height, inverse_pivots_.data() + front->first, work);
+    std::copy_n(work, k, own);
+  }
+  for (Index i = 0; i < tree_->size; ++i) {
+    const T* const row = x + at(tree_->position[at(i)]) * row_size;
+    for (int c = 0; c < used; ++c) columns[c * stride + i] = static_cast<double>(row[c]);
+  }
+}
+
+template <class T>
+void FrontFactor<T>::solve(double* columns, Eigen::Index count, Eigen::Index stride) const {
+  // Two alone are cheaper than a bundle: a bundle takes about three times as long as one.
+  const Eigen::Index width = count > 2 ? kernels_.solve_width : 1;
+  const Eigen::Index bundles = (count + width - 1) / width;
+  const double flops = 4.0 * static_cast<double>(tree_->panel_values) * static_cast<double>(count);
+  const int threads = flops < kFlopsWorthThreads ? 1 : static_cast<int>(std::min<Eigen::Index>(threads_, bundles));
+  Index tallest = 0;
+  for (const auto& front : tree_->fronts) tallest = std::max(tallest, front.height);
+  run_team(threads, [&](const ThreadTeam& team) {
+    const AlignedArray<T> x(at(tree_->size) * static_cast<std::size_t>(width)),
+        work(at(tallest) * static_cast<std::size_t>(width));
+    for (Eigen::Index bundle = team.id; bundle < bundles; bundle += team.count) {
+      const Eigen::Index first = bundle * width;
+      sweep(columns + first * stride, stride, static_cast<int>(std::min(width, count - first)), static_cast<int>(width),
+            x.data(), work.data());
+    }
+  });
 }
 
 template <class T>

@@ -10,6 +10,7 @@
 #include "palpate/core/math.hpp"
 #include "palpate/fem/linear_solver/dense_kernels.hpp"
 #include "palpate/fem/linear_solver/front_tree.hpp"
+#include "palpate/fem/linear_solver/thread_team.hpp"
 
 namespace palpate::fem {
 
@@ -42,7 +43,7 @@ class FrontFactor {
   /// @return false: a pivot was refused (indefinite: it was zero or not finite); there is no factor then
   bool factorise(const double* values, bool definite);
 
-  /// In place; column c starts at columns + c * stride.
+  /// In place; column c starts at columns + c * stride. Many columns are shared among the threads.
   void solve(double* columns, Eigen::Index count, Eigen::Index stride) const;
 
   int negative_pivots() const { return negative_; }
@@ -58,9 +59,10 @@ class FrontFactor {
     Index first, root;
   };
   struct Workspace;
-  struct Team;
   void plan(int threads);
-  bool process(Index front, const double* values, bool definite, Workspace& workspace, Team& team);
+  bool process(Index front, const double* values, bool definite, Workspace& workspace, const ThreadTeam& team,
+               int& pivots_done);
+  void sweep(double* columns, Eigen::Index stride, int used, int width, T* x, T* work) const;
   T* update_of(Index front, const Workspace& workspace) const;
 
   std::shared_ptr<const FrontTree> tree_;

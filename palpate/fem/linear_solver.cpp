@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/linear_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/linear_solver/conjugate_gradients.hpp"
+#include "palpate/fem/linear_solver/front_factor.hpp"
+
+namespace palpate::fem {
+namespace {
+
+// Nominal costs in seconds, measured on one 3.6 GHz AVX2/AVX-512 core. Only their proportions matter, and only for choosing.
+constexpr double kDoubleFlops = 40e9, kFloatFlops = 76e9;  // of a factorisation
+constexpr double kSweepBytes = 15e9;                       // of L, both directions of a solve read it
+constexpr double kIterationPerBlock = 5e-9;                // one step of conjugate gradients, per 3 x 3 block
+constexpr double kSetUpPerBlock = 7e-8;                    // values, diagonal inverses and coarse matrix
+constexpr double kAnalysisPerUnknown = 7e-7;               // ordering, a quarter of it: it serves a whole fit
+constexpr int kMixedIterations = 4;                        // single precision factor, up to Poisson ratios of 0.49
+constexpr Eigen::Index kAnalyseAtOnceBelow = 12000;        // unknowns: the exact flops are worth the ordering
+
+// Volume meshes of 900 to 600 000 unknowns under nested dissection; thin bodies need less.
+double guessed_flops(double n) { return 7.0 * n * n; }
+double guessed_panel_values(double n) { return 7.6 * std::pow(n, 1.36); }
+double guessed_iterations(double n, bool rigid_motions) { return rigid_motions ? 70.0 : 5.5 * std::cbrt(n); }
+
+}  // namespace
+
+const char* name_of(LinearMethod method) {
+  switch (method) {
+    case LinearMethod::automatic:
+      return "automatic";
+    case LinearMethod::direct:
+      return "direct";
+    case LinearMethod::mixed:
+      return "mixed";
+    case LinearMethod::iterative:
+      return "iterative";
+  }
+  return "unknown";
+}
+
+struct LinearSolver::Impl {
+  Options options;
+  Eigen::SparseMatrix<double> lower;  // the present matrix
+  UnknownPlacement placement;
+  bool has_values = false;
+
+  // Of the pattern, made when first needed.
+  std::shared_ptr<const FrontTree> tree;
+  std::unique_ptr<QuotientGraph> graph;
+  Aggregates aggregates;
+  std::unique_ptr<BlockMatrix> blocks;
+  std::unique_ptr<RigidMotionPreconditioner> rigid;
+  std::unique_ptr<FrontFactor<double>> factor;
+  std::unique_ptr<FrontFactor<float>> small_factor;
+
+  // Of the present matrix.
+  enum class State { stale, ready, refused };
+  State factor_state = State::stale, small_state = State::stale, rigid_state = State::stale;
+  bool blocks_current = false;
+
+  double known_iterations = 0;  // of the last iterative solve, 0: none yet
+
+  void need_tree() {
+    if (!tree) tree = std::make_shared<const FrontTree>(build_front_tree(lower, options.block));
+  }
+  void need_blocks() {
+    if (!blocks) {
+      graph = std::make_unique<QuotientGraph>(quotient_graph(lower, std::min(options.block, 3)));
+      // Larger aggregates on larger meshes keep the coarse solve below the product with the matrix.
+      aggregates = aggregate(*graph, placement, graph->group_count() < 40000 ? 64 : 128);
+      blocks = std::make_unique<BlockMatrix>(lower, *graph, aggregates.order);
+    }
+    if (!blocks_current) blocks->set_values(lower.valuePtr());
+    blocks_current = true;
+  }
+  bool need_rigid() {
+    need_blocks();
+    if (!rigid) rigid = std::make_unique<RigidMotionPreconditioner>(*blocks, aggregates, placement);
+    if (rigid_state == State::stale) rigid_state = rigid->update() ? State::ready : State::refused;
+    return rigid_state == State::ready;
+  }
+  bool need_factor() {
+    need_tree();
+    if (!factor) factor = std::make_unique<FrontFactor<double>>(tree, options.threads);
+    if (factor_state == State::stale) {
+      factor_state = factor->factorise(lower.valuePtr(), !options.indefinite) ? State::ready : State::refused;
+    }
+    return factor_state == State::ready;
+  }
+  bool need_small_factor() {
+    need_tree();
+    need_blocks();
+    if (!small_factor) small_factor = std::make_unique<FrontFactor<float>>(tree, options.threads);
+    if (small_state == State::stale) {
+      small_state = small_factor->factorise(lower.valuePtr(), true) ? State::ready : State::refused;
+    }
+    return small_state == State::ready;
+  }
+
+  double unknowns() const { return static_cast<double>(lower.cols()); }
+  double flops() const { return tree ? tree->flops : guessed_flops(unknowns()); }
+  double panel_values() const { return tree ? static_cast<double>(tree->panel_values) : guessed_panel_values(unknowns()); }
+  double block_count() const {
+    return blocks ? static_cast<double>(blocks->block_count()) : 2.0 * static_cast<double>(lower.nonZeros()) / 9.0;
+  }
+  bool fits(double bytes_a_value) const { return 1.5 * panel_values() * bytes_a_value <= options.memory_limit_bytes; }
+
+  double direct_cost(double count) const {
+    if (factor_state == State::refused || !fits(8)) return std::numeric_limits<double>::infinity();
+    const double sweeps = count <= 2 ? count : 3.0 * std::ceil(count / 16.0);
+    const double factorisation =
+        factor_state == State::ready ? 0 : flops() / kDoubleFlops + (tree ? 0 : unknowns() * kAnalysisPerUnknown);
+    return factorisation + sweeps * 16.0 * panel_values() / kSweepBytes;
+  }
+  double mixed_cost(double count) const {
+    if (small_state == State::refused || !fits(4)) return std::numeric_limits<double>::infinity();
+    const double factorisation =
+        small_state == State::ready ? 0 : flops() / kFloatFlops + (tree ? 0 : unknowns() * kAnalysisPerUnknown);
+    return factorisation +
+           count * kMixedIterations * (8.0 * panel_values() / kSweepBytes + kIterationPerBlock * block_count());
+  }
+  double expected_iterations() const {
+    return known_iterations > 0 ? known_iterations : guessed_iterations(unknowns(), !placement.empty());
+  }
+  double iterative_cost(double count) const {
+    if (rigid_state == State::refused) return std::numeric_limits<double>::infinity();
+    return (rigid_state == State::ready ? 0 : kSetUpPerBlock * block_count()) +
+           count * expected_iterations() * kIterationPerBlock * block_count();
+  }
+
+  LinearMethod choose(double count) {
+    if (options.indefinite) return LinearMethod::direct;
+    if (options.method != LinearMethod::automatic) return options.method;
+    if (lower.cols() < kAnalyseAtOnceBelow) need_tree();
+    const double direct = direct_cost(count), mixed = mixed_cost(count), iterative = iterative_cost(count);
+    if (direct <= std::min(mixed, iterative)) return LinearMethod::direct;
+    return mixed < iterative ? LinearMethod::mixed : LinearMethod::iterative;
+  }
+
+  Outcome refuse(LinearMethod method) const {
+    Outcome outcome;
+    outcome.used = method;
+    outcome.not_positive_definite = !options.indefinite;
+    outcome.reason = options.indefinite ? "the matrix is singular: a pivot is zero" : "the matrix is not positive definite";
+    return outcome;
+  }
+
+  Outcome solve_direct(Eigen::Ref<MatrixX> x) {
+    Outcome outcome;
+    outcome.used = LinearMethod::direct;
+    if (!need_factor()) return refuse(LinearMethod::direct);
+    if (!options.indefinite) {
+      factor->solve(x.data(), x.cols(), x.outerStride());
+      outcome.solved = true;
+      return outcome;
+    }
+    // Without pivoting the factor may lose digits; refinement brings them back, and says when it cannot.
+    const MatrixX b = x;
+    factor->solve(x.data(), x.cols(), x.outerStride());
+    for (int step = 0;; ++step) {
+      MatrixX correction = b - lower.selfadjointView<Eigen::Lower>() * x;
+      outcome.residual = 0;
+      for (Eigen::Index c = 0; c < b.cols(); ++c) {
+        const double norm = b.col(c).norm();
+        if (norm > 0) outcome.residual = std::max(outcome.residual, correction.col(c).norm() / norm);
+        if (!correction.col(c).allFinite()) outcome.residual = std::numeric_limits<double>::infinity();
+      }
+      if (outcome.residual <= options.tolerance || step == 3) break;
+      factor->solve(correction.data(), correction.cols(), correction.outerStride());
+      x += correction;
+    }
+    outcome.solved = outcome.residual <= options.tolerance;
+    if (!outcome.solved) outcome.reason = "the matrix is nearly singular: the residual stays above the tolerance";
+    return outcome;
+  }
+
+  /// Conjugate gradients on every column; stops at the first that fails.
+  Outcome solve_by_steps(LinearMethod method, Preconditioner& preconditioner, Eigen::Ref<MatrixX> x, const MatrixX* start,
+                         int max_iterations, Eigen::Index& done) {
+    Outcome outcome;
+    outcome.used = method;
+    const std::vector<Index>& padded = blocks->padded();
+    VectorX b = VectorX::Zero(blocks->padded_size()), solution(blocks->padded_size());
+    // Threads pay from about 10 000 blocks a thread on.
+    const int threads = blocks->block_count() > 20000 ? options.threads : 1;
+    for (; done < x.cols(); ++done) {
+      solution.setZero();
+      for (Eigen::Index u = 0; u < x.rows(); ++u) b[padded[static_cast<std::size_t>(u)]] = x(u, done);
+      if (start != nullptr) {
+        for (Eigen::Index u = 0; u < x.rows(); ++u) solution[padded[static_cast<std::size_t>(u)]] = (*start)(u, done);
+      }
+      const ConjugateGradientsResult result =
+          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, options.tolerance, max_iterations, threads);
+      outcome.iterations = std::max(outcome.iterations, result.iterations);
+      outcome.residual = std::max(outcome.residual, result.residual);
+      if (!result.converged) {
+        outcome.not_positive_definite = result.negative_curvature;
+        outcome.reason = result.negative_curvature ? "the matrix is not positive definite"
+                                                   : "conjugate gradients did not reach the tolerance in " +
+                                                         std::to_string(result.iterations) + " steps";
+        return outcome;
+      }
+      for (Eigen::Index u = 0; u < x.rows(); ++u) x(u, done) = solution[padded[static_cast<std::size_t>(u)]];
+    }
+    outcome.solved = true;
+    return outcome;
+  }
+
+  Outcome solve_mixed(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
+    if (!need_small_factor()) return refuse(LinearMethod::mixed);
+    FactorPreconditioner preconditioner(*small_factor, blocks->padded());
+    return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, std::min(options.max_iterations, 100), done);
+  }
+
+  Outcome solve_iterative(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
+    if (!need_rigid()) return refuse(LinearMethod::iterative);
+    // Automatic: no longer than the factor would take, or half as long again as expected; then the factor takes over.
+    int max_iterations = options.max_iterations;
+    if (options.method == LinearMethod::automatic && fits(4)) {
+      const double as_long_as_factor = mixed_cost(1) / (kIterationPerBlock * block_count());
+      max_iterations =
+          static_cast<int>(std::min<double>(max_iterations, std::max(as_long_as_factor, 1.5 * expected_iterations())));
+    }
+    const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, max_iterations, done);
+    known_iterations = outcome.iterations;
+    return outcome;
+  }
+};
+
+LinearSolver::LinearSolver() : LinearSolver(Options{}) {}
+LinearSolver::LinearSolver(Options options) : impl_(std::make_unique<Impl>()) {
+  if (options.block < 1) throw Error("must be at least 1", "LinearSolver::Options::block");
+  if (options.threads < 1) throw Error("must be at least 1", "LinearSolver::Options::threads");
+  if (!(options.tolerance > 0)) throw Error("must be positive", "LinearSolver::Options::tolerance");
+  impl_->options = options;
+}
+LinearSolver::~LinearSolver() = default;
+LinearSolver::LinearSolver(LinearSolver&&) noexcept = default;
+LinearSolver& LinearSolver::operator=(LinearSolver&&) noexcept = default;
+
+void LinearSolver::analyse(const Eigen::SparseMatrix<double>& lower, UnknownPlacement placement) {
+  if (lower.rows() != lower.cols() || !lower.isCompressed()) {
+    throw Error("the matrix must be square and compressed", "LinearSolver::analyse");
+  }
+  if (!placement.empty() && (placement.point_m.rows() != lower.cols() || placement.direction.rows() != lower.cols())) {
+    throw Error("needs one point and one direction for each of the " + std::to_string(lower.cols()) + " unknowns",
+                "LinearSolver::analyse placement");
+  }
+  const Options options = impl_->options;
+  impl_ = std::make_unique<Impl>();
+  impl_->options = options;
+  impl_->lower = lower;
+  impl_->placement = std::move(placement);
+}
+
+void LinearSolver::set_matrix(const Eigen::SparseMatrix<double>& lower) {
+  Impl& impl = *impl_;
+  if (lower.cols() == 0 || lower.cols() != impl.lower.cols() || lower.nonZeros() != impl.lower.nonZeros()) {
+    throw Error("call analyse() with this matrix's pattern first", "LinearSolver::set_matrix");
+  }
+  std::copy_n(lower.valuePtr(), lower.nonZeros(), impl.lower.valuePtr());
+  impl.has_values = true;
+  impl.blocks_current = false;
+  impl.factor_state = impl.small_state = impl.rigid_state = Impl::State::stale;
+}
+
+LinearSolver::Outcome LinearSolver::solve_in_place(Eigen::Ref<MatrixX> right_hand_sides, const MatrixX* start) {
+  Impl& impl = *impl_;
+  if (!impl.has_values) throw Error("call set_matrix() first", "LinearSolver::solve_in_place");
+  if (right_hand_sides.rows() != impl.lower.cols()) {
+    throw Error("right-hand sides have " + std::to_string(right_hand_sides.rows()) + " rows, the matrix has " +
+                    std::to_string(impl.lower.cols()),
+                "LinearSolver::solve_in_place");
+  }
+  if (start != nullptr && (start->rows() != right_hand_sides.rows() || start->cols() != right_hand_sides.cols())) {
+    throw Error("starting points must have the shape of the right-hand sides", "LinearSolver::solve_in_place start");
+  }
+  const LinearMethod method = impl.choose(static_cast<double>(right_hand_sides.cols()));
+  const bool automatic = impl.options.method == LinearMethod::automatic;
+  Eigen::Index done = 0;
+  Outcome outcome;
+  if (method == LinearMethod::iterative) {
+    outcome = impl.solve_iterative(right_hand_sides, start, done);
+    if (outcome.solved || outcome.not_positive_definite || !automatic) return outcome;
+  }
+  if (method == LinearMethod::mixed || (method == LinearMethod::iterative && impl.fits(4))) {
+    const int before = outcome.iterations;
+    outcome = impl.solve_mixed(right_hand_sides, start, done);
+    outcome.iterations += before;
+    if (outcome.solved || !automatic) return outcome;
+  }
+  // Single precision may refuse a matrix that is definite in double precision.
+  if (method == LinearMethod::direct || impl.fits(8)) {
+    outcome = impl.solve_direct(right_hand_sides.rightCols(right_hand_sides.cols() - done));
+  }
+  return outcome;
+}
+
+int LinearSolver::negative_pivots() const {
+  return impl_->factor_state == Impl::State::ready ? impl_->factor->negative_pivots() : 0;
+}
+
+}  // namespace palpate::fem

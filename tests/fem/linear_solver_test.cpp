@@ -1,0 +1,251 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/linear_solver.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <ostream>
+
+#include "benchmarks/cube.hpp"
+#include "fem/lattice.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::fem {
+namespace {
+
+using test::dense_of;
+using test::lattice_matrix;
+using test::random_matrix;
+
+/// The pressed cube of the benchmarks: stiffness, load, and where its unknowns act.
+struct Cube {
+  Cube(int n, double poisson_ratio) {
+    const TetMesh mesh = benchmark_cube::mesh(n);
+    lower = benchmark_cube::stiffness(mesh, n, poisson_ratio);
+    load = benchmark_cube::disc_load(mesh, n);
+    placement.point_m.resize(lower.cols(), 3);
+    placement.direction = Points::Zero(lower.cols(), 3);
+    for (Eigen::Index u = 0; u < lower.cols(); ++u) {
+      placement.point_m.row(u) = mesh.nodes_m.row(u / 3 + (n + 1) * (n + 1));
+      placement.direction(u, u % 3) = 1;
+    }
+  }
+  double residual(const MatrixX& x) const { return (lower.selfadjointView<Eigen::Lower>() * x - load).norm() / load.norm(); }
+  Eigen::SparseMatrix<double> lower;
+  MatrixX load;
+  UnknownPlacement placement;
+};
+
+class EveryMethod : public testing::TestWithParam<LinearMethod> {};
+
+TEST_P(EveryMethod, AgreesWithTheDenseSolution) {
+  for (const int edge : {1, 2, 5, 7}) {
+    const auto lower = lattice_matrix(edge, edge, edge);
+    LinearSolver solver({.method = GetParam(), .tolerance = 1e-12});
+    solver.analyse(lower);
+    solver.set_matrix(lower);
+    const MatrixX b = random_matrix(lower.rows(), 3, 4);
+    MatrixX x = b;
+    const auto outcome = solver.solve_in_place(x);
+    ASSERT_TRUE(outcome.solved) << outcome.reason;
+    const MatrixX expected = dense_of(lower).llt().solve(b);
+    EXPECT_LT((x - expected).norm(), 1e-9 * expected.norm()) << edge;
+    EXPECT_TRUE(GetParam() == LinearMethod::automatic || outcome.used == GetParam());
+  }
+}
+
+TEST_P(EveryMethod, NodesMayHaveLostUnknownsToSupports) {
+  const auto lower = lattice_matrix(6, 5, 5, 0.0, 1, {0, 1, 2, 4, 9, 10, 77, 200, 201, 371});
+  LinearSolver solver({.method = GetParam(), .tolerance = 1e-12});
+  solver.analyse(lower);
+  solver.set_matrix(lower);
+  const MatrixX b = random_matrix(lower.rows(), 2, 4);
+  MatrixX x = b;
+  ASSERT_TRUE(solver.solve_in_place(x).solved);
+  EXPECT_LT((lower.selfadjointView<Eigen::Lower>() * x - b).norm(), 1e-11 * b.norm());
+}
+
+TEST_P(EveryMethod, SurvivesNearIncompressibility) {
+  for (const double poisson_ratio : {0.3, 0.49, 0.499}) {
+    const Cube cube(8, poisson_ratio);
+    LinearSolver solver({.method = GetParam()});
+    solver.analyse(cube.lower, cube.placement);
+    solver.set_matrix(cube.lower);
+    MatrixX x = cube.load;
+    const auto outcome = solver.solve_in_place(x);
+    ASSERT_TRUE(outcome.solved) << outcome.reason;
+    EXPECT_LT(cube.residual(x), 1e-9);
+    EXPECT_TRUE(outcome.used != LinearMethod::mixed || outcome.iterations <= 8) << outcome.iterations;
+  }
+}
+
+TEST_P(EveryMethod, OneAnalysisServesManyMatricesAndSolves) {
+  LinearSolver solver({.method = GetParam()});
+  solver.analyse(lattice_matrix(6, 6, 6));
+  for (unsigned seed = 1; seed < 4; ++seed) {
+    const auto lower = lattice_matrix(6, 6, 6, 0.1 * seed, seed);
+    solver.set_matrix(lower);
+    for (const int count : {1, 5}) {
+      const MatrixX b = random_matrix(lower.rows(), count, seed);
+      MatrixX x = b;
+      ASSERT_TRUE(solver.solve_in_place(x).solved);
+      EXPECT_LT((lower.selfadjointView<Eigen::Lower>() * x - b).norm(), 1e-9 * b.norm());
+    }
+  }
+}
+
+TEST_P(EveryMethod, SaysThatAMatrixIsNotPositiveDefinite) {
+  const auto lower = lattice_matrix(7, 7, 7, -1.5);
+  LinearSolver solver({.method = GetParam()});
+  solver.analyse(lower);
+  solver.set_matrix(lower);
+  MatrixX x = random_matrix(lower.rows(), 1, 4);
+  const auto outcome = solver.solve_in_place(x);
+  EXPECT_FALSE(outcome.solved);
+  EXPECT_TRUE(outcome.not_positive_definite) << outcome.reason;
+  EXPECT_FALSE(outcome.reason.empty());
+}
+
+TEST_P(EveryMethod, ThreadsDoNotChangeABit) {
+  const Cube cube(13, 0.3);
+  MatrixX alone;
+  for (const int threads : {1, 2, 3}) {
+    LinearSolver solver({.method = GetParam(), .threads = threads});
+    solver.analyse(cube.lower, cube.placement);
+    solver.set_matrix(cube.lower);
+    MatrixX x = cube.load;
+    ASSERT_TRUE(solver.solve_in_place(x).solved);
+    if (threads == 1) alone = x;
+    EXPECT_EQ(x, alone) << threads;
+  }
+}
+
+TEST_P(EveryMethod, ZeroLoadGivesZero) {
+  const auto lower = lattice_matrix(4, 4, 4);
+  LinearSolver solver({.method = GetParam()});
+  solver.analyse(lower);
+  solver.set_matrix(lower);
+  MatrixX x = MatrixX::Zero(lower.rows(), 2);
+  EXPECT_TRUE(solver.solve_in_place(x).solved);
+  EXPECT_EQ(x, MatrixX::Zero(lower.rows(), 2));
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, EveryMethod,
+                         testing::Values(LinearMethod::automatic, LinearMethod::direct, LinearMethod::mixed,
+                                         LinearMethod::iterative),
+                         [](const auto& method) { return std::string(name_of(method.param)); });
+
+TEST(LinearSolver, StepsDoNotGrowWithRefinement) {
+  int steps[2] = {0, 0}, without = 0;
+  for (const int i : {0, 1}) {
+    const Cube cube(i == 0 ? 8 : 16, 0.3);
+    LinearSolver solver({.method = LinearMethod::iterative});
+    solver.analyse(cube.lower, cube.placement);
+    solver.set_matrix(cube.lower);
+    MatrixX x = cube.load;
+    steps[i] = solver.solve_in_place(x).iterations;
+    LinearSolver plain({.method = LinearMethod::iterative});
+    plain.analyse(cube.lower);
+    plain.set_matrix(cube.lower);
+    x = cube.load;
+    without = plain.solve_in_place(x).iterations;
+  }
+  EXPECT_LT(steps[1], 1.3 * steps[0]);
+  EXPECT_LT(2 * steps[1], without);
+}
+
+TEST(LinearSolver, AggregatesMayLieOnALine) {
+  const Cube cube(3, 0.3);
+  UnknownPlacement line = cube.placement;
+  line.point_m.col(0).setZero();
+  line.point_m.col(1).setZero();  // rotations about the line do nothing: the coarse matrix is singular without care
+  LinearSolver solver({.method = LinearMethod::iterative});
+  solver.analyse(cube.lower, line);
+  solver.set_matrix(cube.lower);
+  MatrixX x = cube.load;
+  const auto outcome = solver.solve_in_place(x);
+  EXPECT_TRUE(outcome.solved) << outcome.reason;
+  EXPECT_LT(cube.residual(x), 1e-9);
+}
+
+TEST(LinearSolver, AGoodStartSavesSteps) {
+  const Cube cube(8, 0.3);
+  LinearSolver solver({.method = LinearMethod::iterative});
+  solver.analyse(cube.lower, cube.placement);
+  solver.set_matrix(cube.lower);
+  MatrixX x = cube.load;
+  const auto first = solver.solve_in_place(x);
+  const MatrixX start = 1.001 * x;
+  MatrixX y = cube.load;
+  const auto second = solver.solve_in_place(y, &start);
+  EXPECT_LT(second.iterations, first.iterations);
+  EXPECT_LT((x - y).norm(), 1e-7 * x.norm());
+}
+
+TEST(LinearSolver, AutomaticTakesTheFactorForSmallSystemsAndManyLoads) {
+  const Cube small(6, 0.3), large(16, 0.3);
+  LinearSolver solver;
+  solver.analyse(small.lower, small.placement);
+  solver.set_matrix(small.lower);
+  MatrixX x = small.load;
+  EXPECT_EQ(solver.solve_in_place(x).used, LinearMethod::direct);
+  LinearSolver other;
+  other.analyse(large.lower, large.placement);
+  other.set_matrix(large.lower);
+  x = large.load;
+  EXPECT_EQ(other.solve_in_place(x).used, LinearMethod::iterative);
+  EXPECT_LT(large.residual(x), 1e-9);
+  x = large.load.replicate(1, 40);
+  EXPECT_NE(other.solve_in_place(x).used, LinearMethod::iterative);
+  EXPECT_LT(large.residual(x.col(39)), 1e-9);
+}
+
+TEST(LinearSolver, AutomaticFallsBackOnTheFactor) {
+  // Nearly incompressible and without placement: the steps run out and the factor takes over.
+  const Cube cube(16, 0.4995);
+  LinearSolver solver;
+  solver.analyse(cube.lower);
+  solver.set_matrix(cube.lower);
+  MatrixX x = cube.load;
+  const auto outcome = solver.solve_in_place(x);
+  EXPECT_TRUE(outcome.solved) << outcome.reason;
+  EXPECT_NE(outcome.used, LinearMethod::iterative);
+  EXPECT_LT(cube.residual(x), 1e-9);
+}
+
+TEST(LinearSolver, IndefiniteMatricesAreSolvedAndCounted) {
+  const auto lower = lattice_matrix(7, 7, 7, -1.5);
+  LinearSolver solver({.indefinite = true, .tolerance = 1e-11});
+  solver.analyse(lower);
+  solver.set_matrix(lower);
+  const MatrixX b = random_matrix(lower.rows(), 2, 4);
+  MatrixX x = b;
+  const auto outcome = solver.solve_in_place(x);
+  ASSERT_TRUE(outcome.solved) << outcome.reason;
+  EXPECT_LE(outcome.residual, 1e-11);
+  EXPECT_GT(solver.negative_pivots(), 0);
+}
+
+TEST(LinearSolver, SaysWhatIsWrong) {
+  LinearSolver solver;
+  const auto lower = lattice_matrix(3, 3, 3);
+  MatrixX x = random_matrix(lower.rows(), 1, 1);
+  EXPECT_THROW(solver.set_matrix(lower), Error);
+  solver.analyse(lower);
+  EXPECT_THROW(solver.solve_in_place(x), Error);
+  EXPECT_THROW(solver.set_matrix(lattice_matrix(4, 3, 3)), Error);
+  solver.set_matrix(lower);
+  MatrixX wrong = random_matrix(lower.rows() + 3, 1, 1);
+  EXPECT_THROW(solver.solve_in_place(wrong), Error);
+  EXPECT_THROW(solver.solve_in_place(x, &wrong), Error);
+  UnknownPlacement placement;
+  placement.point_m = Points::Zero(4, 3);
+  EXPECT_THROW(solver.analyse(lower, placement), Error);
+  EXPECT_THROW(LinearSolver({.block = 0}), Error);
+  EXPECT_THROW(LinearSolver({.threads = 0}), Error);
+  EXPECT_THROW(LinearSolver({.tolerance = 0}), Error);
+}
+
+}  // namespace
+}  // namespace palpate::fem
