@@ -281,6 +281,34 @@ std::optional<RayHit> TriangleTree::cast(const Vec3& origin, const Vec3& directi
   return best;
 }
 
+int TriangleTree::crossings(const Vec3& origin, const Vec3& direction) const {
+  const Impl& s = *impl_;
+  if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0)) return 0;
+  const Ray ray(origin, direction);
+  const double endless = std::numeric_limits<double>::max();
+  int count = 0;
+  std::array<Index, bvh_stack_size> stack;
+  int top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const BvhNode& node = s.bvh.nodes[stack[--top]];
+    for (int side = 0; side < 2; ++side) {
+      if (node.child[side] < 0 || !(ray.enter(node.box[side], endless) <= endless)) continue;
+      if (node.count[side] == 0) {
+        stack[top++] = node.child[side];
+        continue;
+      }
+      RayHit hit;
+      for (Index i = node.child[side]; i < node.child[side] + node.count[side]; ++i) {
+        const Index id = s.bvh.order[i];
+        const auto corner = [&](int k) { return Vec3(s.mesh.vertices_m.row(s.mesh.triangles(id, k)).transpose()); };
+        count += ray.hit(corner(0), corner(1), corner(2), endless, hit);
+      }
+    }
+  }
+  return count;
+}
+
 const TriMesh& TriangleTree::mesh() const { return impl_->mesh; }
 
 }  // namespace palpate::geometry

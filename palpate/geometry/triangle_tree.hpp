@@ -43,6 +43,9 @@ class TriangleTree {
   /// No ray slips between two triangles that share an edge (Woop, Benthin, Wald 2013).
   std::optional<RayHit> cast(const Vec3& origin_m, const Vec3& direction, double max_range = 1e300) const;
 
+  /// Number of triangles that the endless ray meets (a crossing of an edge counts for both of its triangles).
+  int crossings(const Vec3& origin_m, const Vec3& direction) const;
+
   const TriMesh& mesh() const;
 
  private:

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "palpate/core/mesh.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/geometry/winding_number.hpp"
+
+namespace palpate::geometry {
+
+/// A triangle soup with all triangles turned outward: welded, without copies and triangles without area.
+struct OrientedSurface {
+  TriMesh mesh;
+  Index flipped = 0;  ///< triangles that were turned round
+  Index dropped = 0;  ///< copies and triangles without area
+  Index patches = 0;  ///< pieces across whose edges the orientation could be carried
+};
+
+/// Orientation is carried over edges with two triangles; when the input was inconsistent, every patch is then turned so that
+/// most of the rays cast from its two sides agree on what is inside by the parity of their crossings. A consistent input
+/// keeps its orientation, unless all of it is inside out.
+OrientedSurface orient(const TriMesh& mesh);
+
+/// A soup seen as a solid: inside is where its winding number is above one half.
+class Solid {
+ public:
+  /// @throws Error when no triangle with an area is left.
+  explicit Solid(const TriMesh& soup);
+
+  bool inside(const Vec3& point_m) const { return winding_(point_m) > 0.5; }
+  /// Distance to the nearest triangle, negative inside.
+  double signed_distance(const Vec3& point_m) const;
+  ClosestPoint closest(const Vec3& point_m, Index hint = -1) const { return tree_.closest(point_m, hint); }
+  Vec3 normal(Index triangle) const { return normals_.row(triangle).transpose(); }
+  /// Where the segment from an inside to an outside point leaves the solid, as a share of its length.
+  double leaves(const Vec3& inside_m, const Vec3& outside_m) const;
+  /// False for a triangle that does not part inside from outside at that point (hidden within another piece).
+  bool separates(const Vec3& point_on_triangle_m, Index triangle) const;
+
+  const TriMesh& surface() const { return tree_.mesh(); }
+  const TriangleTree& tree() const { return tree_; }
+  const OrientedSurface& orientation() const { return oriented_; }  ///< without its mesh
+  bool watertight() const { return watertight_; }
+  double diagonal_m() const { return diagonal_m_; }
+  const Vec3& min_m() const { return min_m_; }
+  const Vec3& max_m() const { return max_m_; }
+
+ private:
+  OrientedSurface oriented_;
+  TriangleTree tree_;
+  WindingNumber winding_;
+  Points normals_;
+  bool watertight_ = false;
+  double diagonal_m_ = 0;
+  Vec3 min_m_, max_m_;
+};
+
+}  // namespace palpate::geometry

@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/geometry/tet_improve.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "palpate/geometry/surface_fit.hpp"
+#include "palpate/geometry/tet_quality.hpp"
+
+namespace palpate::geometry {
+namespace {
+
+double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 n = (b - a).cross(c - a);
+  const double n2 = n.squaredNorm();
+  if (n2 > 0 && n.cross(b - a).dot(p - a) >= 0 && n.cross(c - b).dot(p - b) >= 0 && n.cross(a - c).dot(p - c) >= 0)
+    return std::abs(n.dot(p - a)) / std::sqrt(n2);
+  const auto segment = [&](const Vec3& u, const Vec3& v) {
+    const Vec3 d = v - u;
+    const double l2 = d.squaredNorm();
+    return (p - u - (l2 > 0 ? std::clamp(d.dot(p - u) / l2, 0.0, 1.0) : 0.0) * d).norm();
+  };
+  return std::min({segment(a, b), segment(b, c), segment(c, a)});
+}
+
+/// Lets a change of the boundary pass when the new triangles stay near the surface and do not fold.
+TetEditor::Accept near_surface(const TetEditor& mesh, const Solid& solid, double tolerance) {
+  return [&mesh, &solid, tolerance](const std::vector<TetEditor::Tri>& before, const std::vector<TetEditor::Tri>& after,
+                                    const Vec3* lost) {
+    const auto& x = mesh.x;
+    const auto normal = [&](const TetEditor::Tri& t) { return Vec3((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]])); };
+    double size = 0, was = 0;
+    Index hint = -1;
+    for (const auto& t : before) {
+      size += mesh.size_m[t[0]] / double(before.size());
+      const ClosestPoint c = solid.closest((x[t[0]] + x[t[1]] + x[t[2]]) / 3, hint);
+      hint = c.triangle;
+      was = std::max(was, std::sqrt(c.squared_distance_m2));
+    }
+    const double allowed = std::max(tolerance * size, was);
+    if (lost != nullptr) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const auto& t : after) nearest = std::min(nearest, distance_to_triangle(*lost, x[t[0]], x[t[1]], x[t[2]]));
+      if (nearest > tolerance * size) return false;
+    }
+    for (const auto& t : after) {
+      const Vec3 n = normal(t), middle = (x[t[0]] + x[t[1]] + x[t[2]]) / 3;
+      const ClosestPoint c = solid.closest(middle, hint);
+      hint = c.triangle;
+      const double d = std::sqrt(c.squared_distance_m2);
+      if (d > allowed) return false;
+      if (d < 0.3 * size && solid.normal(c.triangle).dot(n) < 0.3 * n.norm()) return false;
+      for (int k = 0; k < 3; ++k) {
+        const Vec3 m = 0.5 * (x[t[k]] + x[t[(k + 1) % 3]]);
+        if (solid.closest(m, c.triangle).squared_distance_m2 > allowed * allowed) return false;
+      }
+      bool folds = true;
+      for (const auto& b : before) {
+        const Vec3 nb = normal(b);
+        folds = folds && nb.dot(n) < 0.3 * nb.norm() * n.norm();
+      }
+      if (folds) return false;
+    }
+    return true;
+  };
+}
+
+class Improver {
+ public:
+  Improver(TetEditor& mesh, const Solid& solid, const SurfaceSamples& samples, const ImproveOptions& options)
+      : m_(mesh), solid_(solid), samples_(samples), o_(options), accept_(near_surface(mesh, solid, options.tolerance)) {}
+
+  bool run(const OnProgress& progress) {
+    for (int round = 0; round < o_.most_rounds; ++round) {
+      if (progress && !progress("quality", double(round) / o_.most_rounds)) return false;
+      const double floor = std::min(o_.target_quality, 0.2 + 0.04 * round);
+      fit_to_surface(m_, solid_, samples_, floor);
+      const double below = round < 3 ? 0.7 : std::min(0.6, o_.target_quality + 0.08);
+      swap(below);
+      smooth(below);
+      if (round % 2 == 1) merge(o_.target_quality);
+      smooth(below);
+      if (round > 3 && worst() >= o_.target_quality) break;
+    }
+    for (int round = 0; round < 6 && worst() < o_.target_quality; ++round) {
+      off_surface_ = round > 1;
+      insert(o_.target_quality);
+      swap(o_.target_quality);
+      smooth(o_.target_quality);
+      merge(o_.target_quality);
+      smooth(o_.target_quality);
+    }
+    return true;
+  }
+
+  double worst() const {
+    double q = 1;
+    for (std::size_t t = 0; t < m_.tets.size(); ++t)
+      if (m_.alive[t]) q = std::min(q, m_.quality[t]);
+    return q;
+  }
+
+ private:
+  std::vector<Index> worse_than(double q) const {
+    std::vector<Index> out;
+    for (std::size_t t = 0; t < m_.tets.size(); ++t)
+      if (m_.alive[t] && m_.quality[t] < q) out.push_back(static_cast<Index>(t));
+    std::sort(out.begin(), out.end(),
+              [&](Index a, Index b) { return m_.quality[a] != m_.quality[b] ? m_.quality[a] < m_.quality[b] : a < b; });
+    return out;
+  }
+
+  void swap(double below) {
+    for (const Index t : worse_than(below)) {
+      if (!m_.alive[t] || m_.quality[t] >= below) continue;
+      const TetEditor::Tet tet = m_.tets[t];
+      bool done = false;
+      for (int i = 0; i < 4 && !done; ++i)
+        for (int j = i + 1; j < 4 && !done; ++j) done = m_.remove_edge(tet[i], tet[j], accept_);
+      for (int k = 0; k < 4 && !done; ++k) done = m_.remove_face(t, k);
+    }
+  }
+
+  void merge(double below) {
+    for (const Index t : worse_than(below)) {
+      if (!m_.alive[t] || m_.quality[t] >= below) continue;
+      const TetEditor::Tet tet = m_.tets[t];
+      std::array<std::array<Index, 2>, 12> edges;
+      int n = 0;
+      for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j)
+          if (i != j) edges[n++] = {tet[i], tet[j]};
+      std::sort(edges.begin(), edges.end(), [&](const auto& a, const auto& b) {
+        return (m_.x[a[0]] - m_.x[a[1]]).squaredNorm() < (m_.x[b[0]] - m_.x[b[1]]).squaredNorm();
+      });
+      for (const auto& [gone, kept] : edges)
+        if (m_.collapse(gone, kept, std::min(below, m_.star_quality(gone) + 1e-6), accept_)) break;
+    }
+  }
+
+  /// Splits an edge of a bad element where the new vertex, well placed, leaves only better ones.
+  void insert(double below) {
+    for (const Index t : worse_than(below)) {
+      if (!m_.alive[t] || m_.quality[t] >= below) continue;
+      const TetEditor::Tet tet = m_.tets[t];
+      bool done = false;
+      for (int i = 0; i < 4 && !done; ++i)
+        for (int j = i + 1; j < 4 && !done; ++j) {
+          double old = 1;
+          for (const Index e : m_.edge_tets(tet[i], tet[j])) old = std::min(old, m_.quality[e]);
+          const Index v = m_.split_edge(tet[i], tet[j]);
+          smooth_vertex(v);
+          done = m_.star_quality(v) > old + 0.01;
+          if (!done) m_.collapse(v, tet[i], -2, nullptr);
+        }
+    }
+  }
+
+  void smooth(double below) {
+    std::vector<Index> todo;
+    for (std::size_t v = 0; v < m_.x.size(); ++v)
+      if (!m_.star[v].empty() && m_.star_quality(static_cast<Index>(v)) < below) todo.push_back(static_cast<Index>(v));
+    for (const Index v : todo) smooth_vertex(v);
+  }
+
+  /// Soft minimum of the star's quality and its gradient by differences.
+  double soft(Index v, const Vec3& at) const {
+    constexpr double sharpness = 25;
+    double sum = 0;
+    for (const Index id : m_.star[v]) {
+      const TetEditor::Tet& t = m_.tets[id];
+      std::array<Vec3, 4> p;
+      for (int k = 0; k < 4; ++k) p[k] = t[k] == v ? at : m_.x[t[k]];
+      sum += std::exp(-sharpness * tet_quality(p[0], p[1], p[2], p[3]));
+    }
+    return -std::log(sum) / sharpness;
+  }
+
+  void smooth_vertex(Index v) {
+    const bool outer = m_.boundary[v];
+    double q = m_.star_quality(v);
+    Vec3 normal = Vec3::Zero();
+    ClosestPoint foot;
+    Vec3 offset = Vec3::Zero();
+    bool on_surface = false;
+    if (outer) {
+      normal = m_.boundary_normal(v);
+      if (normal.isZero(0)) return;
+      foot = solid_.closest(m_.x[v]);
+      offset = m_.x[v] - foot.point_m;
+      on_surface = offset.norm() < 0.3 * m_.size_m[v] && std::abs(solid_.normal(foot.triangle).dot(normal)) > 0.3;
+    }
+    const double h = 1e-4 * m_.size_m[v];
+    for (int step = 0; step < 3; ++step) {
+      const double here = soft(v, m_.x[v]);
+      Vec3 g;
+      for (int k = 0; k < 3; ++k) g[k] = (soft(v, m_.x[v] + h * Vec3::Unit(k)) - here) / h;
+      if (outer && !off_surface_) g -= g.dot(normal) * normal;
+      const double slope = g.norm();
+      if (!(slope > 1e-9)) break;
+      const Vec3 d = g / slope;
+      bool moved = false;
+      for (double length = 0.25 * m_.size_m[v]; length > 0.01 * m_.size_m[v]; length *= 0.45) {
+        Vec3 to = m_.x[v] + length * d;
+        if (outer && on_surface && !off_surface_) {
+          const ClosestPoint c = solid_.closest(to, foot.triangle);
+          const double keep = offset.dot(normal);
+          to = c.point_m + keep * normal;
+        }
+        const double fresh = m_.star_quality_at(v, to, q);
+        if (fresh > q + 1e-4) {
+          if (outer && !stays_near(v, to, foot.triangle)) continue;
+          m_.move(v, to);
+          q = fresh;
+          moved = true;
+          break;
+        }
+      }
+      if (!moved) break;
+    }
+    if (!off_surface_ || q >= o_.target_quality) return;
+    // where the worst elements pull in several directions the gradient is blind
+    double reach = 0.15 * m_.size_m[v];
+    for (int i = 0; i < 24; ++i, reach *= 0.93) {
+      const Vec3 to = m_.x[v] + reach * Vec3(uniform_(rng_), uniform_(rng_), uniform_(rng_));
+      const double fresh = m_.star_quality_at(v, to, q);
+      if (fresh <= q + 1e-4 || (outer && !stays_near(v, to, foot.triangle))) continue;
+      m_.move(v, to);
+      q = fresh;
+    }
+  }
+
+  /// Sum of squared distances of the boundary triangles' middles must not grow noticeably.
+  bool stays_near(Index v, const Vec3& to, Index hint) {
+    double before = 0, after = 0;
+    const Vec3 old = m_.x[v];
+    for (const auto& t : m_.boundary_triangles(v)) {
+      const Vec3 rest = m_.x[t[1]] + m_.x[t[2]];
+      before = std::max(before, solid_.closest((old + rest) / 3, hint).squared_distance_m2);
+      after = std::max(after, solid_.closest((to + rest) / 3, hint).squared_distance_m2);
+    }
+    const double allowed = (off_surface_ ? o_.tolerance : 0.04) * m_.size_m[v];
+    if (off_surface_ && solid_.closest(to, hint).squared_distance_m2 > allowed * allowed) return false;
+    return after <= std::max(1.02 * before, allowed * allowed);
+  }
+
+  TetEditor& m_;
+  const Solid& solid_;
+  const SurfaceSamples& samples_;
+  ImproveOptions o_;
+  TetEditor::Accept accept_;
+  std::mt19937 rng_{1};
+  std::uniform_real_distribution<double> uniform_{-1, 1};
+  bool off_surface_ = false;  ///< boundary vertices may leave the surface within the tolerance
+};
+
+}  // namespace
+
+void merge_short_edges(TetEditor& mesh, const Solid& solid, double share, double above_quality) {
+  const auto accept = near_surface(mesh, solid, 0.12);
+  struct Short {
+    double ratio;
+    Index a, b;
+  };
+  for (int pass = 0; pass < 3; ++pass) {
+    std::vector<Short> list;
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+      if (!mesh.alive[t]) continue;
+      for (int i = 0; i < 4; ++i)
+        for (int j = i + 1; j < 4; ++j) {
+          const Index a = std::min(mesh.tets[t][i], mesh.tets[t][j]), b = std::max(mesh.tets[t][i], mesh.tets[t][j]);
+          const double ratio = (mesh.x[a] - mesh.x[b]).norm() / std::min(mesh.size_m[a], mesh.size_m[b]);
+          if (ratio < share) list.push_back({ratio, a, b});
+        }
+    }
+    std::sort(list.begin(), list.end(),
+              [](const Short& p, const Short& q) { return std::tie(p.ratio, p.a, p.b) < std::tie(q.ratio, q.a, q.b); });
+    list.erase(
+        std::unique(list.begin(), list.end(), [](const Short& p, const Short& q) { return p.a == q.a && p.b == q.b; }),
+        list.end());
+    int merged = 0;
+    for (const Short& s : list) {
+      if (mesh.star[s.a].empty() || mesh.star[s.b].empty() || mesh.edge_tets(s.a, s.b).empty()) continue;
+      for (const auto& [gone, kept] : {std::pair{s.a, s.b}, std::pair{s.b, s.a}}) {
+        if (mesh.boundary[gone] && !mesh.boundary[kept]) continue;
+        const double above = std::min(above_quality, mesh.star_quality(gone));
+        if (mesh.collapse(gone, kept, above, accept)) {
+          ++merged;
+          break;
+        }
+      }
+    }
+    if (merged == 0) break;
+  }
+}
+
+bool improve(TetEditor& mesh, const Solid& solid, const SurfaceSamples& samples, const ImproveOptions& options,
+             const OnProgress& progress) {
+  return Improver(mesh, solid, samples, options).run(progress);
+}
+
+}  // namespace palpate::geometry

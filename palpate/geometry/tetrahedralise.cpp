@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/geometry/tetrahedralise.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <random>
+
+#include "palpate/core/error.hpp"
+#include "palpate/geometry/lattice_cut.hpp"
+#include "palpate/geometry/surface_distance.hpp"
+#include "palpate/geometry/tet_improve.hpp"
+
+namespace palpate::geometry {
+namespace {
+
+/// Volume within the winding number's one half, by counting points; good to some percent, which is all a first guess needs.
+double counted_volume(const Solid& solid) {
+  constexpr int count = 3000;
+  std::mt19937 rng(3);
+  std::uniform_real_distribution<double> u;
+  const Vec3 extent = solid.max_m() - solid.min_m();
+  int inside = 0;
+  for (int i = 0; i < count; ++i) inside += solid.inside(solid.min_m() + extent.cwiseProduct(Vec3(u(rng), u(rng), u(rng))));
+  return extent.prod() * inside / count;
+}
+
+/// Is there an inside at all, right behind the surface?
+bool encloses_something(const Solid& solid, const SurfaceSamples& samples) {
+  std::size_t behind = 0;
+  const double step = 1e-4 * solid.diagonal_m();
+  for (std::size_t i = 0; i < samples.evenly; i += 7) behind += solid.inside(samples.point[i] - step * samples.normal[i]);
+  return behind > samples.evenly / 7 / 20;
+}
+
+struct Draft {
+  TetEditor mesh;
+  Index dropped = 0;
+  double dropped_share = 0;
+};
+
+std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, const TetrahedraliseOptions& o, double cell) {
+  Lattice lattice(solid, cell);
+  lattice.refine_to_surface(samples, o.detail * cell, cell / o.finest);
+  if (!o.finer.empty())
+    lattice.refine_to_size([&](const Vec3& p) {
+      double edge = std::numeric_limits<double>::infinity();
+      for (const FinerNear& f : o.finer)
+        edge = std::min(edge, f.edge_m + 0.5 * std::max(0.0, (p - f.point_m).norm() - f.radius_m));
+      return edge;
+    });
+  Draft out{cut_lattice(lattice, solid), 0, 0};
+  if (out.mesh.count() == 0) return std::nullopt;
+  std::tie(out.dropped, out.dropped_share) = out.mesh.drop_small_pieces(0.01);
+  if (o.improve) merge_short_edges(out.mesh, solid, 0.5, 0.05);
+  return out;
+}
+
+/// Share of the boundary's area that lies far from every input triangle.
+double share_over_holes(const TriMesh& boundary, const Solid& solid) {
+  double far = 0, all = 0;
+  Index hint = -1;
+  for (Index i = 0; i < boundary.triangles.rows(); ++i) {
+    const Vec3 a = boundary.vertices_m.row(boundary.triangles(i, 0)).transpose(),
+               b = boundary.vertices_m.row(boundary.triangles(i, 1)).transpose(),
+               c = boundary.vertices_m.row(boundary.triangles(i, 2)).transpose();
+    const double area = (b - a).cross(c - a).norm();
+    const ClosestPoint q = solid.closest((a + b + c) / 3, hint);
+    hint = q.triangle;
+    all += area;
+    if (q.squared_distance_m2 > std::pow(0.01 * solid.diagonal_m(), 2)) far += area;
+  }
+  return all > 0 ? far / all : 0;
+}
+
+void require(bool ok, const char* field, const std::string& what) {
+  if (!ok) throw Error(what, std::string("TetrahedraliseOptions: ") + field);
+}
+
+}  // namespace
+
+void check(const TetrahedraliseOptions& o) {
+  require(o.tetrahedra >= 50 && o.tetrahedra <= 2000000, "tetrahedra",
+          fmt::format("{} is not between 50 and 2000000", o.tetrahedra));
+  require(o.edge_m >= 0 && std::isfinite(o.edge_m), "edge_m",
+          fmt::format("{} is no length (0 = from tetrahedra)", o.edge_m));
+  require(o.detail >= 0.02 && o.detail <= 1, "detail", fmt::format("{} is not between 0.02 and 1", o.detail));
+  require(o.finest >= 1 && o.finest <= 32, "finest", fmt::format("{} is not between 1 and 32", o.finest));
+  for (const FinerNear& f : o.finer) {
+    require(f.point_m.allFinite(), "finer.point_m", "is not finite");
+    require(f.radius_m >= 0 && std::isfinite(f.radius_m), "finer.radius_m", fmt::format("{} is no length", f.radius_m));
+    require(f.edge_m > 0 && std::isfinite(f.edge_m), "finer.edge_m", fmt::format("{} is not above 0", f.edge_m));
+  }
+}
+
+Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOptions& o, const OnProgress& progress) {
+  check(o);
+  Tetrahedralisation out;
+  out.surface = check_surface(surface);
+  for (const Finding& f : out.surface.findings)
+    if (f.fatal) throw Error(f.message, "surface");
+  const Solid solid(surface);
+  const bool known_volume = out.surface.volume_m3.has_value() || solid.watertight();
+  out.flipped_triangles = solid.orientation().flipped;
+  out.warnings = out.surface.findings;
+
+  const SurfaceSamples samples = sample_surface(solid, 10000);
+  if (!encloses_something(solid, samples))
+    throw Error("the surface encloses nothing: there is no inside to fill. Close it, or complete it first", "surface");
+  const double reference = solid.watertight() ? *check_surface(solid.surface()).volume_m3 : counted_volume(solid);
+  const double volume = std::max(reference, 1e-4 * (solid.max_m() - solid.min_m()).prod());
+  // A lattice of cubes has 12 tetrahedra a cube; boundaries and thin parts cost more, found by trying.
+  double cell = o.edge_m > 0 ? o.edge_m / 0.93 : std::cbrt(12 * volume / o.tetrahedra) * 1.3;
+  const double shrinks = 0.95;  // improvement merges some more
+  std::optional<Draft> best;
+  double best_miss = std::numeric_limits<double>::infinity();
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    if (progress && !progress("lattice", attempt / 5.0)) out.cancelled = true;
+    auto fresh = draft(solid, samples, o, cell);
+    const double ratio = fresh ? shrinks * fresh->mesh.count() / o.tetrahedra : 0.2;
+    const double miss = std::abs(std::log(ratio));
+    if (fresh && (o.edge_m > 0 || miss < best_miss)) best = std::move(fresh), best_miss = miss;
+    if ((best && (o.edge_m > 0 || best_miss < 0.06)) || out.cancelled) break;
+    cell *= std::pow(ratio, 1 / 2.3);
+  }
+  if (!best)
+    throw Error(fmt::format("the object is thinner everywhere than {} tetrahedra can show; ask for more", o.tetrahedra),
+                "surface");
+  if (o.improve && !out.cancelled) out.cancelled = !improve(best->mesh, solid, samples, {}, progress);
+
+  out.mesh = best->mesh.compact();
+  out.check = check_volume(out.mesh);
+  const TriMesh boundary = boundary_surface(out.mesh).surface;
+  if (known_volume) out.volume_error = out.check.volume_m3 / reference - 1;
+  const auto distance = solid.watertight() ? surface_distance(surface, boundary) : one_sided_distance(surface, boundary);
+  out.surface_rms_m = distance.rms_m;
+  out.hausdorff_m = distance.hausdorff_m;
+  if (!solid.watertight()) out.unseen_share = share_over_holes(boundary, solid);
+
+  const auto warn = [&](const char* code, std::string message) {
+    out.warnings.push_back({code, std::move(message), false});
+  };
+  if (out.unseen_share > 0.5)
+    throw Error(
+        fmt::format("{:.0f} % of the surface is missing: what lies inside would be invented. Scan more of the object, "
+                    "or complete it with its support plane",
+                    100 * out.unseen_share),
+        "surface");
+  if (out.unseen_share > 0.05)
+    warn("closed_holes", fmt::format("{:.0f} % of the boundary closes holes of the given surface", 100 * out.unseen_share));
+  if (best->dropped > 0)
+    warn("dropped_pieces",
+         fmt::format("{} small piece{} ({:.2g} % of the volume), cut off by thin or open parts, {} left out", best->dropped,
+                     best->dropped == 1 ? "" : "s", 100 * best->dropped_share, best->dropped == 1 ? "was" : "were"));
+  for (const Finding& f : out.check.findings)
+    if (f.code != "units") out.warnings.push_back(f);
+  if (out.volume_error && std::abs(*out.volume_error) > 0.03)
+    warn("volume_error", fmt::format("the volume differs by {:+.1f} % from the surface's; ask for more tetrahedra",
+                                     100 * *out.volume_error));
+  return out;
+}
+
+}  // namespace palpate::geometry

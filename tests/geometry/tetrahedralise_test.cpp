@@ -1,0 +1,207 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/geometry/tetrahedralise.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "geometry/shapes.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/geometry/surface_distance.hpp"
+#include "palpate/geometry/winding_number.hpp"
+
+namespace palpate::geometry {
+namespace {
+
+using testing::Contains;
+using testing::Field;
+using testing::HasSubstr;
+
+template <class F>
+std::string message_of(F f) {
+  try {
+    f();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "nothing thrown";
+}
+
+Tetrahedralisation with(const TriMesh& m, Index count) {
+  TetrahedraliseOptions o;
+  o.tetrahedra = count;
+  return tetrahedralise(m, o);
+}
+
+void expect_usable(const Tetrahedralisation& r) {
+  EXPECT_EQ(r.check.inverted + r.check.degenerate + r.check.overfull_faces + r.check.unused_nodes, 0);
+  EXPECT_EQ(r.check.non_manifold_boundary_edges, 0);
+  EXPECT_EQ(r.check.pinched_boundary_vertices, 0);
+  EXPECT_GE(r.check.min_dihedral_deg, 15);
+  EXPECT_LE(r.check.max_dihedral_deg, 150);
+  EXPECT_TRUE(check_surface(boundary_surface(r.mesh).surface).watertight());
+}
+
+TEST(WindingNumber, is_one_inside_and_zero_outside) {
+  const TriMesh m = shapes::torus(0.7, 0.2, 60, 30);
+  const WindingNumber w(m);
+  EXPECT_NEAR(w(Vec3(0.7, 0, 0)), 1, 0.05);
+  EXPECT_NEAR(w(Vec3(0, 0, 0)), 0, 0.05);
+  EXPECT_NEAR(w(Vec3(0.7, 0.01, 0.19)), 1, 0.05);
+  EXPECT_NEAR(w(Vec3(0.7, 0.01, 0.21)), 0, 0.05);
+  EXPECT_NEAR(w(Vec3(5, 5, 5)), 0, 0.005);
+  const Index t = 100;
+  const Vec3 middle =
+      (m.vertices_m.row(m.triangles(t, 0)) + m.vertices_m.row(m.triangles(t, 1)) + m.vertices_m.row(m.triangles(t, 2)))
+          .transpose() /
+      3;
+  EXPECT_NEAR(w.without(middle, t), 0.5, 0.05);
+}
+
+TEST(Tetrahedralise, a_sphere_keeps_volume_surface_and_count) {
+  const TriMesh m = shapes::sphere(0.05, 4);
+  for (const Index count : {1000, 4000}) {
+    const auto r = with(m, count);
+    expect_usable(r);
+    EXPECT_NEAR(r.check.tetrahedra, count, 0.25 * count);
+    EXPECT_LT(std::abs(r.volume_error.value_or(1)), 0.005);
+    EXPECT_LT(r.surface_rms_m, 0.0025 * r.surface.diagonal_m());
+    EXPECT_EQ(r.check.components, 1);
+    EXPECT_THAT(r.warnings, testing::IsEmpty());
+  }
+}
+
+TEST(Tetrahedralise, a_hole_through_the_object_stays_open) {
+  const auto r = with(shapes::torus(0.1, 0.03, 64, 32), 3000);
+  expect_usable(r);
+  // Euler characteristic of a torus is zero
+  const auto b = boundary_surface(r.mesh).surface;
+  EXPECT_EQ(b.vertices_m.rows() - 3 * b.triangles.rows() / 2 + b.triangles.rows(), 0);
+}
+
+TEST(Tetrahedralise, sharp_edges_are_kept_within_a_share_of_an_edge) {
+  const auto r = with(shapes::box(Vec3(0.03, 0.03, 0.1)), 3000);
+  expect_usable(r);
+  EXPECT_LT(std::abs(*r.volume_error), 0.01);
+  EXPECT_LT(r.hausdorff_m, 0.02 * r.surface.diagonal_m());
+}
+
+TEST(Tetrahedralise, is_repeatable) {
+  const TriMesh m = shapes::torus(0.1, 0.03, 32, 16);
+  EXPECT_EQ(with(m, 800).mesh.nodes_m, with(m, 800).mesh.nodes_m);
+}
+
+TEST(Tetrahedralise, copes_with_missing_flipped_and_doubled_triangles) {
+  const TriMesh whole = shapes::torus(0.1, 0.035, 80, 40);
+  std::mt19937 rng(4);
+  TriMesh broken = whole;
+  Index n = 0;
+  for (Index i = 0; i < whole.triangles.rows(); ++i) {
+    if (rng() % 5 == 0) continue;
+    auto t = Eigen::Matrix<Index, 1, 3>(whole.triangles.row(i));
+    if (rng() % 2 == 0) std::swap(t[0], t[1]);
+    broken.triangles.conservativeResize(std::max<Eigen::Index>(broken.triangles.rows(), n + 2), 3);
+    broken.triangles.row(n++) = t;
+    if (rng() % 10 == 0) broken.triangles.row(n++) = t;
+  }
+  broken.triangles.conservativeResize(n, 3);
+  const auto r = with(broken, 3000);
+  expect_usable(r);
+  EXPECT_FALSE(r.volume_error);
+  const double truth = *check_surface(whole).volume_m3;
+  EXPECT_NEAR(r.check.volume_m3, truth, 0.03 * truth);
+  const auto d = surface_distance(whole, boundary_surface(r.mesh).surface);
+  EXPECT_LT(d.rms_m, 0.005 * r.surface.diagonal_m());
+}
+
+TEST(Tetrahedralise, overlapping_pieces_become_their_union) {
+  const auto r = with(shapes::join(shapes::sphere(0.05, 4), shapes::sphere(0.05, 4, Vec3(0.05, 0, 0))), 4000);
+  expect_usable(r);
+  EXPECT_EQ(r.check.components, 1);
+  const double ball = 4.0 / 3 * M_PI * std::pow(0.05, 3), lens = M_PI / 12 * std::pow(0.05, 3) * (4 + 1);
+  EXPECT_NEAR(r.check.volume_m3, 2 * ball - lens, 0.01 * ball);
+}
+
+TEST(Tetrahedralise, an_inner_shell_that_faces_inward_is_a_cavity_and_all_inside_out_is_turned) {
+  TriMesh inner = shapes::sphere(0.03, 3);
+  inner.triangles.col(0).swap(inner.triangles.col(1));
+  const TriMesh shell = shapes::join(shapes::sphere(0.05, 4), inner);
+  const auto r = with(shell, 6000);
+  expect_usable(r);
+  EXPECT_LT(std::abs(*r.volume_error), 0.02);
+  TriMesh turned = shell;
+  turned.triangles.col(0).swap(turned.triangles.col(1));
+  const auto t = with(turned, 6000);
+  EXPECT_EQ(t.flipped_triangles, turned.triangles.rows());
+  EXPECT_NEAR(t.check.volume_m3, r.check.volume_m3, 1e-3 * r.check.volume_m3);
+}
+
+TEST(Tetrahedralise, is_finer_where_asked) {
+  TetrahedraliseOptions o;
+  o.edge_m = 0.02;
+  o.finer = {{Vec3(0, 0, 0.05), 0.01, 0.004}};
+  const auto r = tetrahedralise(shapes::sphere(0.05, 4), o);
+  expect_usable(r);
+  double near_sum = 0, far_sum = 0;
+  int near_count = 0, far_count = 0;
+  for (Index i = 0; i < r.mesh.tetrahedra.rows(); ++i) {
+    const Vec3 a = r.mesh.nodes_m.row(r.mesh.tetrahedra(i, 0)).transpose(),
+               b = r.mesh.nodes_m.row(r.mesh.tetrahedra(i, 1)).transpose();
+    if ((a - o.finer[0].point_m).norm() < 0.01) near_sum += (a - b).norm(), ++near_count;
+    if (a.z() < 0) far_sum += (a - b).norm(), ++far_count;
+  }
+  ASSERT_GT(near_count, 20);
+  ASSERT_GT(far_count, 20);
+  EXPECT_LT(near_sum / near_count, 0.005);
+  EXPECT_GT(far_sum / far_count, 0.01);
+}
+
+TEST(Tetrahedralise, refuses_what_has_no_inside) {
+  const TriMesh plane = shapes::make({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}});
+  EXPECT_THAT(message_of([&] { tetrahedralise(plane); }), HasSubstr("encloses nothing"));
+  EXPECT_THAT(message_of([&] {
+                tetrahedralise(shapes::make({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}));
+              }),
+              HasSubstr("no triangle with an area"));
+  EXPECT_THAT(message_of([&] { tetrahedralise(TriMesh{}); }), HasSubstr("no triangle"));
+}
+
+TEST(Tetrahedralise, warns_of_units_and_closed_holes) {
+  TriMesh m = shapes::sphere(80, 4);
+  const auto z = [&](Index t) { return m.vertices_m(m.triangles(t, 0), 2); };
+  Index n = 0;
+  for (Index t = 0; t < m.triangles.rows(); ++t)
+    if (z(t) < 40) m.triangles.row(n++) = Eigen::Matrix<Index, 1, 3>(m.triangles.row(t));
+  m.triangles.conservativeResize(n, 3);
+  const auto r = with(m, 1500);
+  EXPECT_THAT(r.warnings, Contains(Field(&Finding::message, HasSubstr("millimetres?"))));
+  EXPECT_THAT(r.warnings, Contains(Field(&Finding::code, "closed_holes")));
+  EXPECT_GT(r.unseen_share, 0.1);
+  EXPECT_LT(r.unseen_share, 0.35);
+}
+
+TEST(Tetrahedralise, options_are_checked_field_by_field) {
+  const TriMesh m = shapes::sphere(0.05, 2);
+  const auto bad = [&](auto change) {
+    TetrahedraliseOptions o;
+    change(o);
+    return message_of([&] { tetrahedralise(m, o); });
+  };
+  EXPECT_THAT(bad([](auto& o) { o.tetrahedra = 3; }), HasSubstr("tetrahedra"));
+  EXPECT_THAT(bad([](auto& o) { o.edge_m = -1; }), HasSubstr("edge_m"));
+  EXPECT_THAT(bad([](auto& o) { o.detail = 0; }), HasSubstr("detail"));
+  EXPECT_THAT(bad([](auto& o) { o.finest = 0; }), HasSubstr("finest"));
+  EXPECT_THAT(bad([](auto& o) { o.finer = {{Vec3(NAN, 0, 0), 1, 1}}; }), HasSubstr("finer.point_m"));
+  EXPECT_THAT(bad([](auto& o) { o.finer = {{Vec3::Zero(), -1, 1}}; }), HasSubstr("finer.radius_m"));
+  EXPECT_THAT(bad([](auto& o) { o.finer = {{Vec3::Zero(), 1, 0}}; }), HasSubstr("finer.edge_m"));
+}
+
+TEST(Tetrahedralise, can_be_cancelled) {
+  int calls = 0;
+  const auto r = tetrahedralise(shapes::sphere(0.05, 3), {}, [&](std::string_view, double) { return ++calls < 3; });
+  EXPECT_TRUE(r.cancelled);
+  EXPECT_EQ(r.check.inverted, 0);
+}
+
+}  // namespace
+}  // namespace palpate::geometry
