@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t max_vertices_shown = 12'000;  // software rendering keeps 20 frames a second with twice the triangles
+constexpr std::size_t max_vertices_shown = 9'000;  // software rendering on two cores keeps 20 frames a second
 constexpr std::size_t max_points_shown = 15'000;
 constexpr std::size_t max_steps_shown = 100;
 constexpr double raw_bytes_per_text_byte = 0.75;  // base64

@@ -98,7 +98,8 @@ std::string answer(const Identification& identification) {
   std::string text;
   for (const Parameter& parameter : identification.parameters) {
     const std::string range = interval(parameter.lower_95, parameter.upper_95, parameter.unit);
-    const std::string title = parameter_title(parameter);
+    const bool article = parameter.name != "young_modulus";
+    const std::string title = article ? "The " + parameter_title(parameter) : parameter_title(parameter);
     if (!text.empty()) text += ' ';
     if (parameter.determined) {
       const double resolution = (parameter.upper_95 - parameter.lower_95) / 30;

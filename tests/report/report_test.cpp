@@ -44,9 +44,9 @@ TEST(Words, AnswerSaysWhatIsNotDeterminedAndWhatFailed) {
   Identification id = pressed_block::identification();
   EXPECT_EQ(report::answer(id),
             "Young's modulus is 20.30 kPa (95 % interval 19.52 to 21.12 kPa). "
-            "Poisson ratio is 0.310 (95 % interval 0.210 to 0.410).");
+            "The Poisson ratio is 0.310 (95 % interval 0.210 to 0.410).");
   id.parameters[1].determined = false;
-  EXPECT_THAT(report::answer(id), HasSubstr("Poisson ratio is not determined by these pushes"));
+  EXPECT_THAT(report::answer(id), HasSubstr("The Poisson ratio is not determined by these pushes"));
   id.termination = Termination::max_iterations;
   EXPECT_THAT(report::answer(id), HasSubstr("Take this with care"));
   EXPECT_THAT(report::answer(Identification{}), HasSubstr("There is no answer"));

@@ -77,7 +77,7 @@ export function histogram(report: Report, width: number): SVGElement | null {
   const plot = new Plot(
     width,
     260,
-    { label: `residual (${unit.unit}), positive = outside the simulated surface`, from: h.from_m * unit.factor, to: h.to_m * unit.factor },
+    { label: `residual (${unit.unit})`, from: h.from_m * unit.factor, to: h.to_m * unit.factor },
     { label: "points", from: 0, to: top * 1.08 },
     "Histogram of residuals",
     58,
@@ -155,7 +155,6 @@ export function convergence(report: Report, width: number): SVGElement | null {
     const y = (c: number): number => plot.bottom - (plot.bottom - plot.top) * (0.04 + 0.92 * (Math.log(c / low) / Math.log(high / low)));
     const d = costs.map((c, i) => `${i ? "L" : "M"}${plot.x(i)} ${y(c)}`).join("");
     plot.node.append(svg("path", { d, fill: "none", class: "cost" }));
-    plot.node.append(svg("text", { x: plot.right, y: Math.min(y(costs[costs.length - 1]) - 6, plot.bottom - 6), class: "tick", "text-anchor": "end" }, "cost (log, no scale)"));
   }
   return plot.node;
 }

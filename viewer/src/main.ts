@@ -101,14 +101,14 @@ function build(report: Report): void {
   const many = report.pushes.length > 1;
   const curve = Panel.make("Force against travel", `Marks: measured${many ? ", one colour and shape a push" : ""}. Line: the fitted model; band: its 95 % interval. Click a mark to see that step above.`, (w) => forceTravel(report, w, selected, select));
   const region = Panel.make("What the data say about E and \u03bd together", "Regions that hold 68 % (dark) and 95 % (light) of the posterior; cross: medians; thin lines: each parameter alone. A long ridge means that the two trade off against each other.", (w) => posterior(report, w));
-  const residuals = Panel.make("Residuals", `Observed points against the simulated surface${report.histogram && report.histogram.beyond > 0 ? `; ${count(report.histogram.beyond)} beyond the axis` : ""}. Line: a normal distribution of the fit's rms.`, (w) => histogram(report, w));
+  const residuals = Panel.make("Residuals", `Observed points against the simulated surface; positive: outside of it${report.histogram && report.histogram.beyond > 0 ? `; ${count(report.histogram.beyond)} beyond the axis` : ""}. Line: a normal distribution of the fit's rms.`, (w) => histogram(report, w));
   const steps = Panel.make("Residual of every step", "A step that stands out is one to look at in 3D: click it.", (w) => rmsBySteps(report, w, selected, select));
   const single = Panel.make("Each push on its own", "Young's modulus with 95 % interval from each push (or region) alone; shaded: all together. Intervals that do not overlap speak for an object that is not homogeneous.", (w) => perPush(report, w));
   const inputs = Panel.make("Error budget", "How far one standard deviation of each input moves the answer. The longest bar is what to calibrate next.", (w) => budget(report, w));
   const p = report.prediction;
   const unseenPush = Panel.make("Prediction of what was held out", `Fitted without ${p.what || "it"}, then predicted${known(p.force_error) ? `; force off by ${digits(100 * Math.abs(p.force_error), 2)} %` : ""}. Grey: trivial guesses.`, (w) => heldOut(report, w));
   const pulls = Panel.make("Nuisances against their priors", "Estimate with 95 % interval in prior standard deviations. Within the shaded band all is as expected; beyond \u00b13 the prior or the model is wrong.", (w) => nuisances(report, w));
-  const path = Panel.make("Convergence", "Young's modulus over the iterations; thin line: the cost.", (w) => convergence(report, w));
+  const path = Panel.make("Convergence", "Young's modulus over the iterations; dashed: the cost on a logarithmic scale of its own.", (w) => convergence(report, w));
   linked.push(...[curve, steps].filter((x): x is Panel => x !== null));
 
   const figures = el("section", { class: "figures", "aria-label": "Figures" });

@@ -6,7 +6,7 @@ import {
   Quaternion, Scene, TorusGeometry, Vector3, WebGLRenderer, WireframeGeometry,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { signedColour, sizeColour, unseen } from "./colours";
+import { observed, signedColour, sizeColour, unseen } from "./colours";
 import type { Report, Step } from "./data";
 import type { Field } from "./surface_fields";
 
@@ -19,7 +19,7 @@ export interface Visible {
   push: boolean;
 }
 
-const arrowColour = new Color(0.84, 0.1, 0.36); // apart from both colour maps
+const arrowColour = new Color(0.72, 0.02, 0.3); // apart from both colour maps
 
 export class View {
   readonly canvas: HTMLCanvasElement;
@@ -34,12 +34,16 @@ export class View {
   private readonly cloud: Points;
   private readonly masked: Points;
   private readonly push = new Group();
-  private readonly lamp = new DirectionalLight(0xffffff, 2.2);
+  private readonly lamp = new DirectionalLight(0xffffff, 1.7);
   private readonly size: number;
   private readonly centre: Vector3;
   private readonly largestForce: number;
   private pending = false;
   private frames = 0;
+  private lastFrame = 0;
+  private slowness = 0; // smoothed seconds a frame while frames follow each other
+  private coarse = false;
+  private settle = 0;
 
   /** @throws when the browser offers no WebGL */
   constructor(
@@ -76,7 +80,7 @@ export class View {
     this.rest = new LineSegments(new WireframeGeometry(restGeometry), new LineBasicMaterial({ color: 0x8b94a3, transparent: true, opacity: 0.22 }));
     this.cloud = new Points(new BufferGeometry(), new PointsMaterial({ size: 2.6, sizeAttenuation: false, vertexColors: true }));
     this.masked = new Points(new BufferGeometry(), new PointsMaterial({ size: 2, sizeAttenuation: false, color: 0x8b94a3 }));
-    this.scene.add(this.surface, this.wire, this.rest, this.cloud, this.masked, this.push, new AmbientLight(0xffffff, 1.5), this.lamp);
+    this.scene.add(this.surface, this.wire, this.rest, this.cloud, this.masked, this.push, new AmbientLight(0xffffff, 1.35), this.lamp);
 
     this.placeCamera();
     this.controls = new OrbitControls(this.camera, this.canvas);
@@ -104,7 +108,7 @@ export class View {
     }
     level.normalize().applyAxisAngle(up, 0.6);
     this.camera.up.copy(up);
-    this.camera.position.copy(this.centre).addScaledVector(level, this.size * 2.05).addScaledVector(up, this.size * 1.05);
+    this.camera.position.copy(this.centre).addScaledVector(level, this.size * 2.3).addScaledVector(up, this.size * 1.0);
     this.camera.near = this.size / 200;
     this.camera.far = this.size * 30;
     this.camera.lookAt(this.centre);
@@ -175,7 +179,7 @@ export class View {
         continue;
       }
       used.push(...place);
-      const [r, g, b] = coloured ? signedColour(residual / (field.scale || 1)) : [28, 34, 44];
+      const [r, g, b] = coloured ? signedColour(residual / (field.scale || 1)) : observed;
       colours.push(linear(r), linear(g), linear(b));
     }
     replace(this.cloud, used, colours);
@@ -226,12 +230,38 @@ export class View {
   draw(): void {
     if (this.pending) return;
     this.pending = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((now) => {
       this.pending = false;
+      this.keepUp(now);
       this.lamp.position.copy(this.camera.position).addScaledVector(this.camera.up, this.size);
       this.renderer.render(this.scene, this.camera);
       this.canvas.dataset.frames = String(++this.frames);
     });
+  }
+
+  /** While the picture moves too slowly it is drawn with fewer pixels and points; once it rests, in full. */
+  private keepUp(now: number): void {
+    const gap = (now - this.lastFrame) / 1000;
+    this.lastFrame = now;
+    if (gap < 0.5) this.slowness = 0.7 * this.slowness + 0.3 * gap;
+    if (!this.coarse && this.slowness > 0.03) this.coarsen(true);
+    window.clearTimeout(this.settle);
+    if (this.coarse) {
+      this.settle = window.setTimeout(() => {
+        this.coarsen(false);
+        this.slowness = 0;
+        this.lastFrame = 0;
+        this.draw();
+      }, 300);
+    }
+  }
+
+  private coarsen(coarse: boolean): void {
+    this.coarse = coarse;
+    const ratio = Math.min(window.devicePixelRatio, 2);
+    this.renderer.setPixelRatio(coarse ? ratio * 0.5 : ratio);
+    const points = this.cloud.geometry.getAttribute("position")?.count ?? 0;
+    this.cloud.geometry.setDrawRange(0, coarse ? Math.min(points, 3000) : points);
   }
 }
 

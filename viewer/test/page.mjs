@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// usage: node page.mjs CHECK REPORT.html     exit code 0: holds
+import assert from "node:assert/strict";
+import { cpus, loadavg } from "node:os";
+import { resolve } from "node:path";
+import { withPage } from "./browser.mjs";
+
+const dataOf = (page) => page.evaluate(() => JSON.parse(document.getElementById("palpate-data").textContent));
+const settled = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done()))));
+
+// SwiftShader's own notices about reading pixels back are not the page's fault.
+const real = (complaints) => complaints.filter((text) => !/GPU stall due to ReadPixels|software WebGL|SwiftShader|GL Driver Message/i.test(text));
+
+async function numbersAgree(page) {
+  const data = await dataOf(page);
+  for (const p of data.parameters) {
+    const card = page.locator(`.card[data-name="${p.name}"]`).first();
+    assert.equal(Number(await card.locator('data[data-key="value"]').getAttribute("value")), p.value, p.name);
+    const shown = await card.locator('data[data-key="value"]').textContent();
+    assert.ok(data.answer.includes(shown.trim()), `card says ${shown}, the sentence says ${data.answer}`);
+  }
+  assert.equal(await page.locator(".lead").textContent(), data.answer);
+  assert.equal(Number(await page.locator('data[data-key="rms_m"]').getAttribute("value")), data.fit.rms_m);
+  assert.equal(await page.locator(".verdicts li").count(), data.verdicts.length + (data.converged ? 0 : 1));
+}
+
+const checks = {
+  async whole(file) {
+    await withPage(file, {}, async (page, complaints) => {
+      await numbersAgree(page);
+      const canvas = page.locator(".view canvas");
+      const slider = page.getByRole("slider", { name: "Step" });
+      await slider.fill(await slider.getAttribute("max"));
+      await settled(page);
+      const last = await canvas.screenshot();
+      await slider.focus();
+      for (let i = 0; i < 5; ++i) await page.keyboard.press("ArrowLeft");
+      await settled(page);
+      const earlier = await canvas.screenshot();
+      assert.ok(!last.equals(earlier), "the slider does not change the picture");
+      await page.locator('[data-mode="residual"]').click();
+      await settled(page);
+      assert.ok(!earlier.equals(await canvas.screenshot()), "colours do not change the picture");
+      const data = await dataOf(page);
+      const legend = Number(await page.locator('[data-key="legend-max"]').textContent());
+      assert.ok(Math.abs(legend / 1000 / data.residual_scale_m - 1) < 0.01, `legend ends at ${legend}, data at ${data.residual_scale_m}`);
+      await page.locator('[data-mode="displacement"]').click();
+      const deepest = Math.max(...data.steps.map((s) => s.travel_m));
+      const reach = Number(await page.locator('[data-key="legend-max"]').textContent()) / 1000;
+      assert.ok(reach >= 0.99 * deepest && reach < 1.3 * deepest, `displacement legend ends at ${reach}, travel is ${deepest}`);
+      // A click on a measured point selects its step.
+      await page.locator(".plot .point").nth(1).dispatchEvent("click"); // the marks of two pushes may overlap
+      assert.match(await page.locator(".readout").textContent(), new RegExp(`^step ${data.steps[1].step} `));
+      for (const name of ["Force against travel", "What the data say", "Residuals", "Error budget", "Nuisances", "Convergence", "Each push"]) {
+        assert.ok((await page.locator("figure h3", { hasText: name }).count()) > 0, `no figure ${name}`);
+      }
+      await page.setViewportSize({ width: 360, height: 780 });
+      await settled(page);
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(wide <= 360, `the page is ${wide} pixels wide on a phone of 360`);
+      assert.deepEqual(real(complaints), []);
+    });
+  },
+
+  async without_webgl(file) {
+    await withPage(file, { webgl: false }, async (page, complaints) => {
+      await page.getByText("no WebGL").waitFor();
+      await numbersAgree(page);
+      assert.ok((await page.locator("figure svg").count()) >= 5, "figures are missing");
+      const scripted = complaints.filter((text) => !/WebGL/i.test(text));
+      assert.deepEqual(scripted, []);
+    });
+  },
+
+  async hostile(file) {
+    await withPage(file, {}, async (page, complaints) => {
+      await numbersAgree(page);
+      assert.equal(await page.evaluate(() => window.hacked), undefined);
+      assert.equal(await page.locator("img").count(), 0);
+      for (const width of [1200, 360]) {
+        await page.setViewportSize({ width, height: 800 });
+        await settled(page);
+        const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+        assert.ok(wide <= width, `the page is ${wide} pixels wide on ${width}`);
+      }
+      assert.deepEqual(real(complaints), []);
+    });
+  },
+
+  async speed(file) {
+    await withPage(file, {}, async (page, complaints) => {
+      assert.ok((await page.locator(".note", { hasText: "triangles" }).count()) > 0, "thinning is not said");
+      const framesASecond = () => page.evaluate(async () => {
+        const canvas = document.querySelector(".view canvas");
+        const frame = () => new Promise((done) => requestAnimationFrame(done));
+        const turn = async (milliseconds) => {
+          const [start, first] = [performance.now(), Number(canvas.dataset.frames)];
+          while (performance.now() - start < milliseconds) {
+            canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
+            await frame();
+          }
+          return ((Number(canvas.dataset.frames) - first) / (performance.now() - start)) * 1000;
+        };
+        await turn(1000); // lets the page find its pace
+        return turn(2500);
+      });
+      const rate = await framesASecond();
+      // Twenty on a machine of our own; a machine that has more to do than cores gives us that much less.
+      const wanted = 20 / Math.max(1, loadavg()[0] / cpus().length);
+      console.log(`${rate.toFixed(1)} frames a second, ${wanted.toFixed(1)} wanted at this load`);
+      assert.ok(rate > wanted, `${rate.toFixed(1)} frames a second`);
+      assert.deepEqual(real(complaints), []);
+    });
+  },
+};
+
+const [name, file] = process.argv.slice(2);
+await checks[name](resolve(file));
