@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sensing/kinematics.hpp"
+
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::sensing {
+namespace {
+
+bool moves(const RobotJoint& joint) { return joint.kind != RobotJoint::Kind::fixed; }
+
+}  // namespace
+
+Kinematics::Kinematics(RobotModel robot) : robot_(std::move(robot)) {
+  const std::string where = "robot '" + robot_.name + "'";
+  if (robot_.links.empty()) throw Error("has no link", where);
+  std::map<std::string, Index> links, joints;
+  for (std::size_t i = 0; i < robot_.links.size(); ++i)
+    if (!links.emplace(robot_.links[i].name, Index(i)).second)
+      throw Error("has two links named '" + robot_.links[i].name + "'", where);
+  for (std::size_t j = 0; j < robot_.joints.size(); ++j)
+    if (!joints.emplace(robot_.joints[j].name, Index(j)).second)
+      throw Error("has two joints named '" + robot_.joints[j].name + "'", where);
+
+  joint_above_.assign(robot_.links.size(), -1);
+  mimicked_.assign(robot_.joints.size(), -1);
+  for (std::size_t j = 0; j < robot_.joints.size(); ++j) {
+    RobotJoint& joint = robot_.joints[j];
+    const std::string at = where + ", joint '" + joint.name + "'";
+    for (const std::string* name : {&joint.parent, &joint.child})
+      if (!links.count(*name)) throw Error("connects the link '" + *name + "', which does not exist", at);
+    parent_.push_back(links[joint.parent]);
+    child_.push_back(links[joint.child]);
+    Index& above = joint_above_[std::size_t(child_.back())];
+    if (above >= 0)
+      throw Error("gives the link '" + joint.child + "' a second parent (the first is joint '" +
+                      robot_.joints[std::size_t(above)].name + "')",
+                  at);
+    above = Index(j);
+    if (moves(joint)) {
+      if (!(joint.axis.norm() > 1e-9)) throw Error("has an axis of length zero", at);
+      joint.axis.normalize();
+    }
+    if (!joint.mimic.empty()) {
+      if (!joints.count(joint.mimic)) throw Error("mimics the joint '" + joint.mimic + "', which does not exist", at);
+      mimicked_[j] = joints[joint.mimic];
+      const RobotJoint& master = robot_.joints[std::size_t(mimicked_[j])];
+      if (!moves(master) || !master.mimic.empty())
+        throw Error("mimics the joint '" + joint.mimic + "', which has no value of its own", at);
+    } else if (moves(joint)) {
+      free_joints_.push_back(joint.name);
+    }
+  }
+
+  root_ = -1;
+  for (std::size_t i = 0; i < robot_.links.size(); ++i)
+    if (joint_above_[i] < 0) {
+      if (root_ >= 0)
+        throw Error("has two roots, '" + robot_.links[std::size_t(root_)].name + "' and '" + robot_.links[i].name +
+                        "': every link but one needs a joint above it",
+                    where);
+      root_ = Index(i);
+    }
+  if (root_ < 0) throw Error("is a loop: no link is without a joint above it", where);
+  // Breadth first from the root; what is not reached hangs on a loop.
+  std::vector<Index> frontier{root_};
+  for (std::size_t at = 0; at < frontier.size(); ++at)
+    for (std::size_t j = 0; j < robot_.joints.size(); ++j)
+      if (parent_[j] == frontier[at]) {
+        order_.push_back(Index(j));
+        frontier.push_back(child_[j]);
+      }
+  if (order_.size() != robot_.joints.size()) throw Error("has joints in a loop that the root does not reach", where);
+}
+
+Index Kinematics::link(const std::string& name) const {
+  std::string names;
+  for (std::size_t i = 0; i < robot_.links.size(); ++i) {
+    if (robot_.links[i].name == name) return Index(i);
+    names += (names.empty() ? "" : ", ") + robot_.links[i].name;
+  }
+  throw Error("has no link '" + name + "'; there are: " + names, "robot '" + robot_.name + "'");
+}
+
+std::vector<Pose> Kinematics::link_poses(const std::vector<std::string>& names, const std::vector<double>& positions) const {
+  const std::string where = "robot '" + robot_.name + "'";
+  if (names.size() != positions.size())
+    throw Error(
+        "got " + std::to_string(positions.size()) + " joint positions for " + std::to_string(names.size()) + " names",
+        where);
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> value(robot_.joints.size(), unknown);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    bool found = false;
+    for (std::size_t j = 0; j < robot_.joints.size(); ++j)
+      if (robot_.joints[j].name == names[k]) {
+        value[j] = positions[k];
+        found = true;
+      }
+    if (!found) throw Error("has no joint '" + names[k] + "'", where);
+  }
+  std::vector<Pose> poses(robot_.links.size(), Pose::Identity());
+  for (const Index j : order_) {
+    const RobotJoint& joint = robot_.joints[std::size_t(j)];
+    Pose motion = Pose::Identity();
+    if (moves(joint)) {
+      const Index master = mimicked_[std::size_t(j)];
+      const double q =
+          master < 0 ? value[std::size_t(j)] : joint.mimic_multiplier * value[std::size_t(master)] + joint.mimic_offset;
+      if (!std::isfinite(q))
+        throw Error("has no finite position of the joint '" +
+                        (master < 0 ? joint.name : robot_.joints[std::size_t(master)].name) + "'",
+                    where);
+      if (joint.kind == RobotJoint::Kind::prismatic)
+        motion.translation() = q * joint.axis;
+      else
+        motion.linear() = Eigen::AngleAxisd(q, joint.axis).toRotationMatrix();
+    }
+    poses[std::size_t(child_[std::size_t(j)])] = poses[std::size_t(parent_[std::size_t(j)])] * joint.T_parent_joint * motion;
+  }
+  return poses;
+}
+
+double Kinematics::position_std_m(const std::vector<Pose>& poses, Index link, const Vec3& point_link_m,
+                                  double joint_std_rad) const {
+  const Vec3 point = poses[std::size_t(link)] * point_link_m;
+  double variance = 0;
+  for (Index at = link; joint_above_[std::size_t(at)] >= 0;) {
+    const auto j = std::size_t(joint_above_[std::size_t(at)]);
+    const RobotJoint& joint = robot_.joints[j];
+    if (joint.kind == RobotJoint::Kind::revolute || joint.kind == RobotJoint::Kind::continuous) {
+      const Pose& frame = poses[std::size_t(child_[j])];  // the joint's origin and axis move with its child
+      const Vec3 lever = (frame.linear() * joint.axis).cross(point - frame.translation());
+      variance += (lever * joint_std_rad).squaredNorm();
+    }
+    at = parent_[j];
+  }
+  return std::sqrt(variance);
+}
+
+}  // namespace palpate::sensing

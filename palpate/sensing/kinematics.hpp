@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Forward kinematics of a URDF tree: revolute, continuous, prismatic, fixed and mimic joints.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "palpate/core/recording.hpp"
+
+namespace palpate::sensing {
+
+/// A robot whose joints are sorted from the root and checked once; posing it is then a walk down the tree.
+class Kinematics {
+ public:
+  /// @throws Error naming link or joint: no link, two links or joints of a name, a joint between links that do not exist, a
+  ///         link with two parents, no or several roots, a loop, a mimic joint of an unknown or mimicking joint, an axis of
+  ///         length zero.
+  explicit Kinematics(RobotModel robot);
+
+  const RobotModel& robot() const { return robot_; }
+  Index root_link() const { return root_; }
+  /// Index in robot().links. @throws Error listing the names.
+  Index link(const std::string& name) const;
+  /// Joints that have a value of their own (not fixed, not mimicking), in the order of the URDF.
+  const std::vector<std::string>& free_joints() const { return free_joints_; }
+
+  /// Pose of every link in the frame of the root link, in the order of robot().links.
+  /// @param names, positions  radians or metres; joints that are fixed or mimic may be among them and are ignored
+  /// @throws Error when a free joint has no value, a name is unknown, or the counts differ.
+  std::vector<Pose> link_poses(const std::vector<std::string>& names, const std::vector<double>& positions) const;
+
+  /// Standard deviation of the position of a point of a link, from independent errors of all joints above it:
+  /// the square root of the sum of (lever arm times sigma)^2 at this pose; a prismatic joint adds nothing to it.
+  double position_std_m(const std::vector<Pose>& link_poses, Index link, const Vec3& point_link_m,
+                        double joint_std_rad) const;
+
+ private:
+  RobotModel robot_;
+  Index root_ = 0;
+  std::vector<Index> order_;           // joints, parents first
+  std::vector<Index> parent_, child_;  // a joint: link indices
+  std::vector<Index> joint_above_;     // a link: its joint, or -1
+  std::vector<Index> mimicked_;        // a joint: the joint whose value it takes, or -1
+  std::vector<std::string> free_joints_;
+};
+
+}  // namespace palpate::sensing

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which pixels show the robot: its URDF's shapes, posed by the joint angles and seen from the camera.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "palpate/core/recording.hpp"
+#include "palpate/sensing/depth_render.hpp"
+#include "palpate/sensing/kinematics.hpp"
+
+namespace palpate::sensing {
+
+/// Triangles of a shape in its own frame: box and sphere about the origin, cylinder along z about it, as URDF defines them.
+/// Round shapes are drawn around (never inside) the true surface.
+/// @throws Error when a size is not positive or a mesh is empty.
+TriMesh shape_mesh(const RobotShape& shape);
+
+enum class RobotGeometry { visual, collision };
+
+struct RobotMaskOptions {
+  RobotGeometry geometry = RobotGeometry::visual;
+  double joint_std_rad = 0.02 * 3.14159265358979323846 / 180;  ///< encoders: 0.02 degrees (PowerCube modules)
+  double base_std_m = 0;        ///< further error between robot and camera, e.g. of the hand-eye calibration
+  double pose_sigmas = 3;       ///< outline and depth are widened by this many of their standard deviations
+  RenderMaskOptions margins{};  ///< on top of that
+};
+
+class RobotMask {
+ public:
+  /// Shapes of every link as one mesh. A link without geometry of the kind asked for uses the other kind.
+  /// @throws Error as Kinematics and shape_mesh do, or when no link has any geometry.
+  explicit RobotMask(RobotModel robot, RobotMaskOptions options = {});
+
+  const Kinematics& kinematics() const { return kinematics_; }
+  Index triangle_count() const;
+
+  /// What the camera would see of the robot alone. `T_base_root`: where the robot's root link stands in the base frame.
+  DepthImage render(const std::vector<Pose>& link_poses, const Camera& camera, const Pose& T_base_camera,
+                    const Pose& T_base_root = Pose::Identity()) const;
+
+  /// 1 where the frame shows the robot or what it hides.
+  MaskImage mask(const DepthFrame& frame, const std::vector<std::string>& joint_names, const std::vector<double>& joints,
+                 const Pose& T_base_root = Pose::Identity()) const;
+
+ private:
+  Kinematics kinematics_;
+  RobotMaskOptions options_;
+  std::vector<Index> links_;      // those with geometry
+  std::vector<TriMesh> meshes_;   // of them
+  std::vector<Vec3> farthest_m_;  // of them: the vertex farthest from the link's origin
+};
+
+}  // namespace palpate::sensing
