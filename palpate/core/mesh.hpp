@@ -60,6 +60,7 @@ struct Support {
   double pose_std_rad = 0.0;                   ///< clamp: prior on its rotation; 0 = exactly known
   PoseVaries pose_varies = PoseVaries::never;  ///< clamp: one pose in the recording, or one a push, or one a step
   std::string name;
+  std::string source;  ///< file and line, for messages
 };
 
 struct ObjectModel {

@@ -161,6 +161,7 @@ struct Rest {
   double surface_std_m = 0;  ///< slow error of the rest surface (correlated)
   double surface_correlation_m = 0.04;
   std::optional<Triangles> observed_triangles;  ///< the part of the boundary that sensors saw, by node index
+  std::string source;  ///< file and field, for messages
 };
 
 /// One link of a URDF with its shapes; the room `sensing` poses it.
@@ -197,6 +198,7 @@ struct Recording {
   std::vector<Tool> tools;
   Environment environment;
   Rest rest;
+  bool accept_size = false;  ///< lets an object smaller than 1 mm or larger than 10 m pass
   std::vector<Support> supports;
   bool free = false;         ///< `supports: free`
   double density_kg_m3 = 0;  ///< 0 = unknown and not needed

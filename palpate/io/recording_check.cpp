@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+// What can be wrong with a recording whose files could all be read. A wrong unit is noticed by comparing everything with
+// the object's size.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "palpate/io/recording.hpp"
+
+namespace palpate::io {
+namespace {
+
+constexpr double smallest_m = 1e-3, largest_m = 10.0;
+
+/// A length in the unit that people would say it in.
+std::string length(double value_m) {
+  const double size = std::abs(value_m);
+  if (size < 1e-3) return fmt::format("{:.3g} um", value_m * 1e6);
+  if (size < 1) return fmt::format("{:.3g} mm", value_m * 1e3);
+  return fmt::format("{:.3g} m", value_m);
+}
+
+struct Box {
+  Vec3 min = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 max = Vec3::Constant(-std::numeric_limits<double>::infinity());
+  explicit Box(const Points& points) {
+    if (points.rows() == 0) return;
+    min = points.colwise().minCoeff();
+    max = points.colwise().maxCoeff();
+  }
+  Vec3 size() const { return max - min; }
+  Vec3 centre() const { return 0.5 * (min + max); }
+  double diagonal() const { return size().norm(); }
+};
+
+class Checker {
+ public:
+  explicit Checker(const Recording& recording)
+      : recording_(recording),
+        nodes_(recording.rest.volume    ? recording.rest.volume->nodes_m
+               : recording.rest.surface ? recording.rest.surface->vertices_m
+                                        : Points(0, 3)),
+        box_(nodes_) {}
+
+  std::vector<Problem> check() {
+    has_mesh_ = nodes_.rows() > 0;
+    check_size();
+    if (recording_.rest.volume) check_tetrahedra(*recording_.rest.volume);
+    for (const Support& support : recording_.supports) check_support(support);
+    if (!recording_.free && recording_.supports.empty()) {
+      add(recording_.source, "nothing says how the object is held; list 'supports', or write 'supports: free'");
+    }
+    bool observed = false, loaded = false;
+    for (const Push& push : recording_.pushes) {
+      for (const Step& step : push.steps) {
+        for (const Load& load : step.loads) loaded |= check_load(load, step);
+        for (const Observation& observation : step.observations) {
+          observed = true;
+          std::visit([&](const auto& one) { check_observation(one, step); }, observation);
+        }
+      }
+    }
+    check_loads(loaded);
+    if (!observed)
+      add(recording_.source,
+          "no step holds an observation; add what the sensors saw (depth, cloud, markers, travel or wrench)");
+    return std::move(problems_);
+  }
+
+ private:
+  void add(const std::string& where, const std::string& what) { problems_.push_back({where, what}); }
+
+  void check_size() {
+    if (!has_mesh_) return;
+    const double side = box_.size().maxCoeff();
+    if (recording_.accept_size || (side >= smallest_m && side <= largest_m)) return;
+    const std::string guess = side > largest_m ? "is it in millimetres? Add 'scale_to_m: 0.001' to 'rest'"
+                                               : "is its unit right? 'scale_to_m' turns it into metres";
+    add(recording_.rest.source,
+        fmt::format("the object is {} long, objects of 1 mm to 10 m are expected; {} (or 'accept_size: true' if it is so)",
+                    length(side), guess));
+  }
+
+  void check_tetrahedra(const TetMesh& mesh) {
+    Eigen::Index flipped = 0, flat = 0, first = -1;
+    for (Eigen::Index i = 0; i < mesh.tetrahedra.rows(); ++i) {
+      const auto corner = [&](Eigen::Index k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(i, k))); };
+      const Vec3 a = corner(1) - corner(0), b = corner(2) - corner(0), c = corner(3) - corner(0);
+      const double volume = a.cross(b).dot(c), size = std::max({a.norm(), b.norm(), c.norm()});
+      if (volume > 1e-9 * size * size * size) continue;
+      (std::abs(volume) <= 1e-9 * size * size * size ? flat : flipped) += 1;
+      if (first < 0) first = i;
+    }
+    if (flipped + flat > 0) {
+      add(recording_.rest.source, fmt::format("{} of {} tetrahedra are turned inside out and {} are flat, the first is "
+                                              "number {}; swap two corners of each that is turned "
+                                              "(det(x1-x0, x2-x0, x3-x0) must be positive) and remesh where they are flat",
+                                              flipped, mesh.tetrahedra.rows(), flat, first));
+    }
+    if (mesh.tetrahedra.cols() == 10) check_midpoints(mesh);
+  }
+
+  /// Quadratic tetrahedra in another node order have midpoints far from their edges.
+  void check_midpoints(const TetMesh& mesh) {
+    constexpr Eigen::Index edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+    for (Eigen::Index i = 0; i < mesh.tetrahedra.rows(); ++i) {
+      for (Eigen::Index k = 0; k < 6; ++k) {
+        const Vec3 a = mesh.nodes_m.row(mesh.tetrahedra(i, edge[k][0])),
+                   b = mesh.nodes_m.row(mesh.tetrahedra(i, edge[k][1])),
+                   middle = mesh.nodes_m.row(mesh.tetrahedra(i, 4 + k));
+        if ((middle - 0.5 * (a + b)).norm() <= 0.4 * (b - a).norm()) continue;
+        add(recording_.rest.source,
+            fmt::format("node {} of tetrahedron {} is far from the middle of its edge; the nodes are not in the order of "
+                        "the file format",
+                        4 + k, i));
+        return;
+      }
+    }
+  }
+
+  void check_support(const Support& support) {
+    if (!has_mesh_) return;
+    const bool half_space = support.kind == SupportKind::table || support.kind == SupportKind::wall;
+    if (support.select == NodeSelection::plane && !half_space) {
+      const VectorX distance = ((nodes_.rowwise() - support.plane.point_m.transpose()) * support.plane.normal).cwiseAbs();
+      if (distance.minCoeff() > support.tolerance_m) {
+        add(support.source,
+            fmt::format(
+                "no node lies within {} of the plane of '{}', the nearest is {} away; move the plane or raise 'tolerance_m'",
+                length(support.tolerance_m), support.name, length(distance.minCoeff())));
+      }
+    } else if (support.select == NodeSelection::box) {
+      Eigen::Index inside = 0;
+      for (Eigen::Index i = 0; i < nodes_.rows(); ++i) {
+        const auto x = nodes_.row(i).transpose().array();
+        inside += (x >= support.box_min_m.array()).all() && (x <= support.box_max_m.array()).all() ? 1 : 0;
+      }
+      if (inside == 0)
+        add(support.source, fmt::format("no node lies in the box of '{}'; the object reaches from [{}] to [{}]",
+                                        support.name, point(box_.min), point(box_.max)));
+    } else if (half_space) {
+      const double lowest = ((nodes_.rowwise() - support.plane.point_m.transpose()) * support.plane.normal).minCoeff();
+      if (std::abs(lowest) > 0.5 * box_.diagonal()) {
+        add(support.source,
+            fmt::format("the object is {} from '{}'; is the normal on the object's side, and the point in metres?",
+                        length(lowest), support.name));
+      }
+    }
+  }
+
+  static std::string point(const Vec3& x) { return fmt::format("{:.4g}, {:.4g}, {:.4g}", x.x(), x.y(), x.z()); }
+
+  bool check_load(const Load& load, const Step& step) {
+    const bool acts = (load.force_n && load.force_n->norm() > 0) || (load.travel_m && *load.travel_m != 0);
+    if (load.force_n && load.force_n->norm() > 1e5) {
+      add(step.source, fmt::format("the force of '{}' is {:.3g} N; is it in mN?", load.tool, load.force_n->norm()));
+    }
+    if (load.travel_m) check_travel(*load.travel_m, step);
+    const auto tool = std::find_if(recording_.tools.begin(), recording_.tools.end(),
+                                   [&](const Tool& one) { return one.name == load.tool; });
+    const bool has_contact =
+        tool != recording_.tools.end() && tool->shape != ToolShape::vertices && tool->shape != ToolShape::platen;
+    if (acts && has_mesh_ && has_contact) {
+      const double distance = (nodes_.rowwise() - load.contact_m.transpose()).rowwise().norm().minCoeff();
+      if (distance > box_.diagonal()) {
+        add(step.source, fmt::format("contact_m [{}] is {} from the object; it is a point on the rest surface, in metres",
+                                     point(load.contact_m), length(distance)));
+      }
+    }
+    return acts;
+  }
+
+  void check_loads(bool loaded) {
+    if (loaded) return;
+    const bool weight = recording_.environment.gravity_m_s2.norm() > 0 && recording_.density_kg_m3 > 0;
+    if (!weight) {
+      add(recording_.source,
+          "every load is zero and no gravity acts, so nothing deforms the object; give the measured forces, or gravity_m_s2 "
+          "and density_kg_m3");
+    } else if (recording_.rest.state == RestState::under_gravity) {
+      add(recording_.source,
+          "every load is zero and the rest shape already sags under gravity, so nothing deforms it further; add a push, or "
+          "give the stress-free shape");
+    }
+  }
+
+  void check_travel(double travel_m, const Step& step) {
+    if (has_mesh_ && std::abs(travel_m) > 2 * box_.diagonal()) {
+      add(step.source,
+          fmt::format("the travel of {} is larger than the object ({}); is it in millimetres? travel_m is in metres",
+                      length(travel_m), length(box_.diagonal())));
+    }
+  }
+
+  void check_observation(const ToolTravel& travel, const Step& step) { check_travel(travel.travel_m, step); }
+
+  void check_observation(const Wrench& wrench, const Step& step) {
+    if (wrench.force_n.norm() > 1e5)
+      add(step.source, fmt::format("a force of {:.3g} N was observed; is it in mN?", wrench.force_n.norm()));
+  }
+
+  void check_observation(const PointCloud& cloud, const Step& step) {
+    if (!has_mesh_) return;
+    const double diagonal = box_.diagonal(), own = Box(cloud.points_m).diagonal();
+    // The nearest point decides how far a cloud is: it may show the table around the object as well.
+    const double distance = (cloud.points_m.rowwise() - box_.centre().transpose()).rowwise().norm().minCoeff();
+    if (cloud.points_m.rows() > 10 && own < 0.01 * diagonal) {
+      add(step.source,
+          fmt::format("the cloud is {} wide and the object {}; is the cloud's unit metres?", length(own), length(diagonal)));
+    } else if (distance > 3 * diagonal) {
+      add(step.source, fmt::format("the whole cloud is at least {} from the object's centre, which is {} wide; is it in "
+                                   "metres and in the base frame?",
+                                   length(distance), length(diagonal)));
+    } else if (own > 100 * diagonal) {
+      add(step.source,
+          fmt::format("the cloud is {} wide and the object {}; is the cloud in millimetres? It must be in metres",
+                      length(own), length(diagonal)));
+    }
+  }
+
+  void check_observation(const Markers& markers, const Step& step) {
+    if (!has_mesh_) return;
+    for (Eigen::Index i = 0; i < markers.rest_m.rows(); ++i) {
+      for (const auto& [place, what] : {std::pair{markers.rest_m.row(i), "rest"}, {markers.observed_m.row(i), "observed"}}) {
+        const double distance = (Vec3(place) - box_.centre()).norm();
+        if (!(distance > 3 * box_.diagonal())) continue;  // hidden markers are NaN
+        add(step.source,
+            fmt::format("marker '{}' ({}) is {} from the object's centre; is it in metres and in the base frame?",
+                        markers.names[static_cast<std::size_t>(i)], what, length(distance)));
+        return;
+      }
+    }
+  }
+
+  void check_observation(const DepthFrame& frame, const Step& step) {
+    std::vector<float> depths;
+    const bool masked = frame.mask.size() == frame.depth_m.size();
+    for (Eigen::Index i = 0; i < frame.depth_m.size(); ++i) {
+      if (frame.depth_m.data()[i] > 0 && !(masked && frame.mask.data()[i] != 0)) depths.push_back(frame.depth_m.data()[i]);
+    }
+    if (depths.empty()) {
+      add(step.source, "no pixel outside the mask has a depth; non-zero in the mask means invalid");
+      return;
+    }
+    std::sort(depths.begin(), depths.end());
+    const double median = static_cast<double>(depths[depths.size() / 2]);
+    if (median < 0.02 || median > 50) {
+      add(step.source, fmt::format("the median depth is {}; is the camera's 'depth_unit_m' right (0.001 for millimetres)?",
+                                   length(median)));
+      return;
+    }
+    if (!has_mesh_) return;
+    const Pose T_camera_base = frame.T_base_camera.inverse();
+    const Points in_camera =
+        (nodes_ * T_camera_base.linear().transpose()).rowwise() + T_camera_base.translation().transpose();
+    const double near = in_camera.col(2).minCoeff(), far = in_camera.col(2).maxCoeff();
+    if (far <= 0) {
+      add(step.source,
+          "the object lies behind the camera; T_base_camera maps the camera's coordinates into the base frame, was its "
+          "inverse given?");
+    } else if (static_cast<double>(depths.back()) < 0.5 * near || static_cast<double>(depths.front()) > 2 * far) {
+      add(step.source, fmt::format("depths of {} to {} were seen, the object is {} to {} from the camera; check "
+                                   "'depth_unit_m' and 'T_base_camera'",
+                                   length(static_cast<double>(depths.front())), length(static_cast<double>(depths.back())),
+                                   length(near), length(far)));
+    }
+  }
+
+  const Recording& recording_;
+  Points nodes_;
+  Box box_;
+  bool has_mesh_ = false;
+  std::vector<Problem> problems_;
+};
+
+}  // namespace
+
+std::vector<Problem> check_recording(const Recording& recording) { return Checker(recording).check(); }
+
+}  // namespace palpate::io

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "palpate/core/recording.hpp"
+
+namespace palpate::io {
+
+/// Links with their visual and collision shapes and joints of a URDF (ROS wiki, urdf/XML). Meshes are read at once:
+/// `package://NAME/PATH` and relative names are looked for under `mesh_root` (with and without NAME); STL, OBJ and PLY.
+/// Throws Error naming file and line: unknown joint types (floating, planar), links that are not there, two roots, loops.
+RobotModel parse_urdf(std::string_view bytes, const std::string& name, const std::filesystem::path& mesh_root);
+RobotModel read_urdf(const std::filesystem::path& path);
+
+/// The model as a URDF (`STEM.urdf`) and a PLY for each mesh: file name -> bytes.
+std::map<std::string, std::string> urdf_files(const RobotModel& robot, const std::string& stem);
+
+}  // namespace palpate::io
