@@ -209,14 +209,16 @@ class Checker {
     if (cloud.points_m.rows() > 10 && own < 0.01 * diagonal) {
       add(step.source,
           fmt::format("the cloud is {} wide and the object {}; is the cloud's unit metres?", length(own), length(diagonal)));
-    } else if (distance > 3 * diagonal) {
-      add(step.source, fmt::format("the whole cloud is at least {} from the object's centre, which is {} wide; is it in "
-                                   "metres and in the base frame?",
-                                   length(distance), length(diagonal)));
-    } else if (own > 100 * diagonal) {
+    } else if (own > 50 * diagonal) {
       add(step.source,
           fmt::format("the cloud is {} wide and the object {}; is the cloud in millimetres? It must be in metres",
                       length(own), length(diagonal)));
+    } else if (distance > 3 * diagonal) {
+      add(step.source,
+          fmt::format(
+              "the whole cloud is at least {} from the centre of the object, which is {} wide; is it in metres and in "
+              "the base frame?",
+              length(distance), length(diagonal)));
     }
   }
 

@@ -1,0 +1,300 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// Every way in which recordings were seen to be broken: each is an Error that names the file (and the line or field) and the
+// cure.
+#include <gtest/gtest.h>
+
+#include "io/broken_bytes.hpp"
+#include "io/recording_folder.hpp"
+#include "palpate/io/depth_file.hpp"
+#include "palpate/io/recording.hpp"
+
+namespace palpate::io {
+namespace {
+
+using namespace palpate::io::test;
+
+class BrokenRecording : public testing::Test {
+ protected:
+  BrokenRecording() : folder("broken") { put_cube_recording(folder); }
+
+  void change_index(const std::string& from, const std::string& to) {
+    folder.put("recording.yaml", replaced(index_text, from, to));
+  }
+
+  /// The message names `where` and `cure`.
+  void expect_refused(const std::string& where, const std::string& cure) {
+    try {
+      read_recording(folder.path());
+      ADD_FAILURE() << "was accepted";
+    } catch (const Error& error) {
+      EXPECT_NE(error.where().find(where), std::string::npos) << error.what();
+      EXPECT_NE(error.message().find(cure), std::string::npos) << error.what();
+    }
+  }
+
+  void expect_accepted() { EXPECT_NO_THROW(read_recording(folder.path())); }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(BrokenRecording, TheRecordingItselfIsWhole) { expect_accepted(); }
+
+TEST_F(BrokenRecording, NoFolder) {
+  EXPECT_THROW(read_recording(folder.path() / "nowhere"), Error);
+  std::filesystem::remove(folder.path() / "recording.yaml");
+  expect_refused("broken", "recording.yaml");
+}
+
+TEST_F(BrokenRecording, MissingFile) {
+  std::filesystem::remove(folder.path() / "clouds/b.xyz");
+  expect_refused("frames.csv:3: cloud", "there is no file 'clouds/b.xyz'");
+  change_index("rest.msh", "rast.msh");
+  expect_refused("recording.yaml:4: rest.volume_mesh", "there is no file 'rast.msh'");
+}
+
+TEST_F(BrokenRecording, FilesOutsideTheFolder) {
+  change_index("rest.msh", "../rest.msh");
+  expect_refused("recording.yaml:4", "outside the recording's folder");
+  change_index("rest.msh", "/etc/rest.msh");
+  expect_refused("recording.yaml:4", "outside the recording's folder");
+}
+
+TEST_F(BrokenRecording, NotANumber) {
+  folder.put("clouds/b.xyz", cloud_text() + "nan 0 0\n");
+  expect_refused("b.xyz:26", "not finite");
+  put_cube_recording(folder);
+  folder.put("frames.csv", replaced(folder.get("frames.csv"), "0.5,0,-2", "0.5,nan,-2"));
+  expect_refused("frames.csv:3: force_y_n", "not a finite number");
+  put_cube_recording(folder);
+  change_index("sigma_m: 0.0005", "sigma_m: .nan");
+  expect_refused("recording.yaml:16", "not a finite number");
+  put_cube_recording(folder);
+  folder.put("rest.msh", replaced(folder.get("rest.msh"), "0.1", "nan"));
+  expect_refused("rest.msh", "not a finite number");
+}
+
+TEST_F(BrokenRecording, MeshInMillimetres) {
+  MeshData mesh = cube();
+  mesh.points_m *= 1000;
+  folder.put("rest.msh", mesh_format_named("msh22").write(mesh));
+  expect_refused("rest.msh", "scale_to_m: 0.001");
+  change_index("state:", "scale_to_m: 0.001\n  state:");
+  expect_accepted();
+}
+
+TEST_F(BrokenRecording, MeshAThousandTimesTooSmall) {
+  MeshData mesh = cube();
+  mesh.points_m *= 0.001;
+  folder.put("rest.msh", mesh_format_named("msh22").write(mesh));
+  expect_refused("rest.msh", "accept_size: true");
+}
+
+TEST_F(BrokenRecording, ASizeThatIsMeantIsAccepted) {
+  MeshData mesh = cube();
+  mesh.points_m *= 1000;
+  folder.put("rest.msh", mesh_format_named("msh22").write(mesh));
+  folder.put("clouds/a.xyz", cloud_text(1000));
+  folder.put("clouds/b.xyz", cloud_text(990));
+  change_index("rest:", "accept_size: true\nrest:");
+  expect_accepted();
+}
+
+TEST_F(BrokenRecording, CloudInMillimetres) {
+  folder.put("clouds/b.xyz", cloud_text(1000));
+  expect_refused("frames.csv:3", "millimetres");
+  folder.put("clouds/b.xyz", cloud_text(0.001));
+  expect_refused("frames.csv:3", "metres");
+}
+
+constexpr const char* camera_text = R"(cameras:
+  - {name: top, width_px: 8, height_px: 6, fx_px: 10, fy_px: 10, cx_px: 3.5, cy_px: 2.5, depth_unit_m: 0.001,
+     T_base_camera: {position_m: [0.05, 0.05, 0.6], quaternion_xyzw: [1, 0, 0, 0]}, noise: {model: constant, sigma_m: 0.002}}
+pushes:
+  - name: seen
+    steps:
+      - time_s: 0
+        loads: [{tool: tip, force_n: [0, 0, -1]}]
+        observations: [{kind: depth, camera: top, file: depth.png}]
+)";
+
+TEST_F(BrokenRecording, DepthUnitWrongByAThousand) {
+  const std::string with_camera = index_text.substr(0, index_text.find("pushes:")) + camera_text;
+  folder.put("depth.png", depth_png(DepthImage::Constant(6, 8, 0.5f), 0.001));
+  folder.put("recording.yaml", with_camera);
+  expect_accepted();
+  for (const char* unit : {"depth_unit_m: 1", "depth_unit_m: 0.000001"}) {
+    folder.put("recording.yaml", replaced(with_camera, "depth_unit_m: 0.001", unit));
+    expect_refused("recording.yaml:17", "depth_unit_m");
+  }
+}
+
+TEST_F(BrokenRecording, CutOffPng) {
+  const std::string png = depth_png(DepthImage::Constant(6, 8, 0.5f), 0.001);
+  folder.put("recording.yaml", index_text.substr(0, index_text.find("pushes:")) + camera_text);
+  folder.put("depth.png", png.substr(0, png.size() / 2));
+  expect_refused("depth.png", "cut off");
+  folder.put("depth.png", depth_png(DepthImage::Constant(6, 9, 0.5f), 0.001));
+  expect_refused("depth.png", "9 x 6 pixels");
+  folder.put("depth.png", depth_npy(DepthImage::Zero(6, 8)));
+  expect_refused("depth.png", "no pixel");
+}
+
+TEST_F(BrokenRecording, FlippedTetrahedron) {
+  MeshData mesh = cube();
+  std::swap(mesh.tetrahedra(2, 0), mesh.tetrahedra(2, 1));
+  folder.put("rest.msh", mesh_format_named("msh22").write(mesh));
+  expect_refused("rest.msh",
+                 "1 of 5 tetrahedra are turned inside out and 0 are flat, the first is number 2; swap two corners");
+  mesh = cube();
+  mesh.points_m.row(7) = mesh.points_m.row(6);
+  folder.put("rest.msh", mesh_format_named("msh22").write(mesh));
+  expect_refused("rest.msh", "flat");
+}
+
+TEST_F(BrokenRecording, EmptyCloud) {
+  for (const char* bytes : {"", "\n", "# nothing\n"}) {
+    folder.put("clouds/b.xyz", bytes);
+    expect_refused("b.xyz", "empty");
+  }
+}
+
+TEST_F(BrokenRecording, NoSupports) {
+  change_index("supports:\n  - {kind: vertices, file: fixed.csv}\n", "");
+  expect_refused("recording.yaml", "'supports: free'");
+  change_index("supports:\n  - {kind: vertices, file: fixed.csv}\n", "supports: []\n");
+  expect_refused("recording.yaml:6", "'supports: free'");
+  change_index("supports:\n  - {kind: vertices, file: fixed.csv}\n", "supports: free\n");
+  expect_accepted();
+}
+
+TEST_F(BrokenRecording, SupportThatHoldsNothing) {
+  change_index("{kind: vertices, file: fixed.csv}", "{kind: plane, point_m: [0, 0, -0.01], normal: [0, 0, 1]}");
+  expect_refused("recording.yaml:7", "the nearest is 10 mm away");
+  change_index("{kind: vertices, file: fixed.csv}", "{kind: box, min_m: [1, 1, 1], max_m: [2, 2, 2]}");
+  expect_refused("recording.yaml:7", "no node lies in the box");
+}
+
+TEST_F(BrokenRecording, EveryLoadZeroAndNoGravity) {
+  folder.put("frames.csv", replaced(folder.get("frames.csv"), "0.5,0,-2", "0,0,0"));
+  expect_refused("broken", "gravity_m_s2 and density_kg_m3");
+  change_index("tools:", "density_kg_m3: 1000\nenvironment: {gravity_m_s2: [0, 0, -9.81]}\ntools:");
+  expect_accepted();
+  folder.put("recording.yaml", replaced(folder.get("recording.yaml"), "stress_free", "under_gravity"));
+  expect_refused("broken", "stress-free shape");
+}
+
+TEST_F(BrokenRecording, GravityWithoutDensity) {
+  change_index("tools:", "environment: {gravity_m_s2: [0, 0, -9.81]}\ntools:");
+  expect_refused("recording.yaml:8: environment.gravity_m_s2", "density_kg_m3");
+}
+
+TEST_F(BrokenRecording, DuplicateStep) {
+  const std::string frames = folder.get("frames.csv");
+  folder.put("frames.csv", frames + "1,0.5,0,-2,clouds/b.xyz\n");
+  expect_refused("frames.csv:4", "remove one");
+  folder.put("frames.csv", frames + "2,0.5,0,-2,clouds/b.xyz\n");
+  expect_refused("frames.csv:4", "'clouds/b.xyz' is used by");
+  folder.put("clouds/c.xyz", cloud_text(0.97));
+  folder.put("frames.csv", frames + "1,0.5,0,-2,clouds/c.xyz\n");
+  expect_refused("frames.csv:4: time_s", "a step is there twice");
+  folder.put("frames.csv", frames + "0.5,0.5,0,-2,clouds/c.xyz\n");
+  expect_refused("frames.csv:4: time_s", "order the steps by time");
+}
+
+TEST_F(BrokenRecording, UnknownKeys) {
+  change_index("supports:", "suports:");
+  expect_refused("recording.yaml", "is 'suports' in line 7 meant?");
+  change_index("element: tet4", "elemnt: tet4");
+  expect_refused("recording.yaml:10: model.elemnt", "did you mean 'element'?");
+  change_index("element: tet4", "element: tet5");
+  expect_refused("recording.yaml:10: model.element", "did you mean 'tet4'?");
+  change_index("force_relative_std: 0.02", "force_relative: 0.02");
+  expect_refused("recording.yaml:15", "did you mean 'force_relative_std'?");
+  change_index("sigma_m: 0.0005", "sigma_mm: 0.5");
+  expect_refused("recording.yaml:16", "sigma_m");
+  change_index("tool: tip", "tool: tap");
+  expect_refused("recording.yaml:15", "did you mean 'tip'?");
+  change_index("kind: cloud", "kind: clouds");
+  expect_refused("recording.yaml:16", "did you mean 'cloud'?");
+}
+
+TEST_F(BrokenRecording, UnknownColumns) {
+  folder.put("frames.csv", replaced(folder.get("frames.csv"), "force_x_n", "force_x"));
+  expect_refused("frames.csv", "force_x_n");
+  put_cube_recording(folder);
+  folder.put("frames.csv", "time_s,force_x_n,force_y_n,force_z_n,cloud,temperature_c\n0,1,0,0,clouds/a.xyz,20\n");
+  expect_refused("frames.csv:1", "column 'temperature_c' is unknown");
+}
+
+TEST_F(BrokenRecording, DoubledKeysAndBrokenYaml) {
+  change_index("name: cube\n", "name: cube\nname: ball\n");
+  expect_refused("recording.yaml:3", "twice");
+  change_index("  state: stress_free", "  state: [stress_free");
+  expect_refused("recording.yaml:", "YAML");
+  folder.put("recording.yaml", "");
+  expect_refused("recording.yaml", "empty");
+}
+
+TEST_F(BrokenRecording, IndicesOutsideTheMesh) {
+  folder.put("fixed.csv", "0\n1\n8\n");
+  expect_refused("fixed.csv", "vertex 8 is not in the rest mesh, which has 8");
+  put_cube_recording(folder);
+  change_index("vertices: [6, 7]", "vertices: [6, 70]");
+  expect_refused("recording.yaml:9", "vertex 70");
+}
+
+TEST_F(BrokenRecording, WrongWords) {
+  change_index("force_relative_std: 0.02", "force_relative_std: 2 %");
+  expect_refused("recording.yaml:15", "not a number");
+  change_index("force_relative_std: 0.02", "force_relative_std: -0.02");
+  expect_refused("recording.yaml:15", "must not be negative");
+  change_index("palpate-recording/1", "palpate-recording/2");
+  expect_refused("recording.yaml:1: format", "palpate-recording/1");
+}
+
+TEST_F(BrokenRecording, TravelInMillimetres) {
+  change_index("loads: [{tool: tip, force_relative_std: 0.02}]", "loads: [{tool: tip}]");
+  folder.put("recording.yaml",
+             replaced(folder.get("recording.yaml"), "observations: [", "observations: [{kind: travel, sigma_m: 0.001}, "));
+  folder.put(
+      "frames.csv",
+      "time_s,force_x_n,force_y_n,force_z_n,cloud,observed_travel_m\n0,0,0,0,clouds/a.xyz,0\n1,0,0,-2,clouds/b.xyz,4\n");
+  expect_refused("frames.csv:3", "millimetres");
+}
+
+TEST_F(BrokenRecording, AllProblemsAreListed) {
+  folder.put("clouds/b.xyz", cloud_text(1000));
+  MeshData mesh = cube();
+  std::swap(mesh.tetrahedra(2, 0), mesh.tetrahedra(2, 1));
+  folder.put("rest.msh", mesh_format_named("msh22").write(mesh));
+  EXPECT_EQ(check_recording(read_recording_unchecked(folder.path())).size(), 2u);
+  expect_refused("rest.msh", "1 more");
+}
+
+TEST_F(BrokenRecording, DamagedIndexFilesAreSurvived) {
+  const auto read = [&](const std::string& file, const std::string& bytes) {
+    folder.put(file, bytes);
+    try {
+      read_recording(folder.path());
+    } catch (const Error& error) {
+      EXPECT_FALSE(error.where().empty());
+    }
+  };
+  for (const char* file : {"recording.yaml", "frames.csv", "fixed.csv"}) {
+    put_cube_recording(folder);
+    const std::string whole = folder.get(file);
+    for (const std::string& bytes : truncated(whole)) read(file, bytes);
+    for (const std::string& bytes : damaged(whole, 150)) read(file, bytes);
+    for (const std::string& bytes : garbage()) read(file, bytes);
+  }
+}
+
+TEST_F(BrokenRecording, WindowsLineEndsAreFine) {
+  for (const char* file : {"recording.yaml", "frames.csv", "fixed.csv", "clouds/a.xyz"})
+    folder.put(file, with_crlf(folder.get(file)));
+  expect_accepted();
+}
+
+}  // namespace
+}  // namespace palpate::io
