@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// From what was seen or given of an object at rest to something that can be simulated.
+#pragma once
+
+#include "palpate/core/recording.hpp"
+#include "palpate/geometry/tetrahedralise.hpp"
+
+namespace palpate::reconstruction {
+
+struct BuildOptions {
+  geometry::TetrahedraliseOptions mesh;  ///< of a surface that has to be filled
+};
+
+struct BuiltObject {
+  ObjectModel model;
+  geometry::VolumeCheck check;         ///< of model.volume
+  std::optional<double> volume_error;  ///< as in geometry::Tetrahedralisation; empty for a given volume
+  double surface_rms_m = 0;            ///< between given surface and boundary of the volume
+  double hausdorff_m = 0;
+};
+
+/// Fills a surface and ties it to the volume. Supports that are found by their place (plane, table, wall, box) get a
+/// tolerance of a tenth of the boundary's mean edge at least, because the boundary follows the surface only that well.
+/// @throws Error as geometry::tetrahedralise.
+BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options = {},
+                         const OnProgress& progress = {});
+
+/// Takes a volume as it is; its boundary is the surface. @throws Error when an element is inverted or has no volume.
+BuiltObject build_object(const TetMesh& volume, const std::vector<Support>& supports);
+
+}  // namespace palpate::reconstruction
