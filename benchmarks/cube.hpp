@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "palpate/core/mesh.hpp"
+#include "palpate/fem/linear_solver.hpp"
 
 namespace palpate::benchmark_cube {
 
@@ -87,6 +88,18 @@ inline Eigen::SparseMatrix<double> stiffness(const TetMesh& mesh, int n, double 
   Eigen::SparseMatrix<double> lower(3 * free, 3 * free);
   lower.setFromTriplets(entries.begin(), entries.end());
   return lower;
+}
+
+/// Where the free unknowns act.
+inline fem::UnknownPlacement placement(const TetMesh& mesh, int n) {
+  const int held = (n + 1) * (n + 1);
+  const Eigen::Index size = 3 * (mesh.nodes_m.rows() - held);
+  fem::UnknownPlacement result{Points(size, 3), Points::Zero(size, 3)};
+  for (Eigen::Index u = 0; u < size; ++u) {
+    result.point_m.row(u) = mesh.nodes_m.row(u / 3 + held);
+    result.direction(u, u % 3) = 1;
+  }
+  return result;
 }
 
 /// Consistent forces of the disc's pressure, by sampling every top triangle finely.

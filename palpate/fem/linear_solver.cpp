@@ -15,16 +15,16 @@ namespace {
 // Nominal costs in seconds, measured on one 3.6 GHz AVX2/AVX-512 core. Only their proportions matter, and only for choosing.
 constexpr double kDoubleFlops = 40e9, kFloatFlops = 76e9;  // of a factorisation
 constexpr double kSweepBytes = 15e9;                       // of L, both directions of a solve read it
-constexpr double kIterationPerBlock = 5e-9;                // one step of conjugate gradients, per 3 x 3 block
+constexpr double kIterationPerBlock = 4e-9;                // one step of conjugate gradients, per 3 x 3 block
 constexpr double kSetUpPerBlock = 7e-8;                    // values, diagonal inverses and coarse matrix
-constexpr double kAnalysisPerUnknown = 7e-7;               // ordering, a quarter of it: it serves a whole fit
+constexpr double kAnalysisPerUnknown = 2.5e-6;             // ordering and symbolic analysis
 constexpr int kMixedIterations = 4;                        // single precision factor, up to Poisson ratios of 0.49
-constexpr Eigen::Index kAnalyseAtOnceBelow = 12000;        // unknowns: the exact flops are worth the ordering
+constexpr Eigen::Index kAnalyseAtOnceBelow = 3000;         // unknowns: the exact flops are worth the ordering
 
 // Volume meshes of 900 to 600 000 unknowns under nested dissection; thin bodies need less.
 double guessed_flops(double n) { return 7.0 * n * n; }
 double guessed_panel_values(double n) { return 7.6 * std::pow(n, 1.36); }
-double guessed_iterations(double n, bool rigid_motions) { return rigid_motions ? 70.0 : 5.5 * std::cbrt(n); }
+double guessed_iterations(double n, bool rigid_motions) { return rigid_motions ? 60.0 : 5.5 * std::cbrt(n); }
 
 }  // namespace
 
@@ -63,6 +63,7 @@ struct LinearSolver::Impl {
   bool blocks_current = false;
 
   double known_iterations = 0;  // of the last iterative solve, 0: none yet
+  double matrices = 0;          // that have been set
 
   void need_tree() {
     if (!tree) tree = std::make_shared<const FrontTree>(build_front_tree(lower, options.block));
@@ -109,17 +110,17 @@ struct LinearSolver::Impl {
   }
   bool fits(double bytes_a_value) const { return 1.5 * panel_values() * bytes_a_value <= options.memory_limit_bytes; }
 
+  // The analysis serves all matrices: each has to bear its share, as if as many were still to come as have been.
+  double analysis_cost() const { return tree ? 0 : unknowns() * kAnalysisPerUnknown / std::max(1.0, matrices); }
   double direct_cost(double count) const {
     if (factor_state == State::refused || !fits(8)) return std::numeric_limits<double>::infinity();
     const double sweeps = count <= 2 ? count : 3.0 * std::ceil(count / 16.0);
-    const double factorisation =
-        factor_state == State::ready ? 0 : flops() / kDoubleFlops + (tree ? 0 : unknowns() * kAnalysisPerUnknown);
+    const double factorisation = factor_state == State::ready ? 0 : flops() / kDoubleFlops + analysis_cost();
     return factorisation + sweeps * 16.0 * panel_values() / kSweepBytes;
   }
   double mixed_cost(double count) const {
     if (small_state == State::refused || !fits(4)) return std::numeric_limits<double>::infinity();
-    const double factorisation =
-        small_state == State::ready ? 0 : flops() / kFloatFlops + (tree ? 0 : unknowns() * kAnalysisPerUnknown);
+    const double factorisation = small_state == State::ready ? 0 : flops() / kFloatFlops + analysis_cost();
     return factorisation +
            count * kMixedIterations * (8.0 * panel_values() / kSweepBytes + kIterationPerBlock * block_count());
   }
@@ -264,6 +265,7 @@ void LinearSolver::set_matrix(const Eigen::SparseMatrix<double>& lower) {
   }
   std::copy_n(lower.valuePtr(), lower.nonZeros(), impl.lower.valuePtr());
   impl.has_values = true;
+  impl.matrices += 1;
   impl.blocks_current = false;
   impl.factor_state = impl.small_state = impl.rigid_state = Impl::State::stale;
 }

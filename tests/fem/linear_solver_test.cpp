@@ -24,12 +24,7 @@ struct Cube {
     const TetMesh mesh = benchmark_cube::mesh(n);
     lower = benchmark_cube::stiffness(mesh, n, poisson_ratio);
     load = benchmark_cube::disc_load(mesh, n);
-    placement.point_m.resize(lower.cols(), 3);
-    placement.direction = Points::Zero(lower.cols(), 3);
-    for (Eigen::Index u = 0; u < lower.cols(); ++u) {
-      placement.point_m.row(u) = mesh.nodes_m.row(u / 3 + (n + 1) * (n + 1));
-      placement.direction(u, u % 3) = 1;
-    }
+    placement = benchmark_cube::placement(mesh, n);
   }
   double residual(const MatrixX& x) const { return (lower.selfadjointView<Eigen::Lower>() * x - load).norm() / load.norm(); }
   Eigen::SparseMatrix<double> lower;

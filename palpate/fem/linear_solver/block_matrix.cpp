@@ -66,46 +66,60 @@ BlockMatrix::BlockMatrix(const Eigen::SparseMatrix<double>& lower, const Quotien
                          const std::vector<Index>& order) {
   const Index rows = graph.group_count();
   std::vector<Index> row_of(at(rows));
-  for (Index row = 0; row < rows; ++row) row_of[at(order[at(row)])] = row;
   padded_.resize(static_cast<std::size_t>(lower.cols()));
   begin_.resize(at(rows) + 1, 0);
-  diagonal_.resize(at(rows));
-  column_.reserve(graph.neighbour.size() + at(rows));
   for (Index row = 0; row < rows; ++row) {
     const Index g = order[at(row)];
+    row_of[at(g)] = row;
+    begin_[at(row + 1)] = begin_[at(row)] + 1 + graph.begin[at(g + 1)] - graph.begin[at(g)];
     for (Index u = graph.first_unknown[at(g)]; u < graph.first_unknown[at(g + 1)]; ++u) {
       padded_[at(u)] = 3 * row + u - graph.first_unknown[at(g)];
     }
-    column_.push_back(row);
-    for (Index e = graph.begin[at(g)]; e < graph.begin[at(g + 1)]; ++e)
-      column_.push_back(row_of[at(graph.neighbour[at(e)])]);
-    const auto first = column_.begin() + begin_[at(row)];
-    std::sort(first, column_.end());
-    diagonal_[at(row)] = static_cast<Index>(std::lower_bound(first, column_.end(), row) - column_.begin());
-    begin_[at(row + 1)] = static_cast<Index>(column_.size());
+  }
+  // Columns come in ascending order to every row, so rows are sorted without sorting. `entry` says where the block in row
+  // `neighbour[e]` and column g lies, for every edge e of g.
+  diagonal_.resize(at(rows));
+  column_.resize(at(begin_.back()));
+  std::vector<Index> next(begin_.begin(), begin_.end() - 1), entry(graph.neighbour.size());
+  for (Index column = 0; column < rows; ++column) {
+    const Index g = order[at(column)];
+    diagonal_[at(column)] = next[at(column)];
+    column_[at(next[at(column)]++)] = column;
+    for (Index e = graph.begin[at(g)]; e < graph.begin[at(g + 1)]; ++e) {
+      Index& slot = next[at(row_of[at(graph.neighbour[at(e)])])];
+      entry[at(e)] = slot;
+      column_[at(slot++)] = column;
+    }
   }
   values_.assign(9 * column_.size() + 3, 0.0);
 
-  // Unknowns of one node follow each other, so a block is looked up once for up to three entries.
-  const auto offset = [&](Index entry, Index row, Index column) {
-    return 9 * static_cast<std::uint32_t>(entry) + static_cast<std::uint32_t>(3 * (column % 3) + row % 3);
+  // Entries below the diagonal of group g belong to its later neighbours, in the order of the graph; seen from such a
+  // neighbour, its earlier ones come up in the order of the graph as well.
+  const auto offset = [](Index block, Index row, Index column) {
+    return 9 * static_cast<std::uint32_t>(block) + static_cast<std::uint32_t>(3 * (column % 3) + row % 3);
   };
-  const auto find = [&](Index row, Index column) {
-    const auto first = column_.begin() + begin_[at(row)], last = column_.begin() + begin_[at(row + 1)];
-    return static_cast<Index>(std::lower_bound(first, last, column) - column_.begin());
-  };
+  std::vector<Index> earlier(graph.begin.begin(), graph.begin.end() - 1);  // next edge to an earlier neighbour
+  std::vector<Index> edge_of(at(rows), 0);                                 // edge from the present group to a later one
   targets_.resize(static_cast<std::size_t>(lower.nonZeros()));
-  for (Index column = 0; column < lower.cols(); ++column) {
-    const Index c = padded_[at(column)];
-    Index known = -1, direct = 0, mirrored = 0;
-    for (Index e = lower.outerIndexPtr()[column]; e < lower.outerIndexPtr()[column + 1]; ++e) {
-      const Index r = padded_[at(lower.innerIndexPtr()[e])];
-      if (r / 3 != known) {
-        known = r / 3;
-        direct = find(known, c / 3);
-        mirrored = find(c / 3, known);
+  std::vector<Index> mirrored(at(rows), 0);
+  std::vector<Index> group_of(static_cast<std::size_t>(lower.cols()));
+  for (Index g = 0; g < rows; ++g) {
+    for (Index u = graph.first_unknown[at(g)]; u < graph.first_unknown[at(g + 1)]; ++u) group_of[at(u)] = g;
+  }
+  for (Index g = 0; g < rows; ++g) {
+    for (Index e = graph.begin[at(g)]; e < graph.begin[at(g + 1)]; ++e) {
+      const Index other = graph.neighbour[at(e)];
+      if (other < g) continue;
+      edge_of[at(other)] = entry[at(e)];
+      mirrored[at(other)] = entry[at(earlier[at(other)]++)];
+    }
+    edge_of[at(g)] = mirrored[at(g)] = diagonal_[at(row_of[at(g)])];
+    for (Index column = graph.first_unknown[at(g)]; column < graph.first_unknown[at(g + 1)]; ++column) {
+      for (Index e = lower.outerIndexPtr()[column]; e < lower.outerIndexPtr()[column + 1]; ++e) {
+        const Index unknown = lower.innerIndexPtr()[e], other = group_of[at(unknown)];
+        const Index r = padded_[at(unknown)], c = padded_[at(column)];
+        targets_[at(e)] = {offset(edge_of[at(other)], r, c), offset(mirrored[at(other)], c, r)};
       }
-      targets_[at(e)] = {offset(direct, r, c), offset(mirrored, c, r)};
     }
   }
   for (Index row = 0; row < rows; ++row) {

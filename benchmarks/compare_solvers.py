@@ -1,0 +1,278 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Times one linear static analysis of the pressed cube against CalculiX and DOLFINx/PETSc on the same meshes.
+
+The cube has an edge of 0.15 m, n^3 cells of five linear tetrahedra, its bottom is held, a pressure of 10 N in all acts on a
+disc of 25 mm radius at the centre of the top. CalculiX and palpate run as whole processes from the same input deck (read,
+assemble, solve, write); DOLFINx and palpate are compared in process (assemble and solve; DOLFINx' just-in-time compilation,
+its mesh and its sparsity pattern are not counted). Every program runs with one thread; seconds are CPU seconds, the smallest
+of the repeats. Each line also says by how much the displacements differ.
+
+  cmake --preset developer && ninja -C build/developer solve_deck
+  benchmarks/compare_solvers.py build/developer/benchmarks/solve_deck --cells 6 13 27 --poisson 0.3 0.49
+
+Programs that are absent are left out with a word. Options: --repeats, --keep FOLDER, --json FILE.
+"""
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+EDGE, RADIUS, FORCE, YOUNG = 0.15, 0.025, 10.0, 20e3
+ONE_THREAD = dict(os.environ, OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", CCX_NPROC_EQUATION_SOLVER="1")
+
+
+def cube(n):
+    """Nodes (N x 3), tetrahedra (M x 4) with positive volume; five to a cell, alternating parity."""
+    m = n + 1
+    z, y, x = np.meshgrid(*(np.arange(m),) * 3, indexing="ij")
+    nodes = np.stack([x, y, z], -1).reshape(-1, 3) * (EDGE / n)
+    pattern = np.array([[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]])
+    cz, cy, cx = (c.ravel() for c in np.meshgrid(*(np.arange(n),) * 3, indexing="ij"))
+    bits = pattern[None] ^ ((cx + cy + cz) % 2)[:, None, None]
+    tets = ((cz[:, None, None] + (bits >> 2 & 1)) * m + cy[:, None, None] + (bits >> 1 & 1)) * m + cx[:, None, None] + (bits & 1)
+    tets = tets.reshape(-1, 4)
+    corner = nodes[tets]
+    flipped = np.linalg.det(corner[:, 1:] - corner[:, :1]) < 0
+    tets[flipped] = tets[flipped][:, [0, 1, 3, 2]]
+    return nodes, tets
+
+
+def disc_load(nodes, tets, samples=24):
+    """Consistent nodal forces along z of the pressure on the disc (top triangles, sampled finely)."""
+    faces = np.concatenate([tets[:, f] for f in ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])])
+    faces = faces[(nodes[faces][:, :, 2] > EDGE * (1 - 1e-9)).all(1)]
+    weights = np.array([((i + s) / samples, (j + s) / samples, 1 - (i + j + 2 * s) / samples)
+                        for i in range(samples) for j in range(samples - i)
+                        for s in ((1 / 3, 2 / 3) if j < samples - i - 1 else (1 / 3,))])
+    points = np.einsum("sk,fkd->fsd", weights, nodes[faces][:, :, :2])
+    inside = np.hypot(*(points - EDGE / 2).transpose(2, 0, 1)) <= RADIUS
+    load = np.zeros(len(nodes))
+    np.add.at(load, faces, np.einsum("fs,sk->fk", inside.astype(float), weights))
+    return -FORCE * load / load.sum()
+
+
+def write_deck(path, nodes, tets, load, poisson, solver):
+    with open(path, "w") as deck:
+        deck.write("*NODE, NSET=ALL\n")
+        np.savetxt(deck, np.column_stack([np.arange(1, len(nodes) + 1), nodes]), fmt=["%d"] + ["%.12g"] * 3, delimiter=",")
+        deck.write("*ELEMENT, TYPE=C3D4, ELSET=BODY\n")
+        np.savetxt(deck, np.column_stack([np.arange(1, len(tets) + 1), tets + 1]), fmt="%d", delimiter=",")
+        deck.write("*BOUNDARY\n")
+        deck.writelines(f"{i + 1},1,3\n" for i in np.flatnonzero(nodes[:, 2] < 1e-9))
+        deck.write(f"*MATERIAL, NAME=FOAM\n*ELASTIC\n{YOUNG},{poisson}\n*SOLID SECTION, ELSET=BODY, MATERIAL=FOAM\n")
+        deck.write(f"*STEP\n*STATIC{', SOLVER=' + solver if solver else ''}\n*CLOAD\n")
+        deck.writelines(f"{i + 1},3,{load[i]:.15g}\n" for i in np.flatnonzero(load))
+        deck.write("*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
+
+
+def run(command, folder, timeout):
+    """CPU seconds, wall seconds, peak megabytes, stdout of a process."""
+    start, peak = time.monotonic(), 0.0
+    with open(os.path.join(folder, "out.txt"), "wb") as out:
+        process = subprocess.Popen(command, cwd=folder, env=ONE_THREAD, stdout=out, stderr=subprocess.STDOUT)
+        while True:
+            pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+            if pid:
+                break
+            try:  # ru_maxrss would count this interpreter's memory, which the child has until it starts its program
+                with open(f"/proc/{process.pid}/status") as text:
+                    peak = max([peak] + [float(line.split()[1]) / 1024 for line in text if line.startswith("VmHWM")])
+            except (OSError, ValueError):
+                pass
+            if time.monotonic() - start > timeout:
+                process.kill()
+            time.sleep(0.001)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    with open(os.path.join(folder, "out.txt"), errors="replace") as out:
+        text = out.read()
+    if process.returncode != 0:
+        raise RuntimeError(f"{command[0]}: {text.strip().splitlines()[-1] if text.strip() else process.returncode}")
+    return usage.ru_utime + usage.ru_stime, time.monotonic() - start, peak, text
+
+
+def smallest(command, folder, repeats, timeout):
+    return min((run(command, folder, timeout) for _ in range(repeats)), key=lambda result: result[0])
+
+
+def displacements(path, count):
+    """Rows 'node ux uy uz' of a CalculiX .dat file or of solve_deck's table."""
+    u = np.zeros((count, 3))
+    for line in open(path):
+        words = line.split()
+        if len(words) == 4 and words[0].isdigit():
+            u[int(words[0]) - 1] = [float(w) for w in words[1:]]
+    return u
+
+
+def dolfinx_worker(path):
+    """Assembles and solves with PETSc; prints CPU seconds of every solver as JSON."""
+    import dolfinx
+    import ufl
+    from dolfinx import fem
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    case = np.load(path)
+    nodes, tets, load, poisson = case["nodes"], case["tets"], case["load"], float(case["poisson"])
+    domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.tetrahedron, 1))
+    mesh = dolfinx.mesh.create_mesh(MPI.COMM_SELF, tets.astype(np.int64), nodes, domain)
+    space = fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    lame = YOUNG * poisson / ((1 + poisson) * (1 - 2 * poisson)), YOUNG / (2 * (1 + poisson))
+    strain = lambda w: ufl.sym(ufl.grad(w))
+    form = fem.form(ufl.inner(lame[0] * ufl.tr(strain(u)) * ufl.Identity(3) + 2 * lame[1] * strain(u), strain(v)) * ufl.dx)
+    held = fem.locate_dofs_geometrical(space, lambda x: x[2] < 1e-9)
+    bc = fem.dirichletbc(np.zeros(3), held, space)
+    matrix = fem.petsc.create_matrix(form)
+
+    def assemble():
+        matrix.zeroEntries()
+        fem.petsc.assemble_matrix(matrix, form, bcs=[bc])
+        matrix.assemble()
+
+    assemble()  # compiles
+    start = time.process_time()
+    assemble()
+    assembly = time.process_time() - start
+
+    # Degrees of freedom of the nodes as they were given: the first order map of the mesh and of the space agree cell by cell.
+    block_of = np.zeros(len(nodes), dtype=np.int64)
+    geometry = np.asarray(mesh.geometry.dofmap.array).reshape(-1, 4)
+    cells = np.asarray(space.dofmap.list.array).reshape(-1, 4)
+    block_of[np.asarray(mesh.geometry.input_global_indices)[geometry]] = cells
+    b = matrix.createVecLeft()
+    values = np.zeros(3 * len(nodes))
+    values[3 * block_of + 2] = load
+    values.reshape(-1, 3)[held] = 0
+    b.setArray(values)
+    matrix.setBlockSize(3)
+    coordinates = PETSc.Vec().createWithArray(space.tabulate_dof_coordinates().ravel().copy(), bsize=3)
+    matrix.setNearNullSpace(PETSc.NullSpace().createRigidBody(coordinates))
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+
+    solvers = {
+        "CG + Jacobi": dict(ksp_type="cg", pc_type="jacobi"),
+        "CG + ICC": dict(ksp_type="cg", pc_type="icc"),
+        "CG + GAMG": dict(ksp_type="cg", pc_type="gamg"),
+        "MUMPS Cholesky": dict(ksp_type="preonly", pc_type="cholesky", pc_factor_mat_solver_type="mumps"),
+        "CHOLMOD": dict(ksp_type="preonly", pc_type="cholesky", pc_factor_mat_solver_type="cholmod"),
+    }
+    results = {}
+    for name, options in solvers.items():
+        if len(nodes) > 60000 and name in ("MUMPS Cholesky", "CHOLMOD"):
+            continue  # minutes and gigabytes
+        try:
+            ksp = PETSc.KSP().create(MPI.COMM_SELF)
+            for key, value in options.items():
+                PETSc.Options()[key] = value
+            ksp.setOperators(matrix)
+            ksp.setFromOptions()
+            if options["ksp_type"] == "cg":
+                ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+                ksp.setTolerances(rtol=1e-8, max_it=5000)
+            x = b.duplicate()
+            start = time.process_time()
+            ksp.setUp()
+            ksp.solve(b, x)
+            seconds = time.process_time() - start
+            if ksp.getConvergedReason() > 0:
+                results[name] = dict(seconds=seconds, steps=ksp.getIterationNumber())
+                solution = x.getArray().reshape(-1, 3)[block_of]
+            for key in options:
+                PETSc.Options().delValue(key)
+        except PETSc.Error as error:
+            print(f"{name}: {error}", file=sys.stderr)
+    np.save(path + ".u.npy", solution)
+    print(json.dumps(dict(assembly=assembly, solvers=results)))
+
+
+def compare(case, arguments, folder):
+    n, poisson = case
+    nodes, tets = cube(n)
+    load = disc_load(nodes, tets)
+    deck = os.path.join(folder, "cube.inp")
+    write_deck(deck, nodes, tets, load, poisson, "")
+    result = dict(cells=n, tetrahedra=len(tets), poisson=poisson, load_average=os.getloadavg()[0])
+    cpu, wall, memory, text = smallest([os.path.abspath(arguments.solve_deck), deck, "ours.txt"], folder, arguments.repeats,
+                                       arguments.timeout)
+    ours = json.loads(text.strip().splitlines()[-1])
+    u = displacements(os.path.join(folder, "ours.txt"), len(nodes))
+    result["palpate"] = dict(ours, cpu_s=cpu, wall_s=wall, peak_mb=memory)
+    print(f"\n{len(tets)} tetrahedra, nu = {poisson}, load average {result['load_average']:.1f}\n"
+          f"  palpate, whole process         {cpu:9.3f} s {memory:7.0f} MB   {ours['method']}, {ours['steps']} steps")
+
+    if shutil.which("ccx"):
+        for solver in ("SPOOLES", "ITERATIVE SCALING", "ITERATIVE CHOLESKY"):
+            if solver == "SPOOLES" and len(tets) > 200000 and not arguments.patient:
+                continue
+            name = solver.replace(" ", "_").lower()
+            write_deck(os.path.join(folder, name + ".inp"), nodes, tets, load, poisson, solver)
+            try:
+                cpu, wall, memory, _ = smallest(["ccx", "-i", name], folder, arguments.repeats if len(tets) < 50000 else 1,
+                                                arguments.timeout)
+            except RuntimeError as error:
+                print(f"  CalculiX {solver:21} {error}")
+                continue
+            other = displacements(os.path.join(folder, name + ".dat"), len(nodes))
+            difference = np.linalg.norm(other - u) / np.linalg.norm(u)
+            ratio = cpu / result["palpate"]["cpu_s"]
+            result["CalculiX " + solver] = dict(cpu_s=cpu, wall_s=wall, peak_mb=memory, ratio=ratio, difference=difference)
+            print(f"  CalculiX {solver:21} {cpu:9.3f} s {memory:7.0f} MB   {ratio:6.1f} x ours, differs by {difference:.1e}")
+    else:
+        print("  CalculiX: ccx is not installed")
+
+    in_process = ours["assemble_s"] + ours["solve_s"]
+    path = os.path.join(folder, "case.npz")
+    np.savez(path, nodes=nodes, tets=tets, load=load, poisson=poisson)
+    worker = subprocess.run([sys.executable, os.path.abspath(__file__), "--dolfinx-worker", path], env=ONE_THREAD,
+                            capture_output=True, text=True)
+    if worker.returncode != 0:
+        reason = worker.stderr.strip().splitlines()
+        print(f"  DOLFINx: left out ({reason[-1] if reason else 'it crashed'})")
+        return result
+    peer = json.loads(worker.stdout.strip().splitlines()[-1])
+    print(f"  palpate, in process            {in_process:9.3f} s              assemble {ours['assemble_s']:.3f}, solve {ours['solve_s']:.3f}")
+    difference = np.linalg.norm(np.load(path + ".u.npy") - u) / np.linalg.norm(u)
+    for name, solved in peer["solvers"].items():
+        total = peer["assembly"] + solved["seconds"]
+        result["PETSc " + name] = dict(cpu_s=total, ratio=total / in_process, steps=solved["steps"], difference=difference)
+        print(f"  PETSc {name:24} {total:9.3f} s              {total / in_process:6.1f} x ours, assemble "
+              f"{peer['assembly']:.3f}, {solved['steps']} steps")
+    print(f"  (DOLFINx' displacements differ by {difference:.1e})")
+    return result
+
+
+def main():
+    if len(sys.argv) == 3 and sys.argv[1] == "--dolfinx-worker":
+        return dolfinx_worker(sys.argv[2])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("solve_deck", help="the program of benchmarks/solve_deck.cpp")
+    parser.add_argument("--cells", type=int, nargs="+", default=[6, 13, 27], help="cells along an edge (47: 519 115 tetrahedra)")
+    parser.add_argument("--poisson", type=float, nargs="+", default=[0.3, 0.49])
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--timeout", type=float, default=300, help="seconds a process")
+    parser.add_argument("--patient", action="store_true", help="SPOOLES above 200 000 tetrahedra too")
+    parser.add_argument("--keep", help="folder for decks and results (otherwise they are deleted)")
+    parser.add_argument("--json", help="writes all numbers to this file")
+    arguments = parser.parse_args()
+    results = []
+    for case in [(n, poisson) for n in arguments.cells for poisson in arguments.poisson]:
+        with tempfile.TemporaryDirectory() as folder:
+            if arguments.keep:
+                folder = os.path.join(arguments.keep, f"cube_{case[0]}_{case[1]}")
+                os.makedirs(folder, exist_ok=True)
+            results.append(compare(case, arguments, folder))
+    if arguments.json:
+        with open(arguments.json, "w") as file:
+            json.dump(results, file, indent=1)
+
+
+if __name__ == "__main__":
+    main()
