@@ -128,7 +128,23 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     }
   }
   memory_.resize(steps_.size());
-  for (const auto& push : recording.pushes) body_of(push);
+  workers_ = std::clamp<std::size_t>(static_cast<std::size_t>(std::max(options_.threads, 1)), 1, steps_.size());
+  options_.threads = 1;  // steps share the threads, not the solves in them
+  bodies_.resize(workers_);
+  solves_.assign(workers_, 0);
+  for (std::size_t s = 0; s < steps_.size(); ++s) body_of(push(s), worker_of(s));
+}
+
+std::size_t ForwardModel::worker_of(std::size_t s) const {
+  std::size_t worker = 0;
+  while (first_step_of(worker + 1) <= s) ++worker;
+  return worker;
+}
+
+int ForwardModel::solves() const {
+  int sum = 0;
+  for (int n : solves_) sum += n;
+  return sum;
 }
 
 const Step& ForwardModel::step(std::size_t s) const { return push(s).steps[steps_[s].step]; }
@@ -138,8 +154,8 @@ void ForwardModel::forget() {
   for (auto& memory : memory_) memory = Memory{};
 }
 
-ForwardModel::Body& ForwardModel::body_of(const Push& push) {
-  auto& body = bodies_[body_key(push)];
+ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) {
+  auto& body = bodies_[worker][body_key(push)];
   if (body) return *body;
   body = std::make_unique<Body>();
 
@@ -299,7 +315,8 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
 }
 
 StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
-  Body& body = body_of(push(s));
+  const std::size_t worker = worker_of(s);
+  Body& body = body_of(push(s), worker);
   const Coefficients c = coefficients(s, body, unknowns);
   if (body.free_motions.cols() > 0 && c.force.size() > 0) {
     const VectorX load = body.forces * c.force;
@@ -320,15 +337,14 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
       const double change = unknowns(from->columns[k]) - from->unknowns(from->columns[k]);
       if (change != 0) start += change * from->derivative.col(static_cast<Index>(k));
     }
-  } else if (s > 0 && steps_[s - 1].push == steps_[s].push && memory_[s - 1].valid) {
+  } else if (s > first_step_of(worker) && steps_[s - 1].push == steps_[s].push && memory_[s - 1].valid) {
     start = memory_[s - 1].displacement_m;
   }
 
   const double young_pa = std::exp(unknowns(log_young));
   const auto solve = [&](const VectorX* guess) {
     auto at = body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion, guess);
-    ++solves_;
-    factorisations_ += at.factorisations;
+    ++solves_[worker];
     return at;
   };
   fem::Equilibrium at = solve(start.size() > 0 ? &start : nullptr);

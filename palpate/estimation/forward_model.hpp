@@ -59,18 +59,23 @@ class ForwardModel {
   /// @param derivatives  false: surface and converged only (the paper's method differentiates numerically)
   StepPrediction predict(std::size_t s, const VectorX& unknowns, bool derivatives = true);
 
+  /// Several workers may predict at the same time, each on its own contiguous range of steps: first step of worker w (w ==
+  /// workers(): one past the last). Answers depend on the number of workers only through where solves start from.
+  std::size_t first_step_of(std::size_t worker) const { return worker * steps_.size() / workers_; }
+  std::size_t workers() const { return workers_; }
+
   /// Forgets warm starts, so that the next answer does not depend on what was asked before.
   void forget();
 
-  int solves() const { return solves_; }
-  int factorisations() const { return factorisations_; }
+  int solves() const;
 
  private:
   struct Body;         // one Statics: a set of platens and its columns of loads
   struct Coefficients;  // of a step: a, b and their derivatives
   struct Memory;       // of a step: where it was last solved
 
-  Body& body_of(const Push& push);
+  std::size_t worker_of(std::size_t s) const;
+  Body& body_of(const Push& push, std::size_t worker);
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
   RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;
 
@@ -78,7 +83,8 @@ class ForwardModel {
   SimulatedObject object_;
   fem::StaticsOptions options_;
   std::vector<StepIndex> steps_;
-  std::map<std::string, std::unique_ptr<Body>> bodies_;
+  std::size_t workers_ = 1;
+  std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies_;  // a worker: its own solver for each set of platens
   std::vector<Memory> memory_;
 
   Vec3 clamp_pivot_m_ = Vec3::Zero();
@@ -87,7 +93,7 @@ class ForwardModel {
   std::vector<int> tare_, travel_offset_;         // a push: first of three, the one; or -1
   std::vector<Vec3> tare_axis_;                   // a push: zero = three unknowns, else one along this axis
   int force_scale_ = -1, density_ = -1;
-  int solves_ = 0, factorisations_ = 0;
+  std::vector<int> solves_;  // a worker
 };
 
 }  // namespace palpate::estimation

@@ -2,8 +2,11 @@
 #include "palpate/estimation/objective.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <exception>
 #include <limits>
+#include <thread>
 
 #include "palpate/core/error.hpp"
 
@@ -58,19 +61,48 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
   out.gradient = VectorX::Zero(count);
   rows_.assign(model_.step_count(), {});
   predictions_.assign(model_.step_count(), {});
-  for (std::size_t s = 0; s < model_.step_count(); ++s) {
-    if (progress && !progress("fit", static_cast<double>(s) / static_cast<double>(model_.step_count()))) {
-      out.reason = "cancelled";
-      return out;
+  // Every worker solves and linearises its own steps; what follows adds them up in order, so that digits do not depend on
+  // who finished first.
+  std::atomic<std::size_t> done{0};
+  std::atomic<bool> stop{false};
+  std::vector<std::exception_ptr> faults(model_.workers());
+  const auto work = [&](std::size_t worker) {
+    try {
+      for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
+        if (terms_[s].empty() || s % loss.every != loss.every / 2) continue;
+        predictions_[s] = model_.predict(s, unknowns);
+        if (!predictions_[s].converged) stop = true;
+        if (stop) return;
+        for (const auto& term : terms_[s]) rows_[s].push_back(term->rows(predictions_[s], unknowns, loss.along_rays));
+        ++done;
+        // Only the calling thread speaks to the caller.
+        if (worker == 0 && progress && !progress("fit", static_cast<double>(done) / static_cast<double>(model_.step_count()))) {
+          out.reason = "cancelled";
+          stop = true;
+        }
+      }
+    } catch (...) {
+      faults[worker] = std::current_exception();
+      stop = true;
     }
-    if (terms_[s].empty()) continue;
-    predictions_[s] = model_.predict(s, unknowns);
-    if (!predictions_[s].converged) {
+  };
+  std::vector<std::thread> helpers;
+  for (std::size_t worker = 1; worker < model_.workers(); ++worker) helpers.emplace_back(work, worker);
+  work(0);
+  for (auto& helper : helpers) helper.join();
+  for (const auto& fault : faults) {
+    if (fault) std::rethrow_exception(fault);
+  }
+  if (out.reason == "cancelled") return out;
+  for (std::size_t s = 0; s < model_.step_count(); ++s) {
+    if (!predictions_[s].converged && !predictions_[s].reason.empty()) {
       out.reason = "step " + std::to_string(model_.index(s).step) + " of " + model_.push(s).name + ": " + predictions_[s].reason;
       return out;
     }
-    for (const auto& term : terms_[s]) {
-      TermRows rows = term->rows(predictions_[s], unknowns, loss.along_rays);
+  }
+
+  for (std::size_t s = 0; s < model_.step_count(); ++s) {
+    for (const TermRows& rows : rows_[s]) {
       const double relevance = rows.cell.empty() ? 1 : loss.surface_weight;
       VectorX weight = VectorX::Constant(rows.residual.size(), relevance);
       for (Index i = 0; i < rows.residual.size(); ++i) {
@@ -94,7 +126,6 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
           out.hessian(rows.unknowns[a], rows.unknowns[b]) += block(static_cast<Index>(a), static_cast<Index>(b));
         }
       }
-      rows_[s].push_back(std::move(rows));
     }
   }
   for (Index k = 0; k < count; ++k) {

@@ -17,6 +17,7 @@ namespace palpate::estimation {
 struct Loss {
   double tukey = 4.685;    ///< cut of Tukey's biweight in standard deviations, 95 % efficient on clean data
   bool along_rays = true;  ///< depth residuals along the ray (else closest point)
+  std::size_t every = 1;      ///< steps that count: every n-th (the first rounds of a long recording need no more)
   double surface_weight = 1;  ///< of rows with neighbours whose errors are correlated: 1 / variance inflation
 };
 

@@ -8,6 +8,8 @@
 namespace palpate::estimation {
 namespace {
 
+constexpr std::size_t rough_steps = 8;  // of a long recording are enough to come near the optimum
+
 MatrixX pick(const MatrixX& matrix, const std::vector<int>& which) {
   MatrixX out(static_cast<Index>(which.size()), static_cast<Index>(which.size()));
   for (std::size_t a = 0; a < which.size(); ++a) {
@@ -118,6 +120,7 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
   Loss loss = final_loss;
   loss.along_rays = false;
   loss.surface_weight = 1;
+  loss.every = std::max<std::size_t>(1, objective.model().step_count() / rough_steps);
   loss.tukey = 1e6;
   Optimum at;
   at.unknowns = start;
@@ -137,6 +140,13 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
     iterations += at.iterations;
     if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
     loss.tukey = std::max(final_loss.tukey, std::min(loss.tukey / 3, 4 * final_loss.tukey * objective.residual_scale()));
+  }
+  if (loss.every > 1) {  // the optimum of a few steps is where the fit of all of them starts
+    loss.tukey = 2 * final_loss.tukey;
+    at = optimise(objective, at.unknowns, loss, options, progress);
+    iterations += at.iterations;
+    if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
+    loss.every = 1;
   }
   if (final_loss.along_rays) {
     loss.tukey = 2 * final_loss.tukey;
@@ -168,7 +178,9 @@ VectorX find_start(Objective& objective, double poisson_start) {
   model.forget();
 
   const double size_m = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
-  const Loss wide{1e3, false, 1};
+  Loss wide;
+  wide.tukey = 1e3;
+  wide.along_rays = false;
   double best_cost = std::numeric_limits<double>::infinity();
   double best = std::log(1e5);
   for (double decade = 1.5; decade <= 11.5; decade += 0.125) {

@@ -21,8 +21,10 @@ void judge_end(const VerdictInput& in, std::vector<Verdict>& out) {
 void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
   const Unknown& nu = in.objective.unknowns()[poisson];
   if (nu.fixed) return;
+  bool determined = true;
   for (const auto& parameter : in.answer.parameters) {
     if (parameter.name == "poisson_ratio" && !parameter.determined) {
+      determined = false;
       out.push_back({"nu_not_determined",
                      "These pushes hardly determine the Poisson ratio: its interval [" + number(parameter.lower_95) + ", " +
                          number(parameter.upper_95) +
@@ -30,7 +32,7 @@ void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
                          "second side."});
     }
   }
-  if (in.optimum.poisson_at_lower || in.optimum.poisson_at_upper) {
+  if (determined && (in.optimum.poisson_at_lower || in.optimum.poisson_at_upper)) {
     out.push_back({"nu_at_bound", "The best Poisson ratio lies at the end of its allowed range (" +
                                       number(in.optimum.poisson_at_lower ? nu.lower : nu.upper, "{:.4g}") +
                                       "). If the material is not known to be like that, the model or the supports are "
@@ -80,7 +82,12 @@ void judge_nuisances(const VerdictInput& in, std::vector<Verdict>& out) {
 void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
   int inverted = 0;
   for (const auto& prediction : in.objective.last_predictions()) inverted += prediction.inverted_elements;
-  if (inverted > 0) {
+  if (inverted > 0 && in.answer.material == "linear") {
+    out.push_back({"beyond_small_strain",
+                   "In the largest steps " + std::to_string(inverted) +
+                       " elements are strained beyond what small-strain elasticity can describe. Unless the object is known "
+                       "to be linear, fit neo_hookean, or use smaller forces."});
+  } else if (inverted > 0) {
     out.push_back({"inverted_elements", std::to_string(inverted) +
                                             " elements of the simulation are turned inside out: the load is beyond what "
                                             "this material model describes. Use neo_hookean, or smaller forces."});

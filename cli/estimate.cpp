@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// `palpate estimate RECORDING -o OUT`: result.json, model/ and report.html, and the answer in words.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include "cli/verbs.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/identify.hpp"
+#include "palpate/io/recording.hpp"
+#include "palpate/io/result.hpp"
+#include "palpate/report/report.hpp"
+
+namespace palpate::cli {
+namespace {
+
+struct Options {
+  std::filesystem::path recording, out;
+  std::string method = "palpate", material, element, refine;
+  std::vector<double> poisson_range;
+  double poisson_ratio = -2, young_start_pa = 0;
+  int max_iterations = 60;
+  bool budget = false;
+};
+
+/// Seconds a stage, from the progress reports: the library itself reads no clock.
+class StageClock {
+ public:
+  void enter(const std::string& stage) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!stage_.empty()) seconds_[stage_] += std::chrono::duration<double>(now - since_).count();
+    stage_ = stage;
+    since_ = now;
+  }
+  std::map<std::string, double> finish() {
+    enter("");
+    return seconds_;
+  }
+
+ private:
+  std::string stage_;
+  std::chrono::steady_clock::time_point since_{};
+  std::map<std::string, double> seconds_;
+};
+
+IdentifyOptions identify_options(const Options& given, const Session& session) {
+  IdentifyOptions options;
+  options.method = given.method;
+  if (!given.material.empty()) options.material = given.material;
+  if (!given.element.empty()) options.element = given.element;
+  if (!given.refine.empty()) options.refine = given.refine;
+  if (given.poisson_range.size() == 2) options.poisson_range = {given.poisson_range[0], given.poisson_range[1]};
+  if (given.poisson_ratio > -1.5) options.poisson_fixed = given.poisson_ratio;
+  if (given.young_start_pa > 0) options.fit.young_start_pa = given.young_start_pa;
+  options.fit.max_iterations = given.max_iterations;
+  options.fit.threads = session.thread_count();
+  return options;
+}
+
+std::string pascal(double value) {
+  if (value >= 1e6) return fmt::format("{:.4g} MPa", value / 1e6);
+  if (value >= 1e3) return fmt::format("{:.4g} kPa", value / 1e3);
+  return fmt::format("{:.4g} Pa", value);
+}
+
+void tell(Session& session, const Options& given, const Identification& answer) {
+  for (const auto& parameter : answer.parameters) {
+    const bool young = parameter.name == "young_modulus";
+    const auto written = [&](double value) { return young ? pascal(value) : fmt::format("{:.4g}", value); };
+    const std::string label = young ? "Young's modulus E" : parameter.name == "poisson_ratio" ? "Poisson ratio nu" : parameter.name;
+    if (!std::isfinite(parameter.lower_95)) {
+      session.say(fmt::format("{:<18} {}", label, written(parameter.value)));
+      continue;
+    }
+    session.say(fmt::format("{:<18} {}   95 % interval {} to {}{}", label, written(parameter.value), written(parameter.lower_95),
+                            written(parameter.upper_95), parameter.determined ? "" : "   (hardly determined by these data)"));
+  }
+  session.say(fmt::format("fit                rms {:.3g} mm over {} numbers, chi2 per degree of freedom {:.3g}, {} iterations, {} solves",
+                          1e3 * answer.fit.rms_m, answer.fit.points_used, answer.fit.chi2_per_dof, answer.fit.iterations,
+                          answer.fit.solves));
+  if (given.budget) {
+    session.say("error budget       what each input's uncertainty does to E and nu:");
+    for (const auto& entry : answer.budget) {
+      session.say(fmt::format("  {:<24} {:6.2f} % of E   {:.4f} of nu", entry.input, entry.young_modulus_percent, entry.poisson_shift));
+    }
+  }
+  for (const auto& verdict : answer.verdicts) session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
+}
+
+int estimate(Session& session, const Options& given) {
+  StageClock clock;
+  const OnProgress show = session.progress();
+  const OnProgress progress = [&](std::string_view stage, double share) {
+    clock.enter(std::string(stage));
+    return show ? show(stage, share) : true;
+  };
+  progress("read", 0);
+  const Recording recording = io::read_recording(given.recording);
+  for (const auto& warning : recording.warnings) session.warn(warning);
+  Identified found = identify(recording, identify_options(given, session), progress);
+  Identification& answer = found.answer;
+  answer.provenance["seed"] = std::to_string(session.seed);
+  progress("write", 0);
+  if (answer.termination == Termination::cancelled) {
+    session.warn("stopped before the end: nothing was written");
+    return exit_numbers;
+  }
+  answer.timing_s = clock.finish();
+  io::write_result(answer, given.out);
+  io::write_model(answer, found.volume, given.out / "model");
+  report::write_report(answer, &recording, given.out / "report.html");
+  if (!answer.parameters.empty()) tell(session, given, answer);
+  session.say(fmt::format("written            {}", (given.out / "report.html").string()));
+  session.result(io::result_json(answer));
+  return answer.termination == Termination::converged ? exit_done : exit_numbers;
+}
+
+}  // namespace
+
+Run verbs::estimate(CLI::App& app) {
+  auto given = std::make_shared<Options>();
+  app.add_option("recording", given->recording, "folder of the recording")->required();
+  app.add_option("-o,--out", given->out, "folder for result.json, model/ and report.html")->required();
+  app.add_option("--method", given->method, "palpate, or paper: the algorithm of Frank et al. 2010 as a baseline")
+      ->check(CLI::IsMember({"palpate", "paper"}));
+  app.add_option("--material", given->material, "material law (overrides the recording's)");
+  app.add_option("--element", given->element, "tet4, tet10 or auto (overrides the recording's)")
+      ->check(CLI::IsMember({"tet4", "tet10", "auto"}));
+  app.add_option("--refine", given->refine, "none or auto: finer under the tool (overrides the recording's)")
+      ->check(CLI::IsMember({"none", "auto"}));
+  app.add_option("--poisson-range", given->poisson_range, "range of the uniform prior on nu, e.g. 0.3 0.4995")->expected(2);
+  app.add_option("--poisson-ratio", given->poisson_ratio, "take nu as known");
+  app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)");
+  app.add_option("--max-iterations", given->max_iterations, "most iterations of the fit")->check(CLI::PositiveNumber);
+  app.add_flag("--budget", given->budget, "print what each input's uncertainty does to E and nu");
+  return [given](Session& session) { return estimate(session, *given); };
+}
+
+}  // namespace palpate::cli
