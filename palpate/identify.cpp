@@ -2,16 +2,20 @@
 #include "palpate/identify.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/version.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/plane_mask.hpp"
 
 namespace palpate {
 namespace {
+
+constexpr Index default_tetrahedra = 3000;
 
 /// Corners of quadratic tetrahedra alone, renumbered only if midpoints stood between them.
 TetMesh to_linear(const TetMesh& mesh) {
@@ -29,6 +33,22 @@ TetMesh to_linear(const TetMesh& mesh) {
   }
   linear.nodes_m = mesh.nodes_m.topRows(corners);
   return linear;
+}
+
+/// Volume mesh of a recording that gives a surface; planes and boxes of its supports then have to find nodes of a mesh that
+/// follows the surface, so their tolerance becomes a share of its edges.
+void fill_with_tetrahedra(Recording& recording) {
+  if (!recording.rest.surface) {
+    throw Error("give the object's shape as rest.volume_mesh or rest.surface_mesh", "rest");
+  }
+  geometry::TetrahedraliseOptions options;
+  options.tetrahedra = default_tetrahedra;
+  auto filled = geometry::tetrahedralise(*recording.rest.surface, options);
+  for (const auto& warning : filled.warnings) recording.warnings.push_back(warning.message);
+  const double edge_m = std::cbrt(6 * std::sqrt(2.0) * filled.check.volume_m3 / static_cast<double>(filled.mesh.tetrahedra.rows()));
+  for (auto& support : recording.supports) support.tolerance_m = std::max(support.tolerance_m, 0.1 * edge_m);
+  recording.rest.volume = std::move(filled.mesh);
+  recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
 }
 
 std::map<std::string, std::string> provenance(const Recording& recording, const IdentifyOptions& options) {
@@ -94,7 +114,7 @@ estimation::Inputs observe(const Recording& recording) {
 }
 
 estimation::SimulatedObject build_simulated_object(Recording& recording) {
-  if (!recording.rest.volume) throw Error("a volume mesh is needed", "rest.volume_mesh");
+  if (!recording.rest.volume) fill_with_tetrahedra(recording);
   const TetMesh& given = *recording.rest.volume;
   estimation::SimulatedObject object;
   object.material = recording.model.material;
