@@ -37,6 +37,14 @@ json json_of(const Nuisance& n) {
           {"pull", number(n.pull)}};
 }
 
+json json_of(const BudgetEntry& entry) {
+  return {{"input", entry.input},
+          {"young_modulus_percent", number(entry.young_modulus_percent)},
+          {"poisson_shift", number(entry.poisson_shift)}};
+}
+
+json json_of(const Verdict& verdict) { return {{"code", verdict.code}, {"message", verdict.message}}; }
+
 template <class Range>
 json list_of(const Range& range) {
   json list = json::array();
@@ -54,14 +62,6 @@ std::string word(Termination termination) {
   }
   return "failed";
 }
-
-json json_of(const BudgetEntry& entry) {
-  return {{"input", entry.input},
-          {"young_modulus_percent", number(entry.young_modulus_percent)},
-          {"poisson_shift", number(entry.poisson_shift)}};
-}
-
-json json_of(const Verdict& verdict) { return {{"code", verdict.code}, {"message", verdict.message}}; }
 
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
