@@ -16,8 +16,8 @@ target_compile_definitions(palpate PUBLIC EIGEN_MPL2_ONLY)
 target_include_directories(palpate PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}>
                                           $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_include_directories(palpate PRIVATE ${METIS_INCLUDE_DIR})
-target_link_libraries(palpate PUBLIC Eigen3::Eigen Threads::Threads
-                              PRIVATE yaml-cpp nlohmann_json::nlohmann_json PNG::PNG ZLIB::ZLIB fmt::fmt ${METIS_LIBRARY})
+target_link_libraries(palpate PUBLIC Eigen3::Eigen Threads::Threads nlohmann_json::nlohmann_json
+                              PRIVATE yaml-cpp PNG::PNG ZLIB::ZLIB fmt::fmt ${METIS_LIBRARY})
 
 # Flags of our own code only, never exported to guests.
 add_library(palpate_flags INTERFACE)

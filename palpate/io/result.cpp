@@ -1,132 +1,172 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/io/result.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
+#include "palpate/io/npy.hpp"
+#include "palpate/io/result_parts.hpp"
 
 namespace palpate::io {
 namespace {
 
-using nlohmann::json;
+namespace fs = std::filesystem;
 
-json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
-
-json json_of(const Parameter& p) {
-  return {{"name", p.name},
-          {"region", p.region},
-          {"unit", p.unit},
-          {"value", number(p.value)},
-          {"std", number(p.std)},
-          {"lower_95", number(p.lower_95)},
-          {"upper_95", number(p.upper_95)},
-          {"determined", p.determined}};
+void make_folder(const fs::path& folder) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (!fs::is_directory(folder, code)) throw Error("cannot be made; check the name and the permissions", folder.string());
 }
 
-json json_of(const Nuisance& n) {
-  return {{"name", n.name},
-          {"unit", n.unit},
-          {"value", number(n.value)},
-          {"std", number(n.std)},
-          {"lower_95", number(n.lower_95)},
-          {"upper_95", number(n.upper_95)},
-          {"prior_std", number(n.prior_std)},
-          {"pull", number(n.pull)}};
+fs::path step_file(const fs::path& folder, std::size_t step, const char* what) {
+  return folder / "fit" / fmt::format("step_{:04}_{}.npy", step + 1, what);
 }
 
-json json_of(const BudgetEntry& entry) {
-  return {{"input", entry.input},
-          {"young_modulus_percent", number(entry.young_modulus_percent)},
-          {"poisson_shift", number(entry.poisson_shift)}};
-}
-
-json json_of(const Verdict& verdict) { return {{"code", verdict.code}, {"message", verdict.message}}; }
-
-template <class Range>
-json list_of(const Range& range) {
-  json list = json::array();
-  for (const auto& each : range) list.push_back(json_of(each));
-  return list;
-}
-
-std::string word(Termination termination) {
-  switch (termination) {
-    case Termination::converged: return "converged";
-    case Termination::max_iterations: return "max_iterations";
-    case Termination::cancelled: return "cancelled";
-    case Termination::no_progress: return "no_progress";
-    case Termination::failed: return "failed";
+/// What simulators take from an answer; NaN where it has no such parameter.
+double value_of(const Identification& answer, const char* name) {
+  for (const Parameter& one : answer.parameters) {
+    if (one.name == name && one.region.empty()) return one.value;
   }
-  return "failed";
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw Error("the folder cannot be made (" + error.message() + "); give another one", folder.string());
+/// Faces that belong to one tetrahedron alone, corners only, outward.
+Triangles boundary_of(const TetMesh& mesh) {
+  constexpr int faces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  std::map<std::array<Index, 3>, std::pair<std::array<Index, 3>, int>> seen;
+  for (Eigen::Index i = 0; i < mesh.tetrahedra.rows(); ++i) {
+    for (const auto& face : faces) {
+      const std::array<Index, 3> corners = {mesh.tetrahedra(i, face[0]), mesh.tetrahedra(i, face[1]),
+                                            mesh.tetrahedra(i, face[2])};
+      std::array<Index, 3> key = corners;
+      std::sort(key.begin(), key.end());
+      auto& entry = seen[key];
+      entry.first = corners;
+      entry.second += 1;
+    }
+  }
+  std::vector<Index> flat;
+  for (const auto& [key, entry] : seen) {
+    if (entry.second == 1) flat.insert(flat.end(), entry.first.begin(), entry.first.end());
+  }
+  return Eigen::Map<const Triangles>(flat.data(), static_cast<Eigen::Index>(flat.size() / 3), 3);
+}
+
+/// The surface alone, with its own numbering.
+MeshData surface_of(const TetMesh& mesh) {
+  MeshData surface;
+  const Triangles faces = boundary_of(mesh);
+  std::vector<Index> row(static_cast<std::size_t>(mesh.nodes_m.rows()), -1);
+  Index count = 0;
+  surface.triangles.resize(faces.rows(), 3);
+  for (Eigen::Index i = 0; i < faces.size(); ++i) {
+    Index& place = row[static_cast<std::size_t>(faces.data()[i])];
+    if (place < 0) place = count++;
+    surface.triangles.data()[i] = place;
+  }
+  surface.points_m.resize(count, 3);
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    if (row[i] >= 0) surface.points_m.row(row[i]) = mesh.nodes_m.row(static_cast<Eigen::Index>(i));
+  }
+  return surface;
 }
 
 }  // namespace
 
-json result_json(const Identification& answer) {
-  json covariance = json::array();
-  for (Index r = 0; r < answer.covariance.rows(); ++r) {
-    json row = json::array();
-    for (Index c = 0; c < answer.covariance.cols(); ++c) row.push_back(number(answer.covariance(r, c)));
-    covariance.push_back(row);
+void write_result(const Identification& answer, const fs::path& folder) {
+  make_folder(folder);
+  std::error_code code;
+  fs::remove_all(folder / "fit", code);  // of an earlier result
+  if (answer.surface.triangles.rows() > 0) {
+    make_folder(folder / "fit");
+    write_mesh(folder / "fit" / "surface.ply", answer.surface);
+    for (std::size_t i = 0; i < answer.steps.size(); ++i) {
+      const StepFit& step = answer.steps[i];
+      const auto put = [&](const char* what, const MatrixX& values) {
+        if (values.size() > 0) write_file(step_file(folder, i, what), npy_bytes(values));
+      };
+      put("surface_m", step.surface_m);
+      put("observed_m", step.observed_m);
+      put("residual_m", step.residual_m);
+      put("von_mises_pa", step.von_mises_pa);
+    }
   }
-  const HeldOut& held = answer.prediction;
-  json prediction = {{"available", held.available}};
-  if (held.available) {
-    prediction.update({{"held_out", held.what},
-                       {"force_error", number(held.force_error)},
-                       {"surface_rms_m", number(held.surface_rms_m)},
-                       {"baseline_no_deformation_rms_m", number(held.baseline_no_deformation_rms_m)},
-                       {"baseline_last_step_rms_m", number(held.baseline_last_step_rms_m)}});
-  }
-  return {{"format", "palpate-result/1"},
-          {"method", answer.method},
-          {"material", answer.material},
-          {"parameters", list_of(answer.parameters)},
-          {"covariance", {{"of", {"log young_modulus", "poisson_ratio"}}, {"matrix", covariance}}},
-          {"nuisances", list_of(answer.nuisances)},
-          {"verdicts", list_of(answer.verdicts)},
-          {"fit",
-           {{"rms_m", number(answer.fit.rms_m)},
-            {"chi2_per_dof", number(answer.fit.chi2_per_dof)},
-            {"points_used", answer.fit.points_used},
-            {"pushes", answer.fit.pushes},
-            {"steps", answer.fit.steps},
-            {"iterations", answer.fit.iterations},
-            {"solves", answer.fit.solves}}},
-          {"prediction", prediction},
-          {"budget", list_of(answer.budget)},
-          {"per_push", list_of(answer.per_push)},
-          {"termination", word(answer.termination)},
-          {"message", answer.message},
-          {"provenance", answer.provenance},
-          {"timing_s", answer.timing_s}};
+  // Last: who finds a result.json finds all that belongs to it.
+  write_file(folder / "result.json",
+             result_json(answer).dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
-void write_result(const Identification& answer, const std::filesystem::path& folder) {
-  make_folder(folder);
-  write_file(folder / "result.json", result_json(answer).dump(2) + "\n");
+Identification read_result(const fs::path& given) {
+  std::error_code code;
+  const bool is_file = fs::is_regular_file(given, code);
+  const fs::path folder = is_file ? given.parent_path() : given;
+  const fs::path index = is_file ? given : folder / "result.json";
+  Identification answer = parse_result(read_file(index), index.string());
+  if (!fs::exists(folder / "fit" / "surface.ply", code)) return answer;
+  answer.surface = read_tri_mesh(folder / "fit" / "surface.ply");
+  for (std::size_t i = 0; i < answer.steps.size(); ++i) {
+    const auto get = [&](const char* what, Eigen::Index columns) -> MatrixX {
+      const fs::path file = step_file(folder, i, what);
+      if (!fs::exists(file, code)) return MatrixX(0, columns);
+      MatrixX values = parse_npy(read_file(file), file.string());
+      if (values.cols() != columns)
+        throw Error("has " + std::to_string(values.cols()) + " columns, " + std::to_string(columns) + " are expected",
+                    file.string());
+      return values;
+    };
+    StepFit& step = answer.steps[i];
+    step.surface_m = get("surface_m", 3);
+    step.observed_m = get("observed_m", 3);
+    step.residual_m = get("residual_m", 1);
+    step.von_mises_pa = get("von_mises_pa", 1);
+  }
+  return answer;
 }
 
-void write_model(const Identification& answer, const TetMesh& volume, const std::filesystem::path& folder) {
+void write_model(const Identification& answer, const TetMesh& volume, const fs::path& folder) {
   make_folder(folder);
-  write_mesh(folder / "mesh.vtu", volume);
-  write_mesh(folder / "mesh.msh", volume);
-  json parameters = json::object();
-  for (const auto& parameter : answer.parameters) parameters[parameter.name] = number(parameter.value);
-  const json material = {{"format", "palpate-material/1"},
-                         {"law", answer.material},
-                         {"small_strain", parameters},
-                         {"units", {{"young_modulus", "Pa"}, {"poisson_ratio", "1"}}}};
-  write_file(folder / "material.json", material.dump(2) + "\n");
+  const double young = value_of(answer, "young_modulus"), poisson = value_of(answer, "poisson_ratio");
+  MeshData mesh;
+  mesh.points_m = volume.nodes_m;
+  mesh.tetrahedra = volume.tetrahedra;
+  if (std::isfinite(young)) mesh.cell_fields["young_modulus_pa"] = MatrixX::Constant(volume.tetrahedra.rows(), 1, young);
+  if (std::isfinite(poisson)) mesh.cell_fields["poisson_ratio"] = MatrixX::Constant(volume.tetrahedra.rows(), 1, poisson);
+  write_mesh(folder / "object.vtu", mesh);
+  write_mesh(folder / "object.msh", mesh);
+  write_mesh(folder / "surface.obj", surface_of(volume));
+
+  const nlohmann::json whole = result_json(answer);
+  nlohmann::json material;
+  material["format"] = "palpate-material/1";
+  material["law"] = answer.material;
+  material["parameters"] = whole["parameters"];
+  if (std::isfinite(young) && std::isfinite(poisson) && poisson < 0.5) {
+    material["young_modulus_pa"] = young;
+    material["poisson_ratio"] = poisson;
+    material["shear_modulus_pa"] = young / (2 * (1 + poisson));
+    material["lame_lambda_pa"] = young * poisson / ((1 + poisson) * (1 - 2 * poisson));
+    material["bulk_modulus_pa"] = young / (3 * (1 - 2 * poisson));
+  }
+  for (const Nuisance& one : answer.nuisances) {
+    if (one.name == "density") material["density_kg_m3"] = one.value;
+  }
+  material["verdicts"] = whole["verdicts"];
+  material["mesh"] = {{"file", "object.vtu"},
+                      {"nodes", volume.nodes_m.rows()},
+                      {"tetrahedra", volume.tetrahedra.rows()},
+                      {"element", volume.tetrahedra.cols() == 10 ? "tet10" : "tet4"},
+                      {"unit", "m"}};
+  write_file(folder / "material.json", material.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace palpate::io

@@ -1,22 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers on disk: result.json and the simulation-ready model.
+// What an identification leaves behind: result.json for programs, model/ for simulators, fit/ for figures.
 #pragma once
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 
 #include "palpate/core/identification.hpp"
-#include "palpate/core/mesh.hpp"
 
 namespace palpate::io {
 
-/// The object of result.json (format palpate-result/1). What was not measured (NaN) is null.
+/// The object of result.json (docs/result-format.md). Numbers that are not known are NaN here and null in the file.
 nlohmann::json result_json(const Identification& answer);
 
-/// Writes FOLDER/result.json, whole or not at all; makes the folder. @throws Error when it cannot be written.
+/// Writes FOLDER/result.json and FOLDER/fit/ (the rest surface as PLY; of each step the deformed surface, observed points,
+/// residuals and stress as .npy), so that `read_result` gives everything back. Throws Error when that cannot be written.
 void write_result(const Identification& answer, const std::filesystem::path& folder);
 
-/// Writes FOLDER/mesh.vtu, mesh.msh and material.json (small-strain E, nu, law): what a simulator needs.
+/// Reads what write_result wrote; `folder` may also be the result.json itself. Surfaces and points come back in single
+/// precision, and empty when fit/ is not there. Throws Error naming file and key.
+Identification read_result(const std::filesystem::path& folder);
+
+/// A simulation-ready model: FOLDER/object.vtu and object.msh (mesh; E and nu as cell data), surface.obj, and material.json
+/// (law, small-strain E and nu with intervals, Lame parameters, bulk modulus, density if the answer knows it).
 void write_model(const Identification& answer, const TetMesh& volume, const std::filesystem::path& folder);
 
 }  // namespace palpate::io

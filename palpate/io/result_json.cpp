@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+// result.json, written and read: each noun has its pair of functions side by side, so that no field is forgotten in one.
+#include <array>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "palpate/core/error.hpp"
+#include "palpate/io/result.hpp"
+#include "palpate/io/result_parts.hpp"
+
+namespace palpate::io {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* format_name = "palpate-result/1";
+constexpr std::array<std::pair<const char*, Termination>, 5> termination_names = {
+    {{"converged", Termination::converged},
+     {"max_iterations", Termination::max_iterations},
+     {"cancelled", Termination::cancelled},
+     {"no_progress", Termination::no_progress},
+     {"failed", Termination::failed}}};
+
+/// JSON knows no NaN and no infinity.
+json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+double number(const json& value) { return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>(); }
+double number_at(const json& object, const char* key) { return number(object.at(key)); }
+
+template <typename Vector>
+json list(const Vector& values) {
+  json result = json::array();
+  for (Eigen::Index i = 0; i < values.size(); ++i) result.push_back(number(values[i]));
+  return result;
+}
+VectorX vector_from(const json& values) {
+  VectorX result(static_cast<Eigen::Index>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i) result[static_cast<Eigen::Index>(i)] = number(values[i]);
+  return result;
+}
+Vec3 vec3_from(const json& values) {
+  const VectorX result = vector_from(values);
+  if (result.size() != 3) throw Error("three numbers are expected");
+  return result;
+}
+
+json rows(const MatrixX& matrix) {
+  json result = json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) result.push_back(list(VectorX(matrix.row(i))));
+  return result;
+}
+MatrixX matrix_from(const json& values) {
+  if (values.empty()) return {};
+  MatrixX result(static_cast<Eigen::Index>(values.size()), static_cast<Eigen::Index>(values[0].size()));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const VectorX row = vector_from(values[i]);
+    if (row.size() != result.cols()) throw Error("the rows of a matrix differ in length");
+    result.row(static_cast<Eigen::Index>(i)) = row;
+  }
+  return result;
+}
+
+json from(const Parameter& one) {
+  return {{"name", one.name},
+          {"region", one.region},
+          {"unit", one.unit},
+          {"value", number(one.value)},
+          {"std", number(one.std)},
+          {"lower_95", number(one.lower_95)},
+          {"upper_95", number(one.upper_95)},
+          {"determined", one.determined}};
+}
+Parameter parameter_from(const json& object) {
+  return {object.at("name"),
+          object.at("region"),
+          object.at("unit"),
+          number_at(object, "value"),
+          number_at(object, "std"),
+          number_at(object, "lower_95"),
+          number_at(object, "upper_95"),
+          object.at("determined")};
+}
+
+json from(const Nuisance& one) {
+  return {{"name", one.name},
+          {"unit", one.unit},
+          {"value", number(one.value)},
+          {"std", number(one.std)},
+          {"lower_95", number(one.lower_95)},
+          {"upper_95", number(one.upper_95)},
+          {"prior_std", number(one.prior_std)},
+          {"pull", number(one.pull)}};
+}
+Nuisance nuisance_from(const json& object) {
+  return {object.at("name"),
+          object.at("unit"),
+          number_at(object, "value"),
+          number_at(object, "std"),
+          number_at(object, "lower_95"),
+          number_at(object, "upper_95"),
+          number_at(object, "prior_std"),
+          number_at(object, "pull")};
+}
+
+json from(const Verdict& one) { return {{"code", one.code}, {"message", one.message}}; }
+Verdict verdict_from(const json& object) { return {object.at("code"), object.at("message")}; }
+
+json from(const FitSummary& fit) {
+  return {{"rms_m", number(fit.rms_m)},
+          {"chi2_per_dof", number(fit.chi2_per_dof)},
+          {"points_used", fit.points_used},
+          {"pushes", fit.pushes},
+          {"steps", fit.steps},
+          {"iterations", fit.iterations},
+          {"solves", fit.solves}};
+}
+FitSummary fit_from(const json& object) {
+  FitSummary fit;
+  fit.rms_m = number_at(object, "rms_m");
+  fit.chi2_per_dof = number_at(object, "chi2_per_dof");
+  fit.points_used = object.at("points_used");
+  fit.pushes = object.at("pushes");
+  fit.steps = object.at("steps");
+  fit.iterations = object.at("iterations");
+  fit.solves = object.at("solves");
+  return fit;
+}
+
+json from(const HeldOut& one) {
+  return {{"available", one.available},
+          {"what", one.what},
+          {"force_error", number(one.force_error)},
+          {"surface_rms_m", number(one.surface_rms_m)},
+          {"baseline_no_deformation_rms_m", number(one.baseline_no_deformation_rms_m)},
+          {"baseline_last_step_rms_m", number(one.baseline_last_step_rms_m)}};
+}
+HeldOut held_out_from(const json& object) {
+  return {object.at("available"),
+          object.at("what"),
+          number_at(object, "force_error"),
+          number_at(object, "surface_rms_m"),
+          number_at(object, "baseline_no_deformation_rms_m"),
+          number_at(object, "baseline_last_step_rms_m")};
+}
+
+json from(const BudgetEntry& one) {
+  return {{"input", one.input},
+          {"young_modulus_percent", number(one.young_modulus_percent)},
+          {"poisson_shift", number(one.poisson_shift)}};
+}
+BudgetEntry budget_from(const json& object) {
+  return {object.at("input"), number_at(object, "young_modulus_percent"), number_at(object, "poisson_shift")};
+}
+
+json from(const StepFit& one) {
+  return {{"push", one.push},
+          {"step", one.step},
+          {"used", one.used},
+          {"force_n", list(one.force_n)},
+          {"contact_m", list(one.contact_m)},
+          {"tool_radius_m", number(one.tool_radius_m)},
+          {"travel_m", number(one.travel_m)},
+          {"travel_predicted_m", number(one.travel_predicted_m)},
+          {"force_measured_n", number(one.force_measured_n)},
+          {"force_predicted_n", number(one.force_predicted_n)},
+          {"force_predicted_std_n", number(one.force_predicted_std_n)}};
+}
+StepFit step_from(const json& object) {
+  StepFit step;
+  step.push = object.at("push");
+  step.step = object.at("step");
+  step.used = object.at("used");
+  step.force_n = vec3_from(object.at("force_n"));
+  step.contact_m = vec3_from(object.at("contact_m"));
+  step.tool_radius_m = number_at(object, "tool_radius_m");
+  step.travel_m = number_at(object, "travel_m");
+  step.travel_predicted_m = number_at(object, "travel_predicted_m");
+  step.force_measured_n = number_at(object, "force_measured_n");
+  step.force_predicted_n = number_at(object, "force_predicted_n");
+  step.force_predicted_std_n = number_at(object, "force_predicted_std_n");
+  return step;
+}
+
+json from(const FitIteration& one) {
+  return {{"young_modulus_pa", number(one.young_modulus_pa)},
+          {"poisson_ratio", number(one.poisson_ratio)},
+          {"cost", number(one.cost)}};
+}
+FitIteration iteration_from(const json& object) {
+  return {number_at(object, "young_modulus_pa"), number_at(object, "poisson_ratio"), number_at(object, "cost")};
+}
+
+template <typename T>
+json array_from(const std::vector<T>& items) {
+  json result = json::array();
+  for (const T& item : items) result.push_back(from(item));
+  return result;
+}
+template <typename Read>
+auto all_of(const json& array, Read read) {
+  std::vector<decltype(read(array))> result;
+  for (const json& item : array) result.push_back(read(item));
+  return result;
+}
+
+}  // namespace
+
+json result_json(const Identification& answer) {
+  json object;
+  object["format"] = format_name;
+  object["method"] = answer.method;
+  object["material"] = answer.material;
+  object["parameters"] = array_from(answer.parameters);
+  object["nuisances"] = array_from(answer.nuisances);
+  object["covariance"] = rows(answer.covariance);
+  object["verdicts"] = array_from(answer.verdicts);
+  object["fit"] = from(answer.fit);
+  object["prediction"] = from(answer.prediction);
+  object["budget"] = array_from(answer.budget);
+  object["per_push"] = array_from(answer.per_push);
+  object["termination"] = "failed";
+  for (const auto& [name, value] : termination_names) {
+    if (value == answer.termination) object["termination"] = name;
+  }
+  object["message"] = answer.message;
+  object["provenance"] = answer.provenance;
+  object["timing_s"] = json::object();
+  for (const auto& [stage, seconds] : answer.timing_s) object["timing_s"][stage] = number(seconds);
+  object["steps"] = array_from(answer.steps);
+  object["posterior"] = {{"young_modulus_pa", list(answer.posterior.young_modulus_pa)},
+                         {"poisson_ratio", list(answer.posterior.poisson_ratio)},
+                         {"density", rows(answer.posterior.density)}};
+  object["trace"] = array_from(answer.trace);
+  return object;
+}
+
+Identification parse_result(const std::string& bytes, const std::string& name) {
+  try {
+    const json object = json::parse(bytes);
+    if (object.at("format") != format_name) {
+      throw Error("its format is not " + std::string(format_name), name + ": format");
+    }
+    Identification answer;
+    answer.method = object.at("method");
+    answer.material = object.at("material");
+    answer.parameters = all_of(object.at("parameters"), parameter_from);
+    answer.nuisances = all_of(object.at("nuisances"), nuisance_from);
+    answer.covariance = matrix_from(object.at("covariance"));
+    answer.verdicts = all_of(object.at("verdicts"), verdict_from);
+    answer.fit = fit_from(object.at("fit"));
+    answer.prediction = held_out_from(object.at("prediction"));
+    answer.budget = all_of(object.at("budget"), budget_from);
+    answer.per_push = all_of(object.at("per_push"), parameter_from);
+    for (const auto& [word, value] : termination_names) {
+      if (object.at("termination") == word) answer.termination = value;
+    }
+    answer.message = object.at("message");
+    answer.provenance = object.at("provenance").get<std::map<std::string, std::string>>();
+    for (const auto& [stage, seconds] : object.at("timing_s").items()) answer.timing_s[stage] = number(seconds);
+    answer.steps = all_of(object.at("steps"), step_from);
+    answer.posterior.young_modulus_pa = vector_from(object.at("posterior").at("young_modulus_pa"));
+    answer.posterior.poisson_ratio = vector_from(object.at("posterior").at("poisson_ratio"));
+    answer.posterior.density = matrix_from(object.at("posterior").at("density"));
+    answer.trace = all_of(object.at("trace"), iteration_from);
+    return answer;
+  } catch (const json::exception& problem) {
+    throw Error(std::string("is not a whole result of this version (") + problem.what() +
+                    "); write it again with `palpate estimate`",
+                name);
+  } catch (const Error& error) {
+    throw Error(error.message(), error.where().empty() ? name : error.where());
+  }
+}
+
+}  // namespace palpate::io
