@@ -30,7 +30,7 @@ VectorX multiply(const BlockPattern& pattern, const BlockValues& values, const E
   return y;
 }
 
-Assembly::Assembly(const TetMesh& mesh) {
+Assembly::Assembly(const TetMesh& mesh, Dilatation dilatation) {
   const Index n = static_cast<Index>(mesh.nodes_m.rows());
   const Index elements = static_cast<Index>(mesh.tetrahedra.rows());
   const int nodes = static_cast<int>(mesh.tetrahedra.cols());
@@ -79,6 +79,7 @@ Assembly::Assembly(const TetMesh& mesh) {
       volume_ += volume;
     }
   }
+  if (dilatation == Dilatation::averaged) build_patches();
   build_pattern();
 }
 
@@ -89,6 +90,9 @@ void Assembly::build_pattern() {
   for (Index e = 0; e < connectivity_.rows(); ++e)
     for (int b = 0; b < nodes; ++b)
       for (int a = b + 1; a < nodes; ++a) rows[connectivity_(e, b)].push_back(connectivity_(e, a));
+  for (const Patch& patch : patches_)
+    for (std::size_t b = 0; b < patch.nodes.size(); ++b)
+      for (std::size_t a = b + 1; a < patch.nodes.size(); ++a) rows[patch.nodes[b]].push_back(patch.nodes[a]);
   pattern_.column_start.assign(1, 0);
   for (Index j = 0; j < n; ++j) {
     auto& r = rows[j];
@@ -98,15 +102,19 @@ void Assembly::build_pattern() {
     pattern_.row.insert(pattern_.row.end(), r.begin(), r.end());
     pattern_.column_start.push_back(static_cast<Index>(pattern_.row.size()));
   }
+  const auto find_block = [this](Index i, Index j) {
+    const auto begin = pattern_.row.begin() + pattern_.column_start[j],
+               end = pattern_.row.begin() + pattern_.column_start[j + 1];
+    return static_cast<Index>(std::lower_bound(begin, end, i) - pattern_.row.begin());
+  };
   block_of_.reserve(static_cast<std::size_t>(connectivity_.rows()) * nodes * (nodes + 1) / 2);
   for (Index e = 0; e < connectivity_.rows(); ++e)
-    for (int b = 0; b < nodes; ++b) {
-      const Index j = connectivity_(e, b);
-      const auto begin = pattern_.row.begin() + pattern_.column_start[j],
-                 end = pattern_.row.begin() + pattern_.column_start[j + 1];
-      for (int a = b; a < nodes; ++a)
-        block_of_.push_back(static_cast<Index>(std::lower_bound(begin, end, connectivity_(e, a)) - pattern_.row.begin()));
-    }
+    for (int b = 0; b < nodes; ++b)
+      for (int a = b; a < nodes; ++a) block_of_.push_back(find_block(connectivity_(e, a), connectivity_(e, b)));
+  for (Patch& patch : patches_)
+    for (std::size_t b = 0; b < patch.nodes.size(); ++b)
+      for (std::size_t a = b; a < patch.nodes.size(); ++a)
+        patch.blocks.push_back(find_block(patch.nodes[a], patch.nodes[b]));
 }
 
 // Calls function(element, gradients (N x 3), weight, displacement gradient) at every quadrature point until it returns
@@ -127,6 +135,21 @@ void Assembly::for_each_point(const VectorX& u, Function&& function) const {
   }
 }
 
+// Fills mean_ with theta averaged over each patch. False: this law or this assembly averages nothing.
+template <int N, int Q>
+bool Assembly::average_dilatation(const MaterialLaw& law, const Moduli& m, const VectorX& u) const {
+  VolumetricPart part;
+  if (patches_.empty() || !law.volumetric_part(m, Mat3::Zero(), false, part)) return false;
+  mean_.assign(patches_.size(), 0.0);
+  for_each_point<N, Q>(u, [&](Index e, const auto&, double weight, const Mat3& h) {
+    law.volumetric_part(m, h, false, part);
+    mean_[patch_of_[e]] += weight * part.theta;
+    return true;
+  });
+  for (std::size_t p = 0; p < patches_.size(); ++p) mean_[p] /= patches_[p].volume;
+  return true;
+}
+
 template <int N, int Q>
 double Assembly::energy_and_forces_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, VectorX& forces,
                                       int* inverted) const {
@@ -135,11 +158,19 @@ double Assembly::energy_and_forces_of(const MaterialLaw& law, const Moduli& m, c
   Index last_inverted = -1;
   if (inverted) *inverted = 0;
   Mat3 stress;
+  VolumetricPart part;
+  const bool averaged = average_dilatation<N, Q>(law, m, u);
   for_each_point<N, Q>(u, [&](Index e, const auto& g, double weight, const Mat3& h) {
-    const double density = law.energy_and_stress(m, h, stress);
+    double density = law.energy_and_stress(m, h, stress);
     if (!(density < std::numeric_limits<double>::infinity())) {
       energy = std::numeric_limits<double>::infinity();
       return false;
+    }
+    if (averaged) {
+      law.volumetric_part(m, h, false, part);
+      const double mean = mean_[patch_of_[e]];
+      stress += part.modulus * (mean - part.theta) * part.gradient;
+      density += 0.5 * part.modulus * (mean * mean - part.theta * part.theta);
     }
     energy += weight * density;
     const Eigen::Matrix<double, 3, N> f = (weight * stress) * g.transpose();
@@ -158,11 +189,24 @@ void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX
   blocks.assign(9 * static_cast<std::size_t>(pattern_.block_count()), 0.0);
   constexpr int kPairs = N * (N + 1) / 2;
   alignas(64) double local[kPairs * 9];
+  const bool averaged = average_dilatation<N, Q>(law, m, u);
+  std::vector<VectorX> volume_gradient(averaged ? patches_.size() : 0);
+  for (std::size_t p = 0; p < volume_gradient.size(); ++p)
+    volume_gradient[p].setZero(3 * static_cast<Index>(patches_[p].nodes.size()));
+  VolumetricPart part;
   int point = 0;
   Mat9 c;
   for_each_point<N, Q>(u, [&](Index e, const auto& g, double weight, const Mat3& h) {
     if (point == 0) std::fill(local, local + kPairs * 9, 0.0);
     law.tangent(m, h, c);
+    if (averaged) {
+      law.volumetric_part(m, h, true, part);
+      c += part.modulus * (mean_[patch_of_[e]] - part.theta) * part.hessian;
+      c.noalias() -= part.modulus * as_vector(part.gradient) * as_vector(part.gradient).transpose();
+      VectorX& sum = volume_gradient[patch_of_[e]];
+      for (int a = 0; a < N; ++a)
+        sum.segment<3>(3 * slot_[static_cast<std::size_t>(e) * N + a]) += weight * part.gradient * g.row(a).transpose();
+    }
     c *= weight;
     double* block = local;
     for (int b = 0; b < N; ++b) {
@@ -184,13 +228,22 @@ void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX
     }
     return true;
   });
+  for (std::size_t p = 0; p < volume_gradient.size(); ++p) {
+    const VectorX& v = volume_gradient[p];
+    const double scale = part.modulus / patches_[p].volume;
+    const Index* target = patches_[p].blocks.data();
+    for (Index b = 0; b < v.size(); b += 3)
+      for (Index a = b; a < v.size(); a += 3)
+        Eigen::Map<Mat3>(&blocks[9 * static_cast<std::size_t>(*target++)]).noalias() +=
+            scale * v.segment<3>(a) * v.segment<3>(b).transpose();
+  }
 }
 
 template <typename Stress>
 VectorX Assembly::forces_of(const VectorX& u, Stress&& stress) const {
   VectorX forces = VectorX::Zero(u.size());
   const auto add = [&](Index e, const auto& g, double weight, const Mat3& h) {
-    const Mat3 p = weight * stress(h);
+    const Mat3 p = weight * stress(e, h);
     for (int a = 0; a < g.rows(); ++a) forces.segment<3>(3 * connectivity_(e, a)) += p * g.row(a).transpose();
     return true;
   };
@@ -215,11 +268,22 @@ void Assembly::tangent(const MaterialLaw& law, const Moduli& m, const VectorX& u
 }
 
 VectorX Assembly::forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const {
-  return forces_of(u, [&](const Mat3& h) { return law.stress_d_poisson(m, h); });
+  const bool averaged =
+      connectivity_.cols() == 4 ? average_dilatation<4, 1>(law, m, u) : average_dilatation<10, 4>(law, m, u);
+  return forces_of(u, [&](Index e, const Mat3& h) {
+    Mat3 stress = law.stress_d_poisson(m, h);
+    if (averaged) {
+      VolumetricPart part;
+      law.volumetric_part(m, h, false, part);
+      stress += part.modulus_d_poisson * (mean_[patch_of_[e]] - part.theta) * part.gradient;
+    }
+    return stress;
+  });
 }
 
+// Further parameters never enter a volumetric part (VolumetricPart knows only its derivative to nu).
 VectorX Assembly::forces_d_extra(const MaterialLaw& law, const Moduli& m, const VectorX& u, int index) const {
-  return forces_of(u, [&](const Mat3& h) { return law.stress_d_extra(m, h, index); });
+  return forces_of(u, [&](Index, const Mat3& h) { return law.stress_d_extra(m, h, index); });
 }
 
 }  // namespace palpate::fem

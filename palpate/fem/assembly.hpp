@@ -8,6 +8,7 @@
 #include "palpate/core/math.hpp"
 #include "palpate/core/mesh.hpp"
 #include "palpate/fem/materials.hpp"
+#include "palpate/fem/statics.hpp"
 
 namespace palpate::fem {
 
@@ -27,7 +28,7 @@ VectorX multiply(const BlockPattern& pattern, const BlockValues& values, const E
 class Assembly {
  public:
   /// @throws Error on indices out of range, an inside-out or degenerate element, or a column count other than 4 or 10.
-  explicit Assembly(const TetMesh& mesh);
+  explicit Assembly(const TetMesh& mesh, Dilatation dilatation = Dilatation::pointwise);
 
   Index node_count() const { return pattern_.nodes; }
   Index element_count() const { return static_cast<Index>(connectivity_.rows()); }
@@ -57,8 +58,11 @@ class Assembly {
   void tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
   template <typename Stress>
   VectorX forces_of(const VectorX& u, Stress&& stress) const;
+  template <int N, int Q>
+  bool average_dilatation(const MaterialLaw& law, const Moduli& m, const VectorX& u) const;
 
   void build_pattern();
+  void build_patches();
 
   Tetrahedra connectivity_;        // nodes of an element in ascending order: local block a >= b is then a lower block
   std::vector<double> gradients_;  // element, quadrature point, node, 3
@@ -66,6 +70,17 @@ class Assembly {
   std::vector<Index> block_of_;    // element, pairs a >= b
   BlockPattern pattern_;
   double volume_ = 0;
+
+  // Patches over which theta is averaged (empty: pointwise).
+  struct Patch {
+    std::vector<Index> nodes;   // ascending
+    std::vector<Index> blocks;  // pairs a >= b of its nodes, as in block_of_
+    double volume = 0;
+  };
+  std::vector<Patch> patches_;
+  std::vector<Index> patch_of_;       // element
+  std::vector<Index> slot_;           // element, node: its place in the patch's nodes
+  mutable std::vector<double> mean_;  // theta of each patch, scratch
 };
 
 }  // namespace palpate::fem

@@ -63,7 +63,7 @@ struct Statics::Impl {
       : mesh(mesh_in),
         law(material_law(material)),
         options(options_in),
-        assembly(mesh_in),
+        assembly(mesh_in, options_in.dilatation),
         boundary(checked(mesh_in, std::move(boundary_in))),
         free(boundary.inertia_relief),
         system(assembly.pattern(), boundary.constraints,

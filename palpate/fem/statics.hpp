@@ -34,7 +34,14 @@ struct Boundary {
   bool inertia_relief = false;          ///< free object: rigid motions projected out, no constraints
 };
 
+/// How the part of an energy that locks near nu = 0.5 is integrated.
+enum class Dilatation {
+  pointwise,  ///< as the law says: plain linear or quadratic tetrahedra
+  averaged,   ///< the volume change is averaged over each quadratic tetrahedron, or over patches of linear ones around nodes
+};
+
 struct StaticsOptions {
+  Dilatation dilatation = Dilatation::pointwise;
   double residual_tolerance = 1e-9;  ///< on free dofs, relative to the largest of external and internal force norms
   int max_newton_steps = 60;
   int max_load_steps = 400;  ///< in the continuation that is started when plain Newton fails

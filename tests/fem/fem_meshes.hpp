@@ -13,7 +13,7 @@
 namespace palpate::fem {
 
 /// nx x ny x nz cells of 5 tetrahedra each (alternating parity), from the origin to `size_m`.
-inline TetMesh block_mesh(int nx, int ny, int nz, const Vec3& size_m) {
+inline TetMesh block_mesh(int nx, int ny, int nz, const Vec3& size_m, int parity = 0) {
   TetMesh mesh;
   const auto id = [&](int i, int j, int k) { return (k * (ny + 1) + j) * (nx + 1) + i; };
   mesh.nodes_m.resize((nx + 1) * (ny + 1) * (nz + 1), 3);
@@ -30,7 +30,7 @@ inline TetMesh block_mesh(int nx, int ny, int nz, const Vec3& size_m) {
       for (int i = 0; i < nx; ++i) {
         const Index corner[8] = {id(i, j, k),     id(i + 1, j, k),     id(i, j + 1, k),     id(i + 1, j + 1, k),
                                  id(i, j, k + 1), id(i + 1, j, k + 1), id(i, j + 1, k + 1), id(i + 1, j + 1, k + 1)};
-        for (const auto& t : (i + j + k) % 2 == 0 ? even : odd) {
+        for (const auto& t : (i + j + k + parity) % 2 == 0 ? even : odd) {
           Index node[4] = {corner[t[0]], corner[t[1]], corner[t[2]], corner[t[3]]};
           Mat3 edges;
           for (int a = 0; a < 3; ++a) edges.col(a) = (mesh.nodes_m.row(node[a + 1]) - mesh.nodes_m.row(node[0])).transpose();
