@@ -21,10 +21,10 @@ struct PosedMesh {
 DepthImage render_depth(const std::vector<PosedMesh>& bodies, const Camera& camera, const Pose& T_base_camera);
 
 struct RenderMaskOptions {
-  double depth_margin_m = 0.005;    ///< constant part of the tolerance between measured and rendered depth
-  double depth_sigmas = 4.0;        ///< plus this many standard deviations of the sensor at that depth
-  double lateral_margin_m = 0.001;  ///< error of the body's pose across the view: its outline is widened by it
-  double lateral_margin_px = 1.5;   ///< and by this, for pixels that mix body and background
+  double depth_margin_m = 0.005;   ///< constant part of the tolerance between measured and rendered depth
+  double depth_sigmas = 4.0;       ///< plus this many standard deviations of the sensor at that depth
+  double lateral_margin_m = 0.0;   ///< error of the body's pose across the view: its outline is widened by it
+  double lateral_margin_px = 1.0;  ///< and by this, for pixels that mix body and background
 };
 
 /// @throws Error naming the option that is out of range.

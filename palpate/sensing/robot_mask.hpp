@@ -23,7 +23,7 @@ struct RobotMaskOptions {
   RobotGeometry geometry = RobotGeometry::visual;
   double joint_std_rad = 0.02 * 3.14159265358979323846 / 180;  ///< encoders: 0.02 degrees (PowerCube modules)
   double base_std_m = 0;        ///< further error between robot and camera, e.g. of the hand-eye calibration
-  double pose_sigmas = 3;       ///< outline and depth are widened by this many of their standard deviations
+  double pose_sigmas = 2;       ///< outline and depth are widened by this many of their standard deviations
   RenderMaskOptions margins{};  ///< on top of that
 };
 
