@@ -138,7 +138,8 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   loss.tukey = options.tukey_cut;
   OptimiseOptions optimiser;
   optimiser.max_iterations = options.max_iterations;
-  Optimum optimum = optimise_annealed(objective, start, loss, optimiser, progress);
+  Optimum optimum = optimise_from_several(objective, start, loss, optimiser, progress);
+  loss = optimum.loss;
 
   Identification answer;
   answer.material = object.material;
@@ -202,6 +203,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   objective.evaluate(optimum.unknowns, loss);  // the last evaluation is the optimum again: verdicts look at it
   answer.fit.solves = model.solves();
   answer.verdicts = judge({recording, objective, optimum, residuals, answer});
+  answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   return answer;
 }

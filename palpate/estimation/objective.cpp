@@ -205,8 +205,11 @@ ResidualSummary Objective::summarise(const Loss& loss) const {
     }
   }
   if (cells > 0 && total > 0) {
-    summary.variance_inflation =
-        std::max(1.0, (between / static_cast<double>(cells)) / (total / static_cast<double>(in_cells)));
+    // Mean squares between and within cells, in units of the stated variance: where residuals are far smaller than that,
+    // their pattern says nothing about the sensor.
+    const double mean_square = total / static_cast<double>(in_cells);
+    const double excess = between / static_cast<double>(cells) - mean_square;
+    summary.variance_inflation = 1 + std::max(0.0, excess) / std::max(1.0, mean_square);
   }
   return summary;
 }

@@ -148,6 +148,8 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
     if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
     loss.every = 1;
   }
+  // Where the model does not fit, the cut follows the residuals' spread: a fit that calls everything an outlier has no say.
+  const Loss last = fitting_loss(objective, final_loss);
   if (final_loss.along_rays) {
     loss.tukey = 2 * final_loss.tukey;
     loss.along_rays = true;
@@ -155,9 +157,42 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
     iterations += at.iterations;
     if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
   }
-  at = optimise(objective, at.unknowns, final_loss, options, progress);
+  at = optimise(objective, at.unknowns, last, options, progress);
   at.iterations += iterations;
+  at.loss = last;
   return at;
+}
+
+Optimum optimise_from_several(Objective& objective, const VectorX& start, const Loss& final_loss, const OptimiseOptions& options,
+                              const OnProgress& progress) {
+  constexpr double misfit = 1.5;  // robust spread of the residuals in standard deviations
+  Optimum best = optimise_annealed(objective, start, final_loss, options, progress);
+  if (best.termination == Termination::cancelled) return best;
+  double spread = best.evaluation.usable ? objective.residual_scale() : std::numeric_limits<double>::infinity();
+  if (spread < misfit) return best;
+  for (double factor : {0.25, 4.0}) {
+    VectorX other = start;
+    other(log_young) += std::log(factor);
+    objective.model().forget();
+    Optimum candidate = optimise_annealed(objective, other, final_loss, options, progress);
+    if (candidate.termination == Termination::cancelled) return candidate;
+    candidate.iterations += best.iterations;
+    if (candidate.evaluation.usable && objective.residual_scale() < spread) {
+      spread = objective.residual_scale();
+      best = std::move(candidate);
+    }
+  }
+  if (best.evaluation.usable) {  // the last evaluation is the answer's again
+    objective.model().forget();
+    best.evaluation = objective.evaluate(best.unknowns, best.loss, progress);
+  }
+  return best;
+}
+
+Loss fitting_loss(const Objective& objective, const Loss& loss) {
+  Loss wider = loss;
+  wider.tukey = loss.tukey * std::max(1.0, objective.residual_scale());
+  return wider;
 }
 
 VectorX find_start(Objective& objective, double poisson_start) {

@@ -18,6 +18,7 @@ struct Optimum {
   std::string message;
   int iterations = 0;
   bool poisson_at_lower = false, poisson_at_upper = false;
+  Loss loss;  ///< that it is the optimum of
 };
 
 /// Levenberg-Marquardt in log E, nu (kept inside its bounds by an active set) and all nuisances that are not fixed.
@@ -27,6 +28,15 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
 /// Whole way from a start: closest points with a wide robust loss first, then tightened to `final_loss`.
 Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss& final_loss, const OptimiseOptions& options,
                           const OnProgress& progress);
+
+/// The same; where the result does not fit although sigma is known, from starts a factor of four softer and stiffer as well
+/// (poses and E trade against each other when the shape is far off). The best one counts.
+Optimum optimise_from_several(Objective& objective, const VectorX& start, const Loss& final_loss, const OptimiseOptions& options,
+                              const OnProgress& progress);
+
+/// `loss` with its cut widened by the robust spread of the last evaluation's residuals where that exceeds the sensors' sigma.
+/// The spread only says what counts as an outlier; weights and intervals keep the sensors' sigma.
+Loss fitting_loss(const Objective& objective, const Loss& loss);
 
 /// A start for log E from solutions at one guess: displacements of an elastic body scale with 1/E, reactions with E. Every
 /// other unknown starts at its prior mean. Nothing but the data decides: a grid over fourteen decades is searched.

@@ -18,6 +18,12 @@ class CloudTerm : public Term {
     sigma_m_ = cloud.sigma_m.size() == 1 ? VectorX::Constant(points_m_.rows(), cloud.sigma_m(0)).eval() : cloud.sigma_m;
     centre_m_ = points_m_.colwise().mean();
     typical_ = sigma_m_.mean();
+    // Neighbours may err together: cells of a tenth of the object.
+    const double cell_m = 0.1 * (rest.vertices_m.colwise().maxCoeff() - rest.vertices_m.colwise().minCoeff()).norm();
+    for (Index i = 0; i < points_m_.rows(); ++i) {
+      const Eigen::Array3d at = ((points_m_.row(i).transpose() - centre_m_) / cell_m).array().floor() + 512;
+      cell_.push_back(static_cast<int>(at(0)) + 1024 * (static_cast<int>(at(1)) + 1024 * static_cast<int>(at(2))));
+    }
   }
 
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool) const override {
@@ -35,6 +41,7 @@ class CloudTerm : public Term {
     rows.jacobian.resize(points_m_.rows(), static_cast<Index>(rows.unknowns.size()));
     rows.residual.resize(points_m_.rows());
     rows.sigma = sigma_m_;
+    rows.cell = cell_;
     rows.observed_m.resize(points_m_.rows(), 3);
     rows.robust = true;
     rows.unit = "m";
@@ -65,6 +72,7 @@ class CloudTerm : public Term {
  private:
   Points points_m_;
   VectorX sigma_m_;
+  std::vector<int> cell_;
   Vec3 centre_m_ = Vec3::Zero();
   double typical_ = 0;
   int pose_;
