@@ -67,7 +67,8 @@ ForwardModel::~ForwardModel() = default;
 
 ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options)
     : recording_(&recording), object_(std::move(object)), options_(options) {
-  unknowns.add({"young_modulus", "log Pa", 0, std::numeric_limits<double>::infinity()});
+  // From a hundredth of a pascal to diamond: beyond that the fit has lost its way.
+  unknowns.add({"young_modulus", "log Pa", 0, std::numeric_limits<double>::infinity(), std::log(1e-2), std::log(1.2e12)});
   unknowns.add({"poisson_ratio", "1", 0, std::numeric_limits<double>::infinity(), recording.model.poisson_lower,
                 recording.model.poisson_upper});
   force_scale_ = unknowns.add_block("force_scale", "1", recording.force_scale_std, {""});

@@ -103,7 +103,8 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
 
   for (std::size_t s = 0; s < model_.step_count(); ++s) {
     for (const TermRows& rows : rows_[s]) {
-      const double relevance = rows.cell.empty() ? 1 : loss.surface_weight;
+      double relevance = rows.cell.empty() ? 1 : loss.surface_weight;
+      if (rows.robust) relevance /= loss.widening * loss.widening;
       VectorX weight = VectorX::Constant(rows.residual.size(), relevance);
       for (Index i = 0; i < rows.residual.size(); ++i) {
         if (rows.robust) {

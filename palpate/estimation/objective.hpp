@@ -16,6 +16,7 @@ namespace palpate::estimation {
 /// How residuals are weighed in one evaluation.
 struct Loss {
   double tukey = 4.685;    ///< cut of Tukey's biweight in standard deviations, 95 % efficient on clean data
+  double widening = 1;     ///< cut over the final cut while annealing: sigma of robust rows grows with it, priors do not
   bool along_rays = true;  ///< depth residuals along the ray (else closest point)
   std::size_t every = 1;      ///< steps that count: every n-th (the first rounds of a long recording need no more)
   double surface_weight = 1;  ///< of rows with neighbours whose errors are correlated: 1 / variance inflation

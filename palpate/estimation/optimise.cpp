@@ -8,6 +8,7 @@
 namespace palpate::estimation {
 namespace {
 
+constexpr double far_prior = 12;         // standard deviations of its prior that no nuisance leaves: the search must come back
 constexpr std::size_t rough_steps = 8;  // of a long recording are enough to come near the optimum
 
 MatrixX pick(const MatrixX& matrix, const std::vector<int>& which) {
@@ -68,6 +69,13 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
       // A step of log E beyond a factor of five leaves every linearisation behind.
       const double jump = std::abs(next(log_young) - best.unknowns(log_young));
       if (jump > 1.6) next = best.unknowns + (1.6 / jump) * (next - best.unknowns);
+      for (int k : moving) {
+        const Unknown& unknown = unknowns[k];
+        if (!std::isfinite(unknown.prior_std)) continue;
+        const double reach = far_prior * unknown.prior_std;
+        next(k) = std::clamp(next(k), unknown.prior_mean - reach, unknown.prior_mean + reach);
+      }
+      next(log_young) = std::clamp(next(log_young), unknowns[log_young].lower, unknowns[log_young].upper);
       next(poisson) = std::clamp(next(poisson), unknowns[poisson].lower, unknowns[poisson].upper);
 
       Evaluation trial = objective.evaluate(next, loss, progress);
@@ -131,7 +139,11 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
     return at;
   }
   int iterations = 0;
-  loss.tukey = std::max(final_loss.tukey, 4 * final_loss.tukey * objective.residual_scale());
+  const auto cut = [&](double tukey) {
+    loss.tukey = tukey;
+    loss.widening = tukey / final_loss.tukey;
+  };
+  cut(std::max(final_loss.tukey, 4 * final_loss.tukey * objective.residual_scale()));
   OptimiseOptions rough = options;
   rough.max_iterations = 4;
   rough.step_tolerance = 0.1;
@@ -139,10 +151,10 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
     at = optimise(objective, at.unknowns, loss, rough, progress);
     iterations += at.iterations;
     if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
-    loss.tukey = std::max(final_loss.tukey, std::min(loss.tukey / 3, 4 * final_loss.tukey * objective.residual_scale()));
+    cut(std::max(final_loss.tukey, std::min(loss.tukey / 3, 4 * final_loss.tukey * objective.residual_scale())));
   }
   if (loss.every > 1) {  // the optimum of a few steps is where the fit of all of them starts
-    loss.tukey = 2 * final_loss.tukey;
+    cut(2 * final_loss.tukey);
     at = optimise(objective, at.unknowns, loss, options, progress);
     iterations += at.iterations;
     if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
@@ -151,15 +163,23 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
   // Where the model does not fit, the cut follows the residuals' spread: a fit that calls everything an outlier has no say.
   const Loss last = fitting_loss(objective, final_loss);
   if (final_loss.along_rays) {
-    loss.tukey = 2 * final_loss.tukey;
+    cut(2 * final_loss.tukey);
     loss.along_rays = true;
     at = optimise(objective, at.unknowns, loss, rough, progress);
     iterations += at.iterations;
     if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
   }
   at = optimise(objective, at.unknowns, last, options, progress);
-  at.iterations += iterations;
   at.loss = last;
+  // A better fit has a narrower spread: tighten while that helps.
+  for (int round = 0; round < 6 && at.evaluation.usable && at.termination != Termination::cancelled; ++round) {
+    const Loss tighter = fitting_loss(objective, final_loss);
+    if (tighter.tukey > 0.9 * at.loss.tukey) break;
+    iterations += at.iterations;
+    at = optimise(objective, at.unknowns, tighter, options, progress);
+    at.loss = tighter;
+  }
+  at.iterations += iterations;
   return at;
 }
 
@@ -168,8 +188,16 @@ Optimum optimise_from_several(Objective& objective, const VectorX& start, const 
   constexpr double misfit = 1.5;  // robust spread of the residuals in standard deviations
   Optimum best = optimise_annealed(objective, start, final_loss, options, progress);
   if (best.termination == Termination::cancelled) return best;
-  double spread = best.evaluation.usable ? objective.residual_scale() : std::numeric_limits<double>::infinity();
-  if (spread < misfit) return best;
+  if (best.evaluation.usable && objective.residual_scale() < misfit) return best;
+
+  // Candidates are compared by one loss, the widest: a narrow one would favour the fit that gives most points up.
+  Loss common = best.evaluation.usable ? fitting_loss(objective, final_loss) : final_loss;
+  const auto cost_of = [&](const Optimum& at) {
+    if (!at.evaluation.usable) return std::numeric_limits<double>::infinity();
+    objective.model().forget();
+    return objective.evaluate(at.unknowns, common, progress).cost;
+  };
+  double lowest = best.evaluation.usable ? cost_of(best) : std::numeric_limits<double>::infinity();
   for (double factor : {0.25, 4.0}) {
     VectorX other = start;
     other(log_young) += std::log(factor);
@@ -177,8 +205,9 @@ Optimum optimise_from_several(Objective& objective, const VectorX& start, const 
     Optimum candidate = optimise_annealed(objective, other, final_loss, options, progress);
     if (candidate.termination == Termination::cancelled) return candidate;
     candidate.iterations += best.iterations;
-    if (candidate.evaluation.usable && objective.residual_scale() < spread) {
-      spread = objective.residual_scale();
+    const double cost = cost_of(candidate);
+    if (cost < lowest) {
+      lowest = cost;
       best = std::move(candidate);
     }
   }
