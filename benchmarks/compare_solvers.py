@@ -166,7 +166,7 @@ def dolfinx_worker(path):
     }
     results = {}
     for name, options in solvers.items():
-        if len(nodes) > 60000 and name in ("MUMPS Cholesky", "CHOLMOD"):
+        if len(nodes) > 60000 and name in ("MUMPS Cholesky", "CHOLMOD", "CG + GAMG"):
             continue  # minutes and gigabytes
         try:
             ksp = PETSc.KSP().create(MPI.COMM_SELF)
