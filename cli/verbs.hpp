@@ -23,6 +23,7 @@ using SetUp = Run(CLI::App& app);
 #define PALPATE_VERBS(VERB) \
   VERB(model,      "object",  "make tetrahedra that can be simulated from a surface, however broken",  "palpate model teddy.obj -o out --tetrahedra 10000 --unit mm") \
   VERB(record,     "measure", "make a recording: the built-in demonstration",                         "palpate record --demo -o foam_cube") \
+  VERB(info,       "measure", "what is in a recording, in units, and what is wrong with it",           "palpate info recording") \
   VERB(estimate,   "measure", "Young's modulus and Poisson ratio of a recording, with intervals",      "palpate estimate recording -o result") \
   VERB(report,     "show",    "the figures of a result as SVG and PNG files, without a display",       "palpate report out --png figures") \
   VERB(doctor,     "set up",  "check the installation and say what to do about what is missing",      "palpate doctor") \

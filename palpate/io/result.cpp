@@ -3,15 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "palpate/core/error.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/npy.hpp"
@@ -38,47 +36,6 @@ double value_of(const Identification& answer, const char* name) {
     if (one.name == name && one.region.empty()) return one.value;
   }
   return std::numeric_limits<double>::quiet_NaN();
-}
-
-/// Faces that belong to one tetrahedron alone, corners only, outward.
-Triangles boundary_of(const TetMesh& mesh) {
-  constexpr int faces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-  std::map<std::array<Index, 3>, std::pair<std::array<Index, 3>, int>> seen;
-  for (Eigen::Index i = 0; i < mesh.tetrahedra.rows(); ++i) {
-    for (const auto& face : faces) {
-      const std::array<Index, 3> corners = {mesh.tetrahedra(i, face[0]), mesh.tetrahedra(i, face[1]),
-                                            mesh.tetrahedra(i, face[2])};
-      std::array<Index, 3> key = corners;
-      std::sort(key.begin(), key.end());
-      auto& entry = seen[key];
-      entry.first = corners;
-      entry.second += 1;
-    }
-  }
-  std::vector<Index> flat;
-  for (const auto& [key, entry] : seen) {
-    if (entry.second == 1) flat.insert(flat.end(), entry.first.begin(), entry.first.end());
-  }
-  return Eigen::Map<const Triangles>(flat.data(), static_cast<Eigen::Index>(flat.size() / 3), 3);
-}
-
-/// The surface alone, with its own numbering.
-MeshData surface_of(const TetMesh& mesh) {
-  MeshData surface;
-  const Triangles faces = boundary_of(mesh);
-  std::vector<Index> row(static_cast<std::size_t>(mesh.nodes_m.rows()), -1);
-  Index count = 0;
-  surface.triangles.resize(faces.rows(), 3);
-  for (Eigen::Index i = 0; i < faces.size(); ++i) {
-    Index& place = row[static_cast<std::size_t>(faces.data()[i])];
-    if (place < 0) place = count++;
-    surface.triangles.data()[i] = place;
-  }
-  surface.points_m.resize(count, 3);
-  for (std::size_t i = 0; i < row.size(); ++i) {
-    if (row[i] >= 0) surface.points_m.row(row[i]) = mesh.nodes_m.row(static_cast<Eigen::Index>(i));
-  }
-  return surface;
 }
 
 }  // namespace
@@ -143,7 +100,7 @@ void write_model(const Identification& answer, const TetMesh& volume, const fs::
   if (std::isfinite(poisson)) mesh.cell_fields["poisson_ratio"] = MatrixX::Constant(volume.tetrahedra.rows(), 1, poisson);
   write_mesh(folder / "object.vtu", mesh);
   write_mesh(folder / "object.msh", mesh);
-  write_mesh(folder / "surface.obj", surface_of(volume));
+  write_mesh(folder / "surface.obj", geometry::boundary_surface(volume).surface);
 
   const nlohmann::json whole = result_json(answer);
   nlohmann::json material;
