@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/acquisition/push_protocol.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::acquisition {
+namespace {
+
+struct Stopped {
+  StopReason reason;
+  std::string message;
+};
+
+class PushRun {
+ public:
+  PushRun(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
+          const std::function<bool()>& keep_going, const Push* so_far)
+      : robot_(robot), plan_(plan), options_(options), on_step_(on_step), keep_going_(keep_going) {
+    push_.name = plan.name;
+    push_.site = plan.site;
+    if (so_far)
+      for (const Step& step : so_far->steps) {
+        ++next_index_;
+        const double force = step.loads.empty() || !step.loads[0].force_n ? 0 : step.loads[0].force_n->dot(plan.direction);
+        recorded_unloading_ = recorded_unloading_ || step.unloading;
+        recorded_force_n_ = std::max(recorded_force_n_, force);
+        for (const Observation& seen : step.observations)
+          if (const auto* encoder = std::get_if<ToolTravel>(&seen))
+            recorded_travel_m_ = std::max(recorded_travel_m_, encoder->travel_m);
+        recorded_rest_ = recorded_rest_ || force == 0;
+        recorded_again_ = recorded_again_ || (step.unloading && force == 0);
+      }
+  }
+
+  PushReport run() {
+    try {
+      look_at_rest();
+      approach();
+      const Stopped stop = rise();
+      report_.stop = stop.reason;
+      report_.message = stop.message;
+      if (stop.reason == StopReason::force_limit || stop.reason == StopReason::travel_limit) go_back_step_by_step();
+    } catch (const Stopped& stop) {
+      report_.stop = stop.reason;
+      report_.message = stop.message;
+    }
+    if (report_.stop == StopReason::user)
+      robot_.stop();  // where it is: only the user knows why
+    else
+      retreat();
+    return report_;
+  }
+
+ private:
+  double along(const Vec3& v) const { return plan_.direction.dot(v); }
+  Vec3 force(const RobotState& state) const { return state.force_n - report_.tare_n; }
+  double pressing(const RobotState& state) const { return along(force(state)); }
+  double travel(const RobotState& state) const { return along(state.T_base_tip.translation() - report_.contact_m); }
+  sensing::ContactSample sample(const RobotState& state) const {
+    return {state.time_s, force(state), state.T_base_tip.translation()};
+  }
+
+  void ask_user() const {
+    if (keep_going_ && !keep_going_()) throw Stopped{StopReason::user, "stopped on request"};
+  }
+
+  void move_to(double distance_m, double speed_m_s) {
+    ask_user();
+    Pose pose = Pose::Identity();
+    pose.linear() = plan_.R_base_tip;
+    pose.translation() = plan_.contact_m + distance_m * plan_.direction;
+    if (robot_.move(pose, speed_m_s) == Motion::refused)
+      throw Stopped{StopReason::robot_limit, "the robot refused to move on: a limit, or out of reach"};
+    at_m_ = distance_m;
+  }
+
+  // Free air: the tare, its noise, and the object untouched.
+  void look_at_rest() {
+    move_to(-options_.start_distance_m, options_.approach_speed_m_s);
+    std::vector<Vec3> forces;
+    RobotState state = robot_.read();
+    for (int i = 0; i < options_.free_air_samples; ++i) {
+      robot_.wait(options_.sample_period_s);
+      state = robot_.read();
+      forces.push_back(state.force_n);
+      report_.tare_n += state.force_n / options_.free_air_samples;
+    }
+    double square = 0;
+    for (const Vec3& f : forces) square += std::pow(along(f - report_.tare_n), 2);
+    free_air_std_n_ = std::sqrt(square / std::max(1, options_.free_air_samples - 1));
+    push_.force_tare_std_n = free_air_std_n_ / std::sqrt(double(options_.free_air_samples));
+    push_.travel_offset_std_m = options_.increment_m;
+    if (!recorded_rest_) record(state, {}, 0, false);
+  }
+
+  void approach() {
+    std::vector<sensing::ContactSample> samples;
+    while (at_m_ < options_.search_distance_m) {
+      move_to(at_m_ + options_.increment_m, options_.approach_speed_m_s);
+      for (int i = 0; i < options_.contact.confirm_samples; ++i) {
+        robot_.wait(options_.sample_period_s);
+        samples.push_back(sample(robot_.read()));
+      }
+      const auto contact = sensing::find_contact(samples, plan_.direction, free_air_std_n_, options_.contact);
+      if (!contact) continue;
+      report_.contact_m = samples[*contact].tip_m;
+      history_.assign(samples.begin() + std::ptrdiff_t(*contact), samples.end());
+      return;
+    }
+    throw Stopped{StopReason::no_contact, "no contact within " + std::to_string(1000 * options_.search_distance_m) +
+                                              " mm beyond the expected surface"};
+  }
+
+  // The least force that still counts as contact: half of what found it.
+  double lost_n() const {
+    return 0.5 * std::max(options_.contact.threshold_n, options_.contact.noise_factor * free_air_std_n_);
+  }
+
+  Stopped rise() {
+    double target = std::max(options_.force_step_n, recorded_force_n_ + options_.force_step_n);
+    if (recorded_unloading_) return {StopReason::force_limit, "the rise was recorded before"};
+    // The last step of the rise may stand on the record already; the way back still has to start from it.
+    const bool top_recorded = recorded_force_n_ >= options_.force_limit_n - 0.5 * options_.force_step_n ||
+                              recorded_travel_m_ >= options_.travel_limit_m - options_.increment_m;
+    for (;;) {
+      const RobotState state = robot_.read();
+      const double now = pressing(state);
+      report_.highest_force_n = std::max(report_.highest_force_n, now);
+      report_.deepest_m = std::max(report_.deepest_m, travel(state));
+      if (now >= options_.force_limit_n) {
+        if (!top_recorded) settle_and_record(false);
+        return {StopReason::force_limit, "the force reached its limit"};
+      }
+      if (travel(state) >= options_.travel_limit_m - 1e-9) {
+        if (!top_recorded) settle_and_record(false);
+        return {StopReason::travel_limit, "the travel reached its limit"};
+      }
+      if (now >= std::min(target, options_.force_limit_n)) {
+        settle_and_record(false);
+        target += options_.force_step_n;
+        continue;
+      }
+      const double step = std::min(options_.increment_m, options_.travel_limit_m - travel(state));
+      move_to(at_m_ + step, options_.push_speed_m_s);
+      robot_.wait(options_.sample_period_s);
+      history_.push_back(sample(robot_.read()));
+      watch_out();
+    }
+  }
+
+  void watch_out() const {
+    const sensing::PushEvent event = sensing::watch(history_, plan_.direction, lost_n(), options_.slip);
+    if (event == sensing::PushEvent::none) return;
+    throw Stopped{event == sensing::PushEvent::contact_lost ? StopReason::contact_lost : StopReason::slip,
+                  sensing::to_words(event)};
+  }
+
+  void settle_and_record(bool unloading) {
+    std::vector<sensing::ContactSample> samples;
+    const double start = robot_.read().time_s;
+    sensing::Settling state;
+    RobotState last;
+    do {
+      ask_user();
+      robot_.wait(options_.sample_period_s);
+      last = robot_.read();
+      samples.push_back(sample(last));
+      state = sensing::settling(samples, plan_.direction, options_.settling);
+    } while (!state.settled && last.time_s - start < options_.settling_timeout_s);
+    if (!state.settled) report_.unsettled.push_back(next_index_);
+    // The recorded force is the mean over the last window, as `settling` sees it.
+    Vec3 mean = Vec3::Zero(), square = Vec3::Zero();
+    double count = 0;
+    for (auto s = samples.rbegin(); s != samples.rend() && s->time_s >= last.time_s - options_.settling.window_s; ++s) {
+      mean += s->force_n;
+      square += s->force_n.cwiseAbs2();
+      ++count;
+    }
+    mean /= count;
+    const Vec3 variance = (square / count - mean.cwiseAbs2()).cwiseMax(0.0);
+    const double sigma = std::sqrt(std::max(variance.mean(), free_air_std_n_ * free_air_std_n_ * 0.01) / count);
+    history_.insert(history_.end(), samples.begin(), samples.end());
+    if (!unloading) watch_out();
+    record(last, mean, sigma, unloading);
+  }
+
+  void record(const RobotState& state, const std::optional<Vec3>& force_n, double sigma_n, bool unloading) {
+    Step step;
+    step.time_s = state.time_s;
+    step.joints_rad = state.joints_rad;
+    step.T_base_tip = state.T_base_tip;
+    step.unloading = unloading;
+    if (force_n) {
+      Load load;
+      load.tool = plan_.tool;
+      load.force_n = *force_n;
+      load.force_std_n = sigma_n;
+      load.contact_m = report_.contact_m;
+      load.direction = plan_.direction;
+      load.contact_std_m = options_.contact_std_m;
+      step.loads.push_back(load);
+      ToolTravel encoder;
+      encoder.tool = plan_.tool;
+      encoder.travel_m = travel(state);
+      encoder.sigma_m = robot_.travel_sigma_m();
+      step.observations.emplace_back(encoder);
+    }
+    step.observations.emplace_back(robot_.take_depth_image());
+    if (on_step_) on_step_(push_, step);
+    ++next_index_;
+    ++report_.steps;
+  }
+
+  void go_back_step_by_step() {
+    if (recorded_unloading_) return;  // the load that the way back starts from is gone
+    const double highest = std::max(report_.highest_force_n, recorded_force_n_);
+    for (int k = 1; k <= options_.unloading_steps; ++k) {
+      const double target = highest * (1 - double(k) / (options_.unloading_steps + 1));
+      while (pressing(robot_.read()) > target && travel(robot_.read()) > 0) {
+        move_to(at_m_ - options_.increment_m, options_.push_speed_m_s);
+        robot_.wait(options_.sample_period_s);
+      }
+      if (pressing(robot_.read()) < lost_n()) break;  // the object stayed behind: nothing left to record under load
+      settle_and_record(true);
+    }
+  }
+
+  // Away from the object whatever happened, and did it come back?
+  void retreat() {
+    try {
+      move_to(-options_.start_distance_m, options_.approach_speed_m_s);
+    } catch (const Stopped& stop) {
+      robot_.stop();
+      report_.message += "; then " + stop.message;
+      return;
+    }
+    robot_.wait(options_.sample_period_s);
+    if (report_.stop != StopReason::no_contact && !recorded_again_) record(robot_.read(), {}, 0, true);
+  }
+
+  Robot& robot_;
+  const PushPlan& plan_;
+  const PushOptions& options_;
+  const OnStep& on_step_;
+  const std::function<bool()>& keep_going_;
+  Push push_;
+  PushReport report_;
+  std::vector<sensing::ContactSample> history_;  // since contact
+  double free_air_std_n_ = 0;
+  double at_m_ = 0;  // commanded, along the push from the expected contact
+  int next_index_ = 0;
+  double recorded_force_n_ = 0, recorded_travel_m_ = 0;
+  bool recorded_rest_ = false, recorded_unloading_ = false, recorded_again_ = false;
+};
+
+}  // namespace
+
+void check(const PushOptions& o) {
+  const auto need = [](bool good, const char* field, const char* rule) {
+    if (!good) throw Error(rule, std::string("PushOptions.") + field);
+  };
+  need(o.force_limit_n > 0, "force_limit_n", "must be positive");
+  need(o.travel_limit_m > 0, "travel_limit_m", "must be positive");
+  need(o.force_step_n > 0, "force_step_n", "must be positive");
+  need(o.unloading_steps >= 0, "unloading_steps", "must not be negative");
+  need(o.start_distance_m > 0, "start_distance_m", "must be positive");
+  need(o.search_distance_m >= 0, "search_distance_m", "must not be negative");
+  need(o.increment_m > 0 && o.increment_m <= 0.01, "increment_m", "must be positive and at most 10 mm");
+  need(o.approach_speed_m_s > 0, "approach_speed_m_s", "must be positive");
+  need(o.push_speed_m_s > 0, "push_speed_m_s", "must be positive");
+  need(o.sample_period_s > 0, "sample_period_s", "must be positive");
+  need(o.free_air_samples >= 2, "free_air_samples", "must be at least 2");
+  need(o.settling_timeout_s > o.settling.window_s, "settling_timeout_s", "must be longer than settling.window_s");
+  need(o.contact_std_m >= 0, "contact_std_m", "must not be negative");
+  sensing::check(o.contact);
+  sensing::check(o.settling);
+  sensing::check(o.slip);
+}
+
+const char* to_words(StopReason reason) {
+  switch (reason) {
+    case StopReason::force_limit:
+      return "force limit";
+    case StopReason::travel_limit:
+      return "travel limit";
+    case StopReason::slip:
+      return "slip";
+    case StopReason::contact_lost:
+      return "contact lost";
+    case StopReason::no_contact:
+      return "no contact";
+    case StopReason::robot_limit:
+      return "limit of the robot";
+    case StopReason::user:
+      break;
+  }
+  return "stopped by the user";
+}
+
+PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
+                    const std::function<bool()>& keep_going, const Push* so_far) {
+  check(options);
+  if (std::abs(plan.direction.norm() - 1) > 1e-6) throw Error("must have unit length", "PushPlan.direction");
+  if (plan.tool.empty()) throw Error("must name a tool of the recording", "PushPlan.tool");
+  return PushRun(robot, plan, options, on_step, keep_going, so_far).run();
+}
+
+}  // namespace palpate::acquisition

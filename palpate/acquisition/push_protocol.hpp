@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// The paper's way to push (Frank et al. 2010, section V): look, approach until contact, raise the force step by step, let it
+// settle, record; stop at 50 N or 10 cm or when something goes wrong; go back step by step, retreat and look again.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "palpate/acquisition/robot.hpp"
+#include "palpate/core/recording.hpp"
+#include "palpate/sensing/push_events.hpp"
+
+namespace palpate::acquisition {
+
+struct PushPlan {
+  std::string name;
+  std::string site;
+  std::string tool;                    ///< name in Recording::tools
+  Vec3 contact_m = Vec3::Zero();       ///< where the surface is expected
+  Vec3 direction = -Vec3::UnitZ();     ///< unit vector, into the object
+  Mat3 R_base_tip = Mat3::Identity();  ///< orientation of the tip throughout
+};
+
+struct PushOptions {
+  double force_limit_n = 50.0;      ///< the paper's
+  double travel_limit_m = 0.10;     ///< the paper's
+  double force_step_n = 2.0;        ///< between recorded steps
+  int unloading_steps = 2;          ///< recorded on the way back, equally spaced in force
+  double start_distance_m = 0.05;   ///< before the expected contact: where the approach starts and the push ends
+  double search_distance_m = 0.03;  ///< beyond it: how far to look for contact
+  double increment_m = 0.0005;      ///< of the tip between two looks at the force
+  double approach_speed_m_s = 0.02;
+  double push_speed_m_s = 0.005;
+  double sample_period_s = 0.02;
+  int free_air_samples = 50;        ///< for the tare and its noise
+  double settling_timeout_s = 5.0;  ///< a step that has not settled by then is recorded and reported
+  double contact_std_m = 0.0;       ///< prior on the contact point that the recording will state
+  sensing::ContactOptions contact;
+  sensing::SettlingOptions settling;
+  sensing::SlipOptions slip;
+};
+
+/// @throws Error naming the option that is out of range.
+void check(const PushOptions& options);
+
+enum class StopReason { force_limit, travel_limit, slip, contact_lost, no_contact, robot_limit, user };
+const char* to_words(StopReason reason);
+
+struct PushReport {
+  StopReason stop = StopReason::user;
+  std::string message;            ///< plain words
+  Vec3 contact_m = Vec3::Zero();  ///< where contact began
+  double highest_force_n = 0, deepest_m = 0;
+  int steps = 0;               ///< recorded now, resumed ones not counted
+  std::vector<int> unsettled;  ///< indices (in the push) of steps whose force still crept
+  Vec3 tare_n = Vec3::Zero();  ///< taken off every force
+};
+
+/// Called with each finished step, after the force has settled and everything is read: a crash loses at most the step in
+/// flight.
+using OnStep = std::function<void(const Push& push, const Step& step)>;
+
+/// Runs one push.
+/// @param keep_going  asked before every motion; false stops the robot where it is (StopReason::user)
+/// @param so_far  steps of the same push that an earlier run has recorded: they are not recorded again, and the force rises
+///                from where they end
+/// @throws Error for bad options or plan, and whatever the robot throws.
+PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
+                    const std::function<bool()>& keep_going = {}, const Push* so_far = nullptr);
+
+}  // namespace palpate::acquisition

@@ -1,0 +1,283 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// Every way in which a push can end, on a robot that presses a spring.
+#include "palpate/acquisition/push_protocol.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::acquisition {
+namespace {
+
+// A linear spring whose surface lies at height 0.1 m; pressed from above. The force relaxes after every motion.
+struct SpringRobot : Robot {
+  double stiffness_n_m = 400, surface_m = 0.1, noise_n = 0.02;
+  double relaxation = 0.1, relaxation_s = 0.3;  // share of the last increase that fades
+  Vec3 bias_n{0.4, -0.2, 0.9};
+  double slips_at_m = 1e9, loses_at_m = 1e9, yields_at_m = 1e9, refuses_at_m = 1e9;
+  double clock_s = 0, moved_s = -100, faded_n = 0;
+  Pose tip = Pose(Eigen::Translation3d(0, 0, 0.3));
+  bool stopped = false;
+  int images = 0;
+  std::mt19937 generator{7};
+
+  double depth() const { return surface_m - tip.translation().z(); }
+  double spring() const {
+    if (depth() <= 0 || depth() > loses_at_m) return 0;
+    return stiffness_n_m * depth() * (depth() > yields_at_m ? 0.5 : 1.0);
+  }
+  RobotState read() override {
+    std::normal_distribution<double> noise(0, noise_n);
+    RobotState state;
+    state.time_s = clock_s;
+    state.joints_rad = {tip.translation().z(), 0.5};
+    state.T_base_tip = tip;
+    if (depth() > slips_at_m) state.T_base_tip.translation().x() += 0.004;
+    const double fading = depth() > 0 ? faded_n * std::exp(-(clock_s - moved_s) / relaxation_s) : 0;
+    state.force_n =
+        bias_n + Vec3(noise(generator), noise(generator), noise(generator) - (spring() > 0 ? spring() + fading : 0));
+    return state;
+  }
+  Motion move(const Pose& pose, double speed_m_s) override {
+    if (surface_m - pose.translation().z() > refuses_at_m) return Motion::refused;
+    const double before = spring();
+    clock_s += (pose.translation() - tip.translation()).norm() / speed_m_s;
+    tip = pose;
+    moved_s = clock_s;
+    faded_n = relaxation * std::max(0.0, spring() - before);
+    return Motion::done;
+  }
+  void stop() override { stopped = true; }
+  DepthFrame take_depth_image() override {
+    ++images;
+    DepthFrame frame;
+    frame.time_s = clock_s;
+    frame.depth_m = DepthImage::Constant(2, 2, float(depth()));
+    return frame;
+  }
+  void wait(double duration_s) override { clock_s += duration_s; }
+  double travel_sigma_m() const override { return 3e-4; }
+};
+
+PushPlan plan() {
+  PushPlan p;
+  p.name = "push 1";
+  p.tool = "stick";
+  p.contact_m = Vec3(0, 0, 0.102);  // expected 2 mm too high
+  return p;
+}
+
+PushOptions options() {
+  PushOptions o;
+  o.force_limit_n = 8;
+  o.travel_limit_m = 0.03;
+  return o;
+}
+
+struct Result {
+  PushReport report;
+  Push push;
+};
+
+Result run(SpringRobot& robot, const PushOptions& o = options(), const std::function<bool()>& keep_going = {},
+           const Push* so_far = nullptr) {
+  Result result;
+  result.report = run_push(
+      robot, plan(), o,
+      [&](const Push& push, const Step& step) {
+        std::vector<Step> steps = std::move(result.push.steps);
+        result.push = push;
+        result.push.steps = std::move(steps);
+        result.push.steps.push_back(step);
+      },
+      keep_going, so_far);
+  return result;
+}
+
+double force(const Step& step) { return step.loads.empty() ? 0 : -step.loads[0].force_n->z(); }
+
+TEST(PushProtocol, RisesStepByStepToTheForceLimitAndBack) {
+  SpringRobot robot;
+  const Result result = run(robot);
+  EXPECT_EQ(result.report.stop, StopReason::force_limit);
+  EXPECT_NEAR((result.report.tare_n - robot.bias_n).norm(), 0, 0.02);
+  EXPECT_NEAR(result.report.contact_m.z(), 0.1, 0.002);
+  std::vector<double> forces;
+  std::vector<bool> unloading;
+  double time = -1;
+  for (const Step& step : result.push.steps) {
+    EXPECT_GT(step.time_s, time);
+    time = step.time_s;
+    forces.push_back(force(step));
+    unloading.push_back(step.unloading);
+    EXPECT_EQ(step.joints_rad.size(), 2u);
+    const DepthFrame* frame = nullptr;
+    const ToolTravel* travel = nullptr;
+    for (const Observation& o : step.observations) {
+      if (const auto* f = std::get_if<DepthFrame>(&o)) frame = f;
+      if (const auto* t = std::get_if<ToolTravel>(&o)) travel = t;
+    }
+    ASSERT_NE(frame, nullptr);
+    EXPECT_EQ(travel != nullptr, !step.loads.empty());
+    if (!travel) continue;
+    // Force and travel belong together: the spring, with its zero where contact was noticed.
+    EXPECT_NEAR(force(step), 400 * (0.1 - step.T_base_tip->translation().z()), 0.1);
+    EXPECT_NEAR(travel->travel_m, result.report.contact_m.z() - step.T_base_tip->translation().z(), 1e-12);
+    EXPECT_GT(step.loads[0].force_std_n, 0);
+    EXPECT_LT(step.loads[0].force_std_n, 0.02);
+  }
+  ASSERT_EQ(forces.size(), 8u);  // rest, 2, 4, 6, 8 N, two on the way back, rest again
+  const std::vector<double> expected{0, 2, 4, 6, 8, 5.4, 2.7, 0};
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(forces[i], expected[i], 0.4) << i;
+  EXPECT_THAT(unloading, testing::ElementsAre(false, false, false, false, false, true, true, true));
+  EXPECT_TRUE(result.report.unsettled.empty());
+  EXPECT_LT(robot.depth(), 0) << "retreated";
+}
+
+TEST(PushProtocol, WaitsForTheForceToSettleAndSaysWhenItDoesNot) {
+  SpringRobot quick, slow;
+  quick.relaxation_s = 0.1;
+  slow.relaxation = 40;  // of the last 0.2 N: 8 N that take 20 s to fade
+  slow.relaxation_s = 20;
+  EXPECT_TRUE(run(quick).report.unsettled.empty());
+  EXPECT_FALSE(run(slow).report.unsettled.empty());
+}
+
+TEST(PushProtocol, StopsAtTheTravelLimit) {
+  SpringRobot robot;
+  robot.stiffness_n_m = 100;
+  const Result result = run(robot);
+  EXPECT_EQ(result.report.stop, StopReason::travel_limit);
+  EXPECT_NEAR(result.report.deepest_m, 0.03, 1e-6);
+  EXPECT_LT(result.report.highest_force_n, 8);
+}
+
+TEST(PushProtocol, StopsOnSlip) {
+  SpringRobot sideways, gives_way;
+  sideways.slips_at_m = 0.009;
+  Result result = run(sideways);
+  EXPECT_EQ(result.report.stop, StopReason::slip);
+  EXPECT_LT(result.report.deepest_m, 0.0101);
+  EXPECT_LT(sideways.depth(), 0) << "retreated";
+  EXPECT_EQ(result.push.steps.back().loads.size(), 0u) << "looked again";
+
+  gives_way.yields_at_m = 0.009;
+  EXPECT_EQ(run(gives_way).report.stop, StopReason::slip);
+}
+
+TEST(PushProtocol, StopsWhenContactIsLost) {
+  SpringRobot robot;
+  robot.loses_at_m = 0.012;
+  const Result result = run(robot);
+  EXPECT_EQ(result.report.stop, StopReason::contact_lost);
+  for (const Step& step : result.push.steps) EXPECT_LE(force(step), 0.012 * 400 + 0.5);
+}
+
+TEST(PushProtocol, GivesUpWhereNothingIsTouched) {
+  SpringRobot robot;
+  robot.surface_m = 0.0;
+  const Result result = run(robot);
+  EXPECT_EQ(result.report.stop, StopReason::no_contact);
+  EXPECT_EQ(result.push.steps.size(), 1u);
+}
+
+TEST(PushProtocol, StopsWhereTheRobotRefuses) {
+  SpringRobot robot;
+  robot.refuses_at_m = 0.011;
+  const Result result = run(robot);
+  EXPECT_EQ(result.report.stop, StopReason::robot_limit);
+  EXPECT_LT(robot.depth(), 0) << "retreated";
+  robot.refuses_at_m = -1;  // cannot even get to the start
+  EXPECT_EQ(run(robot).report.stop, StopReason::robot_limit);
+  EXPECT_TRUE(robot.stopped);
+}
+
+TEST(PushProtocol, UserStopsItWhereItIs) {
+  SpringRobot robot;
+  const Result result = run(robot, options(), [&] { return robot.depth() < 0.006; });
+  EXPECT_EQ(result.report.stop, StopReason::user);
+  EXPECT_TRUE(robot.stopped);
+  EXPECT_NEAR(robot.depth(), 0.006, 0.0011);
+}
+
+TEST(PushProtocol, GoesOnAfterAKillAtEveryStep) {
+  SpringRobot whole_robot;
+  const Push whole = run(whole_robot).push;
+  for (std::size_t killed = 0; killed < whole.steps.size(); ++killed) {
+    struct Killed {};
+    SpringRobot robot;
+    Push so_far;
+    try {
+      run_push(robot, plan(), options(), [&](const Push&, const Step& step) {
+        if (so_far.steps.size() == killed) throw Killed{};
+        so_far.steps.push_back(step);
+      });
+      FAIL() << "was not killed";
+    } catch (const Killed&) {
+    }
+    ASSERT_EQ(so_far.steps.size(), killed);
+    SpringRobot fresh;
+    fresh.clock_s = robot.clock_s + 60;
+    const Result rest = run(fresh, options(), {}, &so_far);
+    for (const Step& step : rest.push.steps) so_far.steps.push_back(step);
+    double time = -1, highest = 0;
+    int at_rest = 0;
+    for (const Step& step : so_far.steps) {
+      EXPECT_GT(step.time_s, time) << killed;
+      time = step.time_s;
+      if (!step.unloading && force(step) > 0) {
+        EXPECT_GT(force(step), highest + 1) << "no level twice, killed at " << killed;
+        highest = force(step);
+      }
+      at_rest += step.loads.empty();
+    }
+    EXPECT_GE(highest, 7.8) << killed;
+    EXPECT_EQ(at_rest, 2) << killed;
+  }
+}
+
+TEST(PushProtocol, BadOptionsAndPlansAreRefused) {
+  const auto refused = [](auto change) {
+    PushOptions o = options();
+    change(o);
+    try {
+      check(o);
+    } catch (const Error&) {
+      return true;
+    }
+    return false;
+  };
+  using O = PushOptions;
+  EXPECT_FALSE(refused([](O&) {}));
+  EXPECT_TRUE(refused([](O& o) { o.force_limit_n = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.travel_limit_m = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.force_step_n = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.unloading_steps = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.start_distance_m = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.search_distance_m = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.increment_m = 0.02; }));
+  EXPECT_TRUE(refused([](O& o) { o.approach_speed_m_s = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.push_speed_m_s = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.sample_period_s = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.free_air_samples = 1; }));
+  EXPECT_TRUE(refused([](O& o) { o.settling_timeout_s = 0.1; }));
+  EXPECT_TRUE(refused([](O& o) { o.contact_std_m = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.contact.threshold_n = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.settling.rate_n_s = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.slip.tangential_m = 0; }));
+  SpringRobot robot;
+  PushPlan bad = plan();
+  bad.direction = Vec3(0, 0, -2);
+  EXPECT_THROW(run_push(robot, bad, options(), {}), Error);
+  bad = plan();
+  bad.tool.clear();
+  EXPECT_THROW(run_push(robot, bad, options(), {}), Error);
+}
+
+}  // namespace
+}  // namespace palpate::acquisition
