@@ -37,7 +37,7 @@ Assembly::Assembly(const TetMesh& mesh, Dilatation dilatation) {
   if (nodes != 4 && nodes != 10) throw Error("needs 4 or 10 columns, has " + std::to_string(nodes), "mesh.tetrahedra");
   if (elements == 0) throw Error("is empty", "mesh.tetrahedra");
   if (!mesh.nodes_m.allFinite()) throw Error("holds NaN or infinity", "mesh.nodes_m");
-  pattern_.nodes = n;
+  pattern_.nodes = nodes_ = n;
   connectivity_ = mesh.tetrahedra;
   const auto quadrature = nodes == 4 ? tet_quadrature_1() : tet_quadrature_4();
   const auto points = static_cast<Index>(quadrature.size());
@@ -79,20 +79,27 @@ Assembly::Assembly(const TetMesh& mesh, Dilatation dilatation) {
       volume_ += volume;
     }
   }
-  if (dilatation == Dilatation::averaged) build_patches();
+  if (dilatation == Dilatation::averaged && nodes == 4) build_patches();
+  if (dilatation == Dilatation::averaged && nodes == 10) build_pressures(mesh);
   build_pattern();
 }
 
 void Assembly::build_pattern() {
   const Index n = pattern_.nodes;
   const int nodes = static_cast<int>(connectivity_.cols());
-  std::vector<std::vector<Index>> rows(n);
+  std::vector<std::vector<Index>> rows(n);  // with the pressures' block nodes behind the mesh's
   for (Index e = 0; e < connectivity_.rows(); ++e)
     for (int b = 0; b < nodes; ++b)
       for (int a = b + 1; a < nodes; ++a) rows[connectivity_(e, b)].push_back(connectivity_(e, a));
   for (const Patch& patch : patches_)
     for (std::size_t b = 0; b < patch.nodes.size(); ++b)
       for (std::size_t a = b + 1; a < patch.nodes.size(); ++a) rows[patch.nodes[b]].push_back(patch.nodes[a]);
+  for (std::size_t k = 0; k < pressure_of_.size(); ++k) {
+    const Index e = static_cast<Index>(k / 4), p = nodes_ + pressure_of_[k];
+    for (int a = 0; a < nodes; ++a) rows[connectivity_(e, a)].push_back(p);
+    for (std::size_t b = 4 * (k / 4); b < 4 * (k / 4) + 4; ++b)
+      if (nodes_ + pressure_of_[b] > p) rows[p].push_back(nodes_ + pressure_of_[b]);
+  }
   pattern_.column_start.assign(1, 0);
   for (Index j = 0; j < n; ++j) {
     auto& r = rows[j];
@@ -111,14 +118,20 @@ void Assembly::build_pattern() {
   for (Index e = 0; e < connectivity_.rows(); ++e)
     for (int b = 0; b < nodes; ++b)
       for (int a = b; a < nodes; ++a) block_of_.push_back(find_block(connectivity_(e, a), connectivity_(e, b)));
+  for (std::size_t k = 0; k < pressure_of_.size(); ++k) {
+    const Index e = static_cast<Index>(k / 4), p = nodes_ + pressure_of_[k];
+    for (int a = 0; a < nodes; ++a) pressure_block_.push_back(find_block(p, connectivity_(e, a)));
+    for (std::size_t b = 4 * (k / 4); b < 4 * (k / 4) + 4; ++b)
+      mass_block_.push_back(nodes_ + pressure_of_[b] >= p ? find_block(nodes_ + pressure_of_[b], p) : -1);
+  }
   for (Patch& patch : patches_)
     for (std::size_t b = 0; b < patch.nodes.size(); ++b)
       for (std::size_t a = b; a < patch.nodes.size(); ++a)
         patch.blocks.push_back(find_block(patch.nodes[a], patch.nodes[b]));
 }
 
-// Calls function(element, gradients (N x 3), weight, displacement gradient) at every quadrature point until it returns
-// false.
+// Calls function(element, point, gradients (N x 3), weight, displacement gradient) at every quadrature point until it
+// returns false.
 template <int N, int Q, typename Function>
 void Assembly::for_each_point(const VectorX& u, Function&& function) const {
   using Gradients = Eigen::Matrix<double, N, 3, Eigen::RowMajor>;
@@ -130,23 +143,37 @@ void Assembly::for_each_point(const VectorX& u, Function&& function) const {
     for (int q = 0; q < Q; ++q, gradient += 3 * N, ++weight) {
       const Eigen::Map<const Gradients> g(gradient);
       const Mat3 h = ue * g;
-      if (!function(e, g, *weight, h)) return;
+      if (!function(e, q, g, *weight, h)) return;
     }
   }
 }
 
-// Fills mean_ with theta averaged over each patch. False: this law or this assembly averages nothing.
+// Fills mean_ with the averaged theta of every point. False: this law or this assembly averages nothing.
 template <int N, int Q>
 bool Assembly::average_dilatation(const MaterialLaw& law, const Moduli& m, const VectorX& u) const {
   VolumetricPart part;
-  if (patches_.empty() || !law.volumetric_part(m, Mat3::Zero(), false, part)) return false;
-  mean_.assign(patches_.size(), 0.0);
-  for_each_point<N, Q>(u, [&](Index e, const auto&, double weight, const Mat3& h) {
+  if ((patches_.empty() && pressures_ == 0) || !law.volumetric_part(m, Mat3::Zero(), false, part)) return false;
+  static const auto quadrature = tet_quadrature_4();
+  VectorX sum = VectorX::Zero(patches_.empty() ? pressures_ : static_cast<Index>(patches_.size()));
+  for_each_point<N, Q>(u, [&](Index e, int q, const auto&, double weight, const Mat3& h) {
     law.volumetric_part(m, h, false, part);
-    mean_[patch_of_[e]] += weight * part.theta;
+    if (Q == 1)
+      sum(patch_of_[e]) += weight * part.theta;
+    else
+      for (int a = 0; a < 4; ++a)
+        sum(pressure_of_[4 * static_cast<std::size_t>(e) + a]) += weight * quadrature[q].barycentric(a) * part.theta;
     return true;
   });
-  for (std::size_t p = 0; p < patches_.size(); ++p) mean_[p] /= patches_[p].volume;
+  mean_.resize(weights_.size());
+  if (Q == 1) {
+    for (std::size_t e = 0; e < mean_.size(); ++e) mean_[e] = sum(patch_of_[e]) / patches_[patch_of_[e]].volume;
+  } else {
+    mass_factor_.solve_in_place(sum);
+    for (std::size_t k = 0; k < mean_.size(); ++k) {
+      mean_[k] = 0;
+      for (int a = 0; a < 4; ++a) mean_[k] += quadrature[k % Q].barycentric(a) * sum(pressure_of_[4 * (k / Q) + a]);
+    }
+  }
   return true;
 }
 
@@ -160,7 +187,7 @@ double Assembly::energy_and_forces_of(const MaterialLaw& law, const Moduli& m, c
   Mat3 stress;
   VolumetricPart part;
   const bool averaged = average_dilatation<N, Q>(law, m, u);
-  for_each_point<N, Q>(u, [&](Index e, const auto& g, double weight, const Mat3& h) {
+  for_each_point<N, Q>(u, [&](Index e, int q, const auto& g, double weight, const Mat3& h) {
     double density = law.energy_and_stress(m, h, stress);
     if (!(density < std::numeric_limits<double>::infinity())) {
       energy = std::numeric_limits<double>::infinity();
@@ -168,7 +195,7 @@ double Assembly::energy_and_forces_of(const MaterialLaw& law, const Moduli& m, c
     }
     if (averaged) {
       law.volumetric_part(m, h, false, part);
-      const double mean = mean_[patch_of_[e]];
+      const double mean = mean_[static_cast<std::size_t>(e) * Q + q];
       stress += part.modulus * (mean - part.theta) * part.gradient;
       density += 0.5 * part.modulus * (mean * mean - part.theta * part.theta);
     }
@@ -196,16 +223,18 @@ void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX
   VolumetricPart part;
   int point = 0;
   Mat9 c;
-  for_each_point<N, Q>(u, [&](Index e, const auto& g, double weight, const Mat3& h) {
+  for_each_point<N, Q>(u, [&](Index e, int q, const auto& g, double weight, const Mat3& h) {
     if (point == 0) std::fill(local, local + kPairs * 9, 0.0);
     law.tangent(m, h, c);
     if (averaged) {
       law.volumetric_part(m, h, true, part);
-      c += part.modulus * (mean_[patch_of_[e]] - part.theta) * part.hessian;
+      c += part.modulus * (mean_[static_cast<std::size_t>(e) * Q + q] - part.theta) * part.hessian;
       c.noalias() -= part.modulus * as_vector(part.gradient) * as_vector(part.gradient).transpose();
-      VectorX& sum = volume_gradient[patch_of_[e]];
-      for (int a = 0; a < N; ++a)
-        sum.segment<3>(3 * slot_[static_cast<std::size_t>(e) * N + a]) += weight * part.gradient * g.row(a).transpose();
+      if (Q == 1) {
+        VectorX& sum = volume_gradient[patch_of_[e]];
+        for (int a = 0; a < N; ++a)
+          sum.segment<3>(3 * slot_[static_cast<std::size_t>(e) * N + a]) += weight * part.gradient * g.row(a).transpose();
+      }
     }
     c *= weight;
     double* block = local;
@@ -237,13 +266,64 @@ void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX
         Eigen::Map<Mat3>(&blocks[9 * static_cast<std::size_t>(*target++)]).noalias() +=
             scale * v.segment<3>(a) * v.segment<3>(b).transpose();
   }
+  if (pressures_ > 0) add_pressure_blocks<N, Q>(law, m, u, blocks);
+}
+
+// B and -M/kappa of the quasi-definite form (see the header).
+template <int N, int Q>
+void Assembly::add_pressure_blocks(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const {
+  static const auto quadrature = tet_quadrature_4();
+  VolumetricPart part;
+  const bool split = law.volumetric_part(m, Mat3::Zero(), false, part);
+  // Nothing couples a body without a volumetric part (foam, nu = 0) to its pressures.
+  const bool coupled = split && std::abs(part.modulus) > 1e-9 * m.young_pa;
+  modulus_ = coupled ? part.modulus : 0;
+  expected_negative_ = !coupled || part.modulus > 0 ? static_cast<int>(pressures_) : 0;
+  const double idle = m.young_pa * std::cbrt(volume_);
+  for (Index p = 0; p < pressures_; ++p) {
+    Eigen::Map<Mat3> block(&blocks[9 * static_cast<std::size_t>(pattern_.column_start[nodes_ + p])]);
+    block(1, 1) = block(2, 2) = idle;
+    if (!coupled) block(0, 0) = -idle;
+  }
+  if (!coupled) return;
+  for_each_point<N, Q>(u, [&](Index e, int q, const auto& g, double weight, const Mat3& h) {
+    law.volumetric_part(m, h, false, part);
+    const Eigen::Matrix<double, 3, N> flux = weight * part.gradient * g.transpose();
+    for (int a = 0; a < 4; ++a) {
+      const std::size_t k = 4 * static_cast<std::size_t>(e) + a;
+      const double shape = quadrature[q].barycentric(a);
+      for (int b = 0; b < N; ++b)
+        Eigen::Map<Mat3>(&blocks[9 * static_cast<std::size_t>(pressure_block_[k * N + b])]).row(0) +=
+            shape * flux.col(b).transpose();
+      for (int b = 0; b < 4; ++b)
+        if (mass_block_[4 * k + b] >= 0)
+          blocks[9 * static_cast<std::size_t>(mass_block_[4 * k + b])] -=
+              weight * shape * quadrature[q].barycentric(b) / modulus_;
+    }
+    return true;
+  });
+}
+
+VectorX Assembly::multiply(const BlockValues& blocks, const VectorX& x) const {
+  if (pressures_ == 0) return fem::multiply(pattern_, blocks, x);
+  VectorX extended = VectorX::Zero(3 * pattern_.nodes);
+  extended.head(x.size()) = x;
+  VectorX y = fem::multiply(pattern_, blocks, extended);
+  VectorX pressure(pressures_);
+  for (Index p = 0; p < pressures_; ++p) pressure(p) = modulus_ * y(3 * (nodes_ + p));
+  mass_factor_.solve_in_place(pressure);
+  extended.setZero();
+  for (Index p = 0; p < pressures_; ++p) extended(3 * (nodes_ + p)) = pressure(p);
+  y += fem::multiply(pattern_, blocks, extended);
+  return y.head(x.size());
 }
 
 template <typename Stress>
 VectorX Assembly::forces_of(const VectorX& u, Stress&& stress) const {
   VectorX forces = VectorX::Zero(u.size());
-  const auto add = [&](Index e, const auto& g, double weight, const Mat3& h) {
-    const Mat3 p = weight * stress(e, h);
+  const auto add = [&](Index e, int q, const auto& g, double weight, const Mat3& h) {
+    const std::size_t point = static_cast<std::size_t>(e) * (connectivity_.cols() == 4 ? 1 : 4) + q;
+    const Mat3 p = weight * stress(point, h);
     for (int a = 0; a < g.rows(); ++a) forces.segment<3>(3 * connectivity_(e, a)) += p * g.row(a).transpose();
     return true;
   };
@@ -270,12 +350,12 @@ void Assembly::tangent(const MaterialLaw& law, const Moduli& m, const VectorX& u
 VectorX Assembly::forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const {
   const bool averaged =
       connectivity_.cols() == 4 ? average_dilatation<4, 1>(law, m, u) : average_dilatation<10, 4>(law, m, u);
-  return forces_of(u, [&](Index e, const Mat3& h) {
+  return forces_of(u, [&](std::size_t point, const Mat3& h) {
     Mat3 stress = law.stress_d_poisson(m, h);
     if (averaged) {
       VolumetricPart part;
       law.volumetric_part(m, h, false, part);
-      stress += part.modulus_d_poisson * (mean_[patch_of_[e]] - part.theta) * part.gradient;
+      stress += part.modulus_d_poisson * (mean_[point] - part.theta) * part.gradient;
     }
     return stress;
   });
@@ -283,7 +363,7 @@ VectorX Assembly::forces_d_poisson(const MaterialLaw& law, const Moduli& m, cons
 
 // Further parameters never enter a volumetric part (VolumetricPart knows only its derivative to nu).
 VectorX Assembly::forces_d_extra(const MaterialLaw& law, const Moduli& m, const VectorX& u, int index) const {
-  return forces_of(u, [&](Index, const Mat3& h) { return law.stress_d_extra(m, h, index); });
+  return forces_of(u, [&](std::size_t, const Mat3& h) { return law.stress_d_extra(m, h, index); });
 }
 
 }  // namespace palpate::fem

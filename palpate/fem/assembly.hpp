@@ -8,6 +8,7 @@
 #include "palpate/core/math.hpp"
 #include "palpate/core/mesh.hpp"
 #include "palpate/fem/materials.hpp"
+#include "palpate/fem/sparse_factor.hpp"
 #include "palpate/fem/statics.hpp"
 
 namespace palpate::fem {
@@ -25,12 +26,16 @@ using BlockValues = std::vector<double>;  ///< 9 a block
 /// y = A x of a symmetric block matrix.
 VectorX multiply(const BlockPattern& pattern, const BlockValues& values, const Eigen::Ref<const VectorX>& x);
 
+/// With Dilatation::averaged the volume change theta of quadratic tetrahedra is projected on continuous linear functions
+/// (Taylor-Hood, Q theta = sum N_i p_i, M p = integral of N theta): the energy kappa/2 (Q theta)^2 stays a function of u
+/// alone, and its tangent K + kappa B' M^-1 B is factorised as the quasi-definite [K B'; B -M/kappa]. The pattern then has
+/// one more block node for every corner, of which the first unknown is the pressure and the two others are idle.
 class Assembly {
  public:
   /// @throws Error on indices out of range, an inside-out or degenerate element, or a column count other than 4 or 10.
   explicit Assembly(const TetMesh& mesh, Dilatation dilatation = Dilatation::pointwise);
 
-  Index node_count() const { return pattern_.nodes; }
+  Index node_count() const { return nodes_; }
   Index element_count() const { return static_cast<Index>(connectivity_.rows()); }
   const BlockPattern& pattern() const { return pattern_; }
   double volume_m3() const { return volume_; }
@@ -42,6 +47,13 @@ class Assembly {
 
   /// Tangent stiffness in the pattern's blocks.
   void tangent(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
+
+  /// Product of the tangent in `blocks` (the last one assembled) with a displacement.
+  VectorX multiply(const BlockValues& blocks, const VectorX& x) const;
+  /// Negative pivots of a stable body's tangent (those of its pressures).
+  int expected_negative_pivots() const { return expected_negative_; }
+  /// The tangent of a linear law is not linear in (lambda, mu).
+  bool is_mixed() const { return pressures_ > 0; }
 
   /// d(internal forces)/dnu at constant E and u.
   VectorX forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const;
@@ -63,6 +75,9 @@ class Assembly {
 
   void build_pattern();
   void build_patches();
+  void build_pressures(const TetMesh& mesh);
+  template <int N, int Q>
+  void add_pressure_blocks(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
 
   Tetrahedra connectivity_;        // nodes of an element in ascending order: local block a >= b is then a lower block
   std::vector<double> gradients_;  // element, quadrature point, node, 3
@@ -78,9 +93,17 @@ class Assembly {
     double volume = 0;
   };
   std::vector<Patch> patches_;
-  std::vector<Index> patch_of_;       // element
-  std::vector<Index> slot_;           // element, node: its place in the patch's nodes
-  mutable std::vector<double> mean_;  // theta of each patch, scratch
+  std::vector<Index> patch_of_;  // element
+  std::vector<Index> slot_;      // element, node: its place in the patch's nodes
+  // Pressures at the corners (none: pointwise or linear elements).
+  Index nodes_ = 0, pressures_ = 0;
+  std::vector<Index> pressure_of_;     // element, corner in the mesh's order
+  std::vector<Index> pressure_block_;  // element, corner, node: block of B
+  std::vector<Index> mass_block_;      // element, corner pairs a, b: block of M, -1 above the diagonal
+  SparseFactor mass_factor_;
+  mutable double modulus_ = 0;  // kappa of the last tangent
+  mutable int expected_negative_ = 0;
+  mutable std::vector<double> mean_;  // averaged theta at each quadrature point, scratch
 };
 
 }  // namespace palpate::fem

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Patches over which the volume change is averaged. A quadratic tetrahedron is its own patch (P2/P0). A linear one has too
-// few unknowns for a constraint of its own, so the tetrahedra around a node share one (compare the F-bar patches of de Souza
-// Neto, Pires and Owen 2005).
+// Where the volume change is averaged: continuous linear pressures of quadratic tetrahedra, patches of linear ones. A linear
+// tetrahedron has too few unknowns for a constraint of its own, so those around a node share one (compare the F-bar patches
+// of de Souza Neto, Pires and Owen 2005).
 #include <algorithm>
 
+#include "palpate/core/error.hpp"
 #include "palpate/fem/assembly.hpp"
+#include "palpate/fem/tetrahedron.hpp"
 
 namespace palpate::fem {
 namespace {
@@ -64,32 +66,52 @@ Index group_linear_elements(const Tetrahedra& elements, Index node_count, std::v
 
 void Assembly::build_patches() {
   const Index count = element_count();
-  const int nodes = static_cast<int>(connectivity_.cols());
-  const int points = nodes == 4 ? 1 : 4;
-  Index patches = count;
-  if (nodes == 4) {
-    patches = group_linear_elements(connectivity_, pattern_.nodes, patch_of_);
-  } else {
-    patch_of_.resize(count);
-    for (Index e = 0; e < count; ++e) patch_of_[e] = e;
-  }
-  patches_.resize(patches);
+  patches_.resize(group_linear_elements(connectivity_, nodes_, patch_of_));
   for (Index e = 0; e < count; ++e) {
     Patch& patch = patches_[patch_of_[e]];
-    for (int a = 0; a < nodes; ++a) patch.nodes.push_back(connectivity_(e, a));
-    for (int q = 0; q < points; ++q) patch.volume += weights_[static_cast<std::size_t>(e) * points + q];
+    for (int a = 0; a < 4; ++a) patch.nodes.push_back(connectivity_(e, a));
+    patch.volume += weights_[e];
   }
   for (Patch& patch : patches_) {
     std::sort(patch.nodes.begin(), patch.nodes.end());
     patch.nodes.erase(std::unique(patch.nodes.begin(), patch.nodes.end()), patch.nodes.end());
   }
-  slot_.resize(static_cast<std::size_t>(count) * nodes);
+  slot_.resize(static_cast<std::size_t>(count) * 4);
   for (Index e = 0; e < count; ++e) {
     const auto& all = patches_[patch_of_[e]].nodes;
-    for (int a = 0; a < nodes; ++a)
-      slot_[static_cast<std::size_t>(e) * nodes + a] =
+    for (int a = 0; a < 4; ++a)
+      slot_[static_cast<std::size_t>(e) * 4 + a] =
           static_cast<Index>(std::lower_bound(all.begin(), all.end(), connectivity_(e, a)) - all.begin());
   }
+}
+
+void Assembly::build_pressures(const TetMesh& mesh) {
+  std::vector<Index> number(nodes_, -1);
+  for (Index e = 0; e < element_count(); ++e)
+    for (int a = 0; a < 4; ++a) {
+      Index& p = number[mesh.tetrahedra(e, a)];
+      if (p < 0) p = pressures_++;
+      pressure_of_.push_back(p);
+    }
+  pattern_.nodes = nodes_ + pressures_;
+  std::vector<Eigen::Triplet<double>> triplets;
+  const auto quadrature = tet_quadrature_4();
+  for (Index e = 0; e < element_count(); ++e)
+    for (int q = 0; q < 4; ++q)
+      for (int a = 0; a < 4; ++a)
+        for (int b = 0; b < 4; ++b) {
+          const Index i = pressure_of_[4 * static_cast<std::size_t>(e) + a],
+                      j = pressure_of_[4 * static_cast<std::size_t>(e) + b];
+          if (i >= j)
+            triplets.emplace_back(
+                i, j,
+                weights_[4 * static_cast<std::size_t>(e) + q] * quadrature[q].barycentric(a) * quadrature[q].barycentric(b));
+        }
+  Eigen::SparseMatrix<double> mass(pressures_, pressures_);
+  mass.setFromTriplets(triplets.begin(), triplets.end());
+  mass_factor_ = SparseFactor({false, 1, 1});
+  mass_factor_.analyse(mass);
+  if (!mass_factor_.factorise(mass)) throw Error("its elements are too distorted for pressures at the corners", "mesh");
 }
 
 }  // namespace palpate::fem

@@ -12,7 +12,7 @@ namespace palpate::fem {
 
 ReducedSystem::ReducedSystem(const BlockPattern& pattern, const std::vector<Constraint>& constraints, MatrixX rigid_border,
                              const Points& nodes_m, int threads)
-    : nodes_(pattern.nodes),
+    : nodes_(static_cast<Index>(nodes_m.rows())),
       kept_(pattern.nodes, 0),
       special_(pattern.nodes, -1),
       constraints_(constraints),
@@ -26,7 +26,7 @@ ReducedSystem::ReducedSystem(const BlockPattern& pattern, const std::vector<Cons
       partial_.push_back({c.axes, c.count});
     }
   }
-  for (Index i = 0; i < nodes_; ++i)
+  for (Index i = 0; i < pattern.nodes; ++i)
     if (kept_[i] >= 0) {
       kept_[i] = static_cast<Index>(kept_nodes_.size());
       kept_nodes_.push_back(i);
@@ -35,7 +35,8 @@ ReducedSystem::ReducedSystem(const BlockPattern& pattern, const std::vector<Cons
   if (rigid_border.cols() == 0) return;
 
   const Eigen::HouseholderQR<MatrixX> qr(rigid_border);
-  border_ = qr.householderQ() * MatrixX::Identity(rigid_border.rows(), rigid_border.cols());
+  border_ = MatrixX::Zero(3 * pattern.nodes, rigid_border.cols());
+  border_.topRows(3 * nodes_) = qr.householderQ() * MatrixX::Identity(rigid_border.rows(), rigid_border.cols());
   // Three nodes that span the body carry the springs.
   const Vec3 middle = nodes_m.colwise().mean().transpose();
   Index a = 0, b = 0, c = 0;
@@ -64,7 +65,7 @@ VectorX ReducedSystem::prescribed_part(const VectorX& u) const {
 }
 
 VectorX ReducedSystem::free_part(const VectorX& force) const {
-  if (border_.cols() > 0) return force - border_ * (border_.transpose() * force);
+  if (border_.cols() > 0) return force - border_.topRows(3 * nodes_) * (border_.topRows(3 * nodes_).transpose() * force);
   return force - prescribed_part(force);
 }
 
@@ -100,7 +101,7 @@ void ReducedSystem::fill(const BlockPattern& pattern, const BlockValues& blocks,
       if (kept_[row] < 0) continue;
       Mat3 block = Eigen::Map<const Mat3>(&blocks[9 * static_cast<std::size_t>(p)]);
       const int special_row = special_[row];
-      if (row == node && shift != 0) block.diagonal() *= 1 + shift;
+      if (row == node && shift != 0 && node < nodes_) block.diagonal() *= 1 + shift;
       if (special_row >= 0 || special_column >= 0) {
         const double keep = block.trace() / 3;
         if (special_row >= 0) {
@@ -115,7 +116,7 @@ void ReducedSystem::fill(const BlockPattern& pattern, const BlockValues& blocks,
           for (int k = 0; k < partial_[special_row].count; ++k) block(k, k) = keep;
       }
       if (row == node) {
-        diagonal_sum += block.trace();
+        if (node < nodes_) diagonal_sum += block.trace();
         for (int c = 0; c < 3; ++c)
           for (int r = c; r < 3; ++r) *column[c]++ = block(r, c);
       } else {
@@ -125,21 +126,27 @@ void ReducedSystem::fill(const BlockPattern& pattern, const BlockValues& blocks,
     }
   }
   if (!spring_dofs_.empty()) {
-    spring_ = diagonal_sum / static_cast<double>(lower_.cols());
+    spring_ = diagonal_sum / static_cast<double>(3 * nodes_);
     for (Index dof : spring_dofs_) value[outer[dof]] += spring_;
   }
 }
 
-bool ReducedSystem::factorise(const BlockPattern& pattern, const BlockValues& blocks, double shift) {
+bool ReducedSystem::factorise(const BlockPattern& pattern, const BlockValues& blocks, double shift, int negative) {
   use_indefinite_ = false;
-  fill(pattern, blocks, shift);
-  if (factor_.factorise(lower_)) return complete_border();
+  if (negative == 0) {
+    fill(pattern, blocks, shift);
+    if (factor_.factorise(lower_)) return complete_border();
+    if (border_.cols() == 0) return false;
+  }
   // A free body under compression may be stable although its springs alone do not hold it: the inertia of the whole bordered
-  // matrix decides. Stable means that exactly the six multipliers are negative.
-  if (border_.cols() == 0 || !factorise_indefinite(pattern, blocks, shift)) return false;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(schur_, Eigen::EigenvaluesOnly);
-  const auto negative = indefinite_->negative_pivots() + (eigen.eigenvalues().array() > 0).count();
-  return negative == border_.cols();
+  // matrix decides. Stable means that only pressures and the six multipliers are negative.
+  if (!factorise_indefinite(pattern, blocks, shift)) return false;
+  auto found = static_cast<Index>(indefinite_->negative_pivots());
+  if (border_.cols() > 0) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(schur_, Eigen::EigenvaluesOnly);
+    found += static_cast<Index>((eigen.eigenvalues().array() > 0).count());
+  }
+  return found == negative + border_.cols();
 }
 
 bool ReducedSystem::factorise_indefinite(const BlockPattern& pattern, const BlockValues& blocks, double shift) {
@@ -173,7 +180,12 @@ bool ReducedSystem::complete_border() {
 
 MatrixX ReducedSystem::reduce(const MatrixX& full) const {
   MatrixX reduced(3 * kept_nodes_.size(), full.cols());
-  for (std::size_t i = 0; i < kept_nodes_.size(); ++i) reduced.middleRows<3>(3 * i) = full.middleRows<3>(3 * kept_nodes_[i]);
+  for (std::size_t i = 0; i < kept_nodes_.size(); ++i) {
+    if (kept_nodes_[i] < nodes_)
+      reduced.middleRows<3>(3 * i) = full.middleRows<3>(3 * kept_nodes_[i]);
+    else
+      reduced.middleRows<3>(3 * i).setZero();
+  }
   for (const Constraint& c : constraints_)
     if (c.count > 0 && c.count < 3) {
       auto rows = reduced.middleRows<3>(3 * kept_[c.node]);
@@ -185,7 +197,8 @@ MatrixX ReducedSystem::reduce(const MatrixX& full) const {
 
 MatrixX ReducedSystem::expand(const MatrixX& reduced) const {
   MatrixX full = MatrixX::Zero(3 * nodes_, reduced.cols());
-  for (std::size_t i = 0; i < kept_nodes_.size(); ++i) full.middleRows<3>(3 * kept_nodes_[i]) = reduced.middleRows<3>(3 * i);
+  for (std::size_t i = 0; i < kept_nodes_.size() && kept_nodes_[i] < nodes_; ++i)
+    full.middleRows<3>(3 * kept_nodes_[i]) = reduced.middleRows<3>(3 * i);
   for (const Constraint& c : constraints_)
     if (c.count > 0 && c.count < 3) {
       auto rows = full.middleRows<3>(3 * c.node);

@@ -16,6 +16,8 @@ namespace palpate::fem {
 
 class ReducedSystem {
  public:
+  /// The pattern may have more block nodes than the mesh (pressures behind the displacements): they are solved for, not
+  /// shown.
   /// @param rigid_border  3n x 6 mass-weighted rigid motions of a free object, or 3n x 0
   ReducedSystem(const BlockPattern& pattern, const std::vector<Constraint>& constraints, MatrixX rigid_border,
                 const Points& nodes_m, int threads);
@@ -25,8 +27,9 @@ class ReducedSystem {
   /// Removes from a residual (3n) what supports carry: prescribed directions, or rigid-body inertia of a free object.
   VectorX free_part(const VectorX& force) const;
 
-  /// Factorises blocks + shift * diagonal. False when the matrix is not positive definite.
-  bool factorise(const BlockPattern& pattern, const BlockValues& blocks, double shift = 0);
+  /// Factorises blocks + shift * diagonal. False when it is not the tangent of a stable body: positive definite, up to
+  /// `negative` pivots that belong to pressures.
+  bool factorise(const BlockPattern& pattern, const BlockValues& blocks, double shift, int negative);
   /// The same for the tangent of an unstable state (some negative pivots). False when it is singular.
   bool factorise_indefinite(const BlockPattern& pattern, const BlockValues& blocks, double shift = 0);
 
@@ -41,7 +44,7 @@ class ReducedSystem {
   bool complete_border();
   void solve_reduced(MatrixX& reduced) const;
 
-  Index nodes_ = 0;
+  Index nodes_ = 0;                // of the mesh
   std::vector<Index> kept_;        // reduced node of a node, or -1
   std::vector<Index> kept_nodes_;  // node of a reduced node
   std::vector<int> special_;       // per node: index into partial_ or -1

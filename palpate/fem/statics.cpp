@@ -73,7 +73,7 @@ struct Statics::Impl {
     motions = MatrixX(boundary.motions);
     for (Index k = 0; k < motions.cols(); ++k) motions.col(k) = system.prescribed_part(motions.col(k));
     diameter_m = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
-    if (law.is_linear()) {
+    if (law.is_linear() && !assembly.is_mixed()) {
       Moduli unit;
       const VectorX rest = VectorX::Zero(3 * assembly.node_count());
       unit.lambda = 1;
@@ -115,9 +115,9 @@ struct Statics::Impl {
     factored_u.resize(0);
     // The exact tangent first; a shifted one only where it is not positive definite (clamping every element would destroy
     // quadratic convergence). Under a limit load the shift keeps descent towards a stable equilibrium.
-    for (double shift = 0; shift < 1e3; shift = shift == 0 ? 1e-3 : shift * 8) {
+    for (double shift = 0; shift < 1e3; shift = shift == 0 ? 1e-3 : shift * 4) {
       ++factorisations;
-      if (system.factorise(assembly.pattern(), blocks, shift)) {
+      if (system.factorise(assembly.pattern(), blocks, shift, assembly.expected_negative_pivots())) {
         if (shifted) *shifted = shift > 0;
         if (shift == 0) {
           factored_u = u;
@@ -140,7 +140,7 @@ struct Statics::Impl {
       bool shifted = false;
       if (!factorise_tangent(p, s.u, out.factorisations, &shifted)) return "the tangent could not be factorised";
       VectorX rhs = -(s.internal - p.external);
-      if (!at_target) rhs -= multiply(assembly.pattern(), blocks, jump);
+      if (!at_target) rhs -= assembly.multiply(blocks, jump);
       const VectorX d_free = system.solve(rhs);
       if (!d_free.allFinite()) return "the Newton step is not finite";
       ++out.newton_steps;
@@ -190,7 +190,7 @@ struct Statics::Impl {
       }
       const int before = out.newton_steps;
       reason =
-          usable ? newton(part, s, out, std::min(25, options.max_newton_steps)) : "the law does not exist at the last state";
+          usable ? newton(part, s, out, std::min(40, options.max_newton_steps)) : "the law does not exist at the last state";
       if (reason.empty()) {
         before_last = last.u;
         last_t = t;
@@ -273,10 +273,14 @@ struct Statics::Impl {
   void factorise_linear(double poisson, int* factorisations) {
     if (linear_poisson == poisson) return;
     const Moduli unit = moduli(1.0, poisson);
-    blocks.resize(blocks_mu.size());
-    for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] = unit.lambda * blocks_lambda[i] + unit.mu * blocks_mu[i];
+    if (assembly.is_mixed()) {
+      assembly.tangent(law, unit, VectorX::Zero(3 * assembly.node_count()), blocks);
+    } else {
+      blocks.resize(blocks_mu.size());
+      for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] = unit.lambda * blocks_lambda[i] + unit.mu * blocks_mu[i];
+    }
     linear_poisson = std::numeric_limits<double>::quiet_NaN();
-    if (!system.factorise(assembly.pattern(), blocks))
+    if (!system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots()))
       throw Error("the stiffness matrix is not positive definite: is the mesh degenerate?", "mesh");
     if (factorisations) ++*factorisations;
     linear_poisson = poisson;
@@ -295,7 +299,7 @@ struct Statics::Impl {
     MatrixX rhs(3 * assembly.node_count(), a.cols());
     for (Index c = 0; c < a.cols(); ++c) {
       rhs.col(c) = problems[c].external / young;
-      if (motions.cols() > 0) rhs.col(c) -= multiply(assembly.pattern(), blocks, problems[c].prescribed);
+      if (motions.cols() > 0) rhs.col(c) -= assembly.multiply(blocks, problems[c].prescribed);
     }
     const MatrixX u = system.solve(rhs);
     for (Index c = 0; c < a.cols(); ++c) {
@@ -325,7 +329,7 @@ struct Statics::Impl {
       if (!same) {
         factored_u.resize(0);
         assembly.tangent(law, p.m, u, blocks);
-        if (system.factorise(assembly.pattern(), blocks)) {
+        if (system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots())) {
           factored_u = u;
           factored_moduli = p.m;
         } else if (!system.factorise_indefinite(assembly.pattern(), blocks)) {
@@ -343,12 +347,12 @@ struct Statics::Impl {
     rhs.col(1) = -assembly.forces_d_poisson(law, p.m, u);
     for (Index i = 0; i < x; ++i) rhs.col(2 + i) = -assembly.forces_d_extra(law, p.m, u, static_cast<int>(i));
     rhs.middleCols(2 + x, k) = MatrixX(boundary.forces);
-    for (Index j = 0; j < m; ++j) rhs.col(2 + x + k + j) = -scale * multiply(assembly.pattern(), blocks, motions.col(j));
+    for (Index j = 0; j < m; ++j) rhs.col(2 + x + k + j) = -scale * assembly.multiply(blocks, motions.col(j));
     MatrixX du = system.solve(rhs) / scale;
     // Reactions: M' (K du - rhs), with K du of the whole displacement.
     MatrixX reaction(m, du.cols());
     for (Index j = 0; m > 0 && j < du.cols(); ++j)
-      reaction.col(j) = motions.transpose() * (scale * multiply(assembly.pattern(), blocks, du.col(j)) - rhs.col(j));
+      reaction.col(j) = motions.transpose() * (scale * assembly.multiply(blocks, du.col(j)) - rhs.col(j));
     du.rightCols(m) += motions;
     Sensitivity out;
     out.d_log_young = du.col(0);

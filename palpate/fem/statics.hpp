@@ -37,7 +37,8 @@ struct Boundary {
 /// How the part of an energy that locks near nu = 0.5 is integrated.
 enum class Dilatation {
   pointwise,  ///< as the law says: plain linear or quadratic tetrahedra
-  averaged,   ///< the volume change is averaged over each quadratic tetrahedron, or over patches of linear ones around nodes
+  averaged,   ///< the volume change is projected on continuous linear functions (quadratic tetrahedra: Taylor-Hood, right up
+             ///< to nu = 0.4999) or averaged over patches around nodes (linear ones)
 };
 
 struct StaticsOptions {
