@@ -9,8 +9,10 @@
 #include <map>
 #include <memory>
 
+#include "cli/info_bag.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/io/file.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_names.hpp"
 
@@ -248,8 +250,10 @@ int look(Session& session, const std::filesystem::path& folder) {
 
 Run verbs::info(CLI::App& app) {
   auto folder = std::make_shared<std::filesystem::path>();
-  app.add_option("recording", *folder, "folder of the recording")->required();
-  return [folder](Session& session) { return look(session, *folder); };
+  app.add_option("recording", *folder, "folder of the recording, or an MCAP file")->required();
+  return [folder](Session& session) {
+    return io::extension_of(*folder) == ".mcap" ? look_into_bag(session, *folder) : look(session, *folder);
+  };
 }
 
 }  // namespace palpate::cli

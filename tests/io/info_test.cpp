@@ -66,5 +66,18 @@ TEST_F(Info, WhatCannotBeReadExitsWithThreeAndNamesFileLineAndField) {
       << outcome.out;
 }
 
+TEST(InfoOfABag, ListsItsTopics) {
+  if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  const TemporaryFolder folder("bag");
+  const std::string command = "'" + std::string(PALPATE_CLI) + "' info --json '" + PALPATE_SOURCE_DIR +
+                              "/tests/io/files/peer_lz4.mcap' > '" + folder.path().string() + "/out' 2> '" +
+                              folder.path().string() + "/err'";
+  ASSERT_EQ(std::system(command.c_str()), 0) << folder.get("err");
+  const nlohmann::json all = nlohmann::json::parse(folder.get("out"));
+  EXPECT_EQ(all["topics"][0]["topic"], "/wrench");
+  EXPECT_EQ(all["topics"][0]["messages"], 12);
+  EXPECT_EQ(all["topics"][0]["understood"], true);
+}
+
 }  // namespace
 }  // namespace palpate::io
