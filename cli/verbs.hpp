@@ -21,6 +21,7 @@ using SetUp = Run(CLI::App& app);
 // clang-format off
 //     verb         group      what it does (one line of the help)                                     an example
 #define PALPATE_VERBS(VERB) \
+  VERB(demo,       "start",   "the whole way on a made-up foam cube: push, fit, report",               "palpate demo -o out") \
   VERB(model,      "object",  "make tetrahedra that can be simulated from a surface, however broken",  "palpate model teddy.obj -o out --tetrahedra 10000 --unit mm") \
   VERB(record,     "measure", "make a recording: the built-in demonstration",                         "palpate record --demo -o foam_cube") \
   VERB(info,       "measure", "what is in a recording, in units, and what is wrong with it",           "palpate info recording") \

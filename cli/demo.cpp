@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// `palpate demo -o OUT`: the whole way on the built-in recording, verb by verb as a user would type it, with the truth
+// beside the answer at the end.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli/verbs.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/report/words.hpp"
+
+namespace palpate::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+int run_verb(SetUp& set_up, const std::string& name, const std::vector<std::string>& arguments, Session& session) {
+  std::string typed = "$ palpate " + name;
+  for (const std::string& argument : arguments) typed += " " + argument;
+  session.say(typed);
+  CLI::App app;
+  const Run run = set_up(app);
+  app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  return run(session);
+}
+
+nlohmann::json read_json(const fs::path& path) {
+  std::ifstream file(path);
+  nlohmann::json object = nlohmann::json::parse(file, nullptr, false);
+  if (object.is_discarded()) throw Error("cannot be read back", path.string());
+  return object;
+}
+
+/// "Young's modulus: truth 20.0 kPa, found 20.3 kPa, inside the 95 % interval", one line a parameter.
+void compare_with_truth(Session& session, const nlohmann::json& truth, const nlohmann::json& result) {
+  session.say("The recording was made by palpate's own lab, so the truth is known:");
+  for (const auto& parameter : result.at("parameters")) {
+    const std::string name = parameter.at("name"), unit = parameter.value("unit", "");
+    if (!truth.contains(name)) continue;
+    const double true_value = truth.at(name), value = parameter.at("value");
+    const double lower = parameter.at("lower_95"), upper = parameter.at("upper_95");
+    const bool inside = lower <= true_value && true_value <= upper;
+    session.say(fmt::format("  {}: truth {}, found {}, {} the 95 % interval {}",
+                            name == "young_modulus" ? "Young's modulus" : "Poisson ratio",
+                            report::quantity(true_value, unit), report::quantity(value, unit), inside ? "inside" : "OUTSIDE",
+                            report::interval(lower, upper, unit)));
+  }
+}
+
+int demonstrate(Session& session, const fs::path& out) {
+  const fs::path recording = out / "recording", truth = out / "truth.json";
+  // A demonstration that was made here before is replaced; anything else of that name is not ours to remove.
+  if (fs::exists(truth)) fs::remove_all(recording);
+  fs::create_directories(out);
+  Session quiet_json;  // the demonstration answers with one object: that of the estimate
+  quiet_json.seed = session.seed;
+  quiet_json.threads = session.threads;
+  quiet_json.quiet = session.quiet;
+  int code = run_verb(verbs::record, "record", {"--demo", "-o", recording.string(), "--truth", truth.string()}, quiet_json);
+  if (code != exit_done) return code;
+  code = run_verb(verbs::estimate, "estimate", {recording.string(), "-o", out.string()}, session);
+  if (!fs::exists(out / "result.json")) return code;
+  compare_with_truth(session, read_json(truth), read_json(out / "result.json"));
+  const int drawn = run_verb(verbs::report, "report", {out.string(), "--png", (out / "figures").string()}, quiet_json);
+  return code != exit_done ? code : drawn;
+}
+
+}  // namespace
+
+Run verbs::demo(CLI::App& app) {
+  auto out = std::make_shared<std::string>("palpate-demo");
+  app.add_option("-o,--out", *out, "folder for the recording, the result, the report and the figures")
+      ->capture_default_str();
+  return [out](Session& session) { return demonstrate(session, *out); };
+}
+
+}  // namespace palpate::cli
