@@ -308,9 +308,9 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
       c.d_force.block<3, 1>(body.gravity_column, at) += into_object * gravity;
     }
   }
-  // A translation of the clamp changes no load, but it moves the surface.
+  // The clamp moves the surface, whether or not a load depends on it.
   if (clamp_[s] >= 0) {
-    for (int k = 0; k < 3; ++k) column(clamp_[s] + k);
+    for (int k = 0; k < 6; ++k) column(clamp_[s] + k);
   }
   return c;
 }
@@ -441,6 +441,14 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
       const VectorX weights = columns * direction;
       out.travel_m(l) = weights.dot(at.displacement_m);
       out.d_travel.row(l) = weights.transpose() * field;
+      if (clamp_[s] < 0) continue;
+      // A turned clamp turns the object under the tool's direction.
+      const Vec3 mean_motion_m = columns.transpose() * at.displacement_m;
+      const Mat3 turn = clamp.inverse_rotation_derivative(load.direction.normalized());
+      for (Index k = 2; k < count; ++k) {
+        const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s] - 3;
+        if (component >= 0 && component < 3) out.d_travel(l, k) += mean_motion_m.dot(turn.col(component));
+      }
     }
   }
 

@@ -1,0 +1,175 @@
+// label: contract
+// SPDX-License-Identifier: Apache-2.0
+// What every measurement term promises: its jacobian is the derivative of its residual to every unknown there is, far from
+// rest and with every nuisance off its prior mean. A new term joins with one line of `cases`.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "scenes.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// Points a little off the surface of `predicted`, inside and outside, one a triangle (away from its edges).
+Points points_near(const Points& surface_m, const Triangles& triangles, double off_m) {
+  Points points(triangles.rows(), 3);
+  for (Index t = 0; t < triangles.rows(); ++t) {
+    const Vec3 a = surface_m.row(triangles(t, 0)), b = surface_m.row(triangles(t, 1)), c = surface_m.row(triangles(t, 2));
+    const Vec3 normal = (b - a).cross(c - a).normalized();
+    points.row(t) = 0.41 * a + 0.33 * b + 0.26 * c + (t % 2 == 0 ? off_m : -off_m) * normal;
+  }
+  return points;
+}
+
+struct Scene {
+  const Points& surface_m;  ///< as predicted in the state that derivatives are checked at
+  const Triangles& triangles;
+};
+
+TermInput cloud(const Scene& scene) {
+  PointCloud cloud;
+  cloud.points_m = points_near(scene.surface_m, scene.triangles, 4e-4);
+  cloud.sigma_m = VectorX::Constant(1, 5e-4);
+  cloud.pose_std_m = 1e-3;
+  cloud.pose_std_rad = 0.01;
+  return cloud;
+}
+
+TermInput rays(const Scene& scene) {
+  RayObservation observation;
+  const Points points = points_near(scene.surface_m, scene.triangles, 6e-4);
+  const Index count = static_cast<Index>(points.rows());
+  const Vec3 eye(0.12, -0.21, 0.35);
+  RayCloud& r = observation.rays;
+  r.origins_m = eye.transpose().replicate(count, 1);
+  r.directions = (points.rowwise() - eye.transpose()).rowwise().normalized();
+  r.range_m = (points.rowwise() - eye.transpose()).rowwise().norm();
+  r.sigma_m = VectorX::Constant(count, 8e-4);
+  observation.pose_std_m = 1e-3;
+  observation.pose_std_rad = 0.01;
+  observation.bias_std_m = 5e-4;
+  return observation;
+}
+
+TermInput markers(const Scene&) {
+  Markers markers;
+  markers.names = {"a", "b", "hidden"};
+  markers.rest_m.resize(3, 3);
+  markers.rest_m << 0.051, 0.019, 0.034, 0.031, -0.006, 0.014, 0.02, 0.02, 0.03;  // two stand off the surface
+  markers.observed_m = markers.rest_m.array() + 0.003;
+  markers.observed_m.row(2).setConstant(std::nan(""));
+  markers.sigma_m = 3e-4;
+  markers.rest_std_m = 5e-4;
+  return markers;
+}
+
+TermInput travel(const Scene&) { return ToolTravel{"tip", 0.004, 2e-4}; }
+
+TermInput wrench(const Scene&) {
+  Wrench wrench;
+  wrench.force_n = Vec3(0.1, -0.2, -1.5);
+  wrench.force_sigma_n = 0.05;
+  return wrench;
+}
+
+TermInput single_axis_wrench(const Scene& scene) {
+  Wrench one = std::get<Wrench>(wrench(scene));
+  one.along = Vec3(0, 0.6, -0.8);
+  return one;
+}
+
+struct Case {
+  const char* name;
+  TermInput (*make)(const Scene&);
+  std::size_t step;  ///< of clamped_block: 0 tip, 1 unloaded, 2 plate
+  bool along_rays;
+  bool weight = true;
+};
+
+const std::vector<Case> cases{
+    {"rays_tip", rays, 0, true},
+    {"rays_as_points_tip", rays, 0, false},
+    {"rays_plate", rays, 2, true},
+    {"cloud_tip", cloud, 0, true},
+    {"cloud_plate", cloud, 2, true},
+    {"cloud_unloaded", cloud, 1, true, false},
+    {"markers_tip", markers, 0, true},
+    {"markers_plate", markers, 2, true},
+    {"travel_tip", travel, 0, true},
+    {"wrench_plate", wrench, 2, true},
+    {"single_axis_wrench_plate", single_axis_wrench, 2, true},
+    {"cloud_plate_weightless", cloud, 2, true, false},
+};
+
+class TermContract : public testing::TestWithParam<std::tuple<Case, const char*>> {};
+
+TEST_P(TermContract, JacobianIsTheDerivativeOfTheResidual) {
+  const auto& [test, material] = GetParam();
+  const TetMesh mesh = kuhn_block(3, 2, 2, block_size_m);
+  Recording recording = clamped_block(mesh, test.weight);
+  const SimulatedObject object = simulated(mesh, material);
+
+  // The observation is made around the state that the derivatives are checked at.
+  TermInput input;
+  {
+    Unknowns unknowns;
+    ForwardModel model(recording, object, unknowns, tight());
+    const StepPrediction predicted = model.predict(test.step, away_from_rest(unknowns));
+    ASSERT_TRUE(predicted.converged) << predicted.reason;
+    ASSERT_GT((predicted.surface_m - object.surface.rest().vertices_m).cwiseAbs().maxCoeff(), 1e-3);
+    input = test.make({predicted.surface_m, object.surface.rest().triangles});
+  }
+  if (const auto* reading = std::get_if<Wrench>(&input)) recording.pushes[1].steps[0].observations.push_back(*reading);
+
+  Unknowns unknowns;
+  ForwardModel model(recording, object, unknowns, tight());
+  std::map<std::string, int> shared;
+  const auto term = make_term(input, {model, test.step, unknowns, shared});
+  ASSERT_NE(term, nullptr);
+  const VectorX at = away_from_rest(unknowns);
+  const TermRows rows = term->rows(model.predict(test.step, at), at, test.along_rays);
+
+  ASSERT_EQ(rows.jacobian.rows(), rows.residual.size());
+  ASSERT_EQ(rows.jacobian.cols(), static_cast<Index>(rows.unknowns.size()));
+  ASSERT_EQ(rows.sigma.size(), rows.residual.size());
+  ASSERT_TRUE(rows.jacobian.allFinite());
+  std::size_t compared = 0;
+  for (int k = 0; k < unknowns.size(); ++k) {
+    VectorX claimed = VectorX::Zero(rows.residual.size());
+    for (std::size_t c = 0; c < rows.unknowns.size(); ++c) {
+      if (rows.unknowns[c] == k) claimed += rows.jacobian.col(static_cast<Index>(c));
+    }
+    const double h = difference_of(unknowns, k);
+    VectorX ahead = at, behind = at;
+    ahead(k) += h;
+    behind(k) -= h;
+    const VectorX above = term->rows(model.predict(test.step, ahead), ahead, test.along_rays).residual;
+    const VectorX below = term->rows(model.predict(test.step, behind), behind, test.along_rays).residual;
+    // One scale for all rows of an unknown, but never smaller than what would matter to the fit: a thousandth of sigma when
+    // the unknown moves by its prior's standard deviation.
+    VectorX measured(rows.residual.size());
+    for (Index i = 0; i < measured.size(); ++i) {
+      const bool seen = std::isfinite(rows.residual(i)) && std::isfinite(above(i)) && std::isfinite(below(i));
+      measured(i) = seen ? (above(i) - below(i)) / (2 * h) : claimed(i);
+      compared += seen;
+    }
+    const double matters = 1e-3 / (k <= poisson ? 1 : unknowns[k].prior_std);
+    const double scale = std::max(measured.cwiseAbs().maxCoeff(), matters);
+    EXPECT_LT((claimed - measured).cwiseAbs().maxCoeff(), 2e-4 * scale)
+        << unknowns[k].name << ": claimed " << claimed.transpose().head(std::min<Index>(3, claimed.size())) << ", measured "
+        << measured.transpose().head(std::min<Index>(3, claimed.size()));
+  }
+  // Rays that pass by have no residual; most must hit for this to say anything.
+  EXPECT_GT(compared, static_cast<std::size_t>(unknowns.size() * rows.residual.size()) * 4 / 5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, TermContract,
+                         testing::Combine(testing::ValuesIn(cases), testing::Values("neo_hookean", "linear")),
+                         [](const auto& which) {
+                           return std::string(std::get<0>(which.param).name) + "_" + std::get<1>(which.param);
+                         });
+
+}  // namespace
+}  // namespace palpate::estimation
