@@ -16,6 +16,15 @@ namespace palpate {
 namespace {
 
 constexpr Index default_tetrahedra = 3000;
+constexpr double rays_a_frame = 6000;  // beyond that, noise is not what limits E: neighbouring pixels err together
+
+/// Every n-th row and column of an image, so that some thousand rays are left.
+RayCloud thinned_rays(const DepthFrame& frame) {
+  sensing::BackProjectionOptions options;
+  RayCloud rays = sensing::back_project(frame, options);
+  options.stride_px = static_cast<int>(std::floor(std::sqrt(static_cast<double>(rays.range_m.size()) / rays_a_frame)));
+  return options.stride_px > 1 ? sensing::back_project(frame, options) : rays;
+}
 
 /// Corners of quadratic tetrahedra alone, renumbered only if midpoints stood between them.
 TetMesh to_linear(const TetMesh& mesh) {
@@ -35,6 +44,25 @@ TetMesh to_linear(const TetMesh& mesh) {
   return linear;
 }
 
+/// The dent under a tool is what measures E, and its error is first in h / radius: three quadratic elements a radius keep it
+/// within a few per cent.
+std::vector<geometry::FinerNear> finer_under_tools(const Recording& recording) {
+  std::vector<geometry::FinerNear> finer;
+  for (const auto& push : recording.pushes) {
+    for (const auto& step : push.steps) {
+      for (const auto& load : step.loads) {
+        const auto tool = std::find_if(recording.tools.begin(), recording.tools.end(),
+                                       [&](const Tool& each) { return each.name == load.tool; });
+        if (tool == recording.tools.end() || !(tool->radius_m > 0)) continue;
+        const bool known = std::any_of(finer.begin(), finer.end(),
+                                       [&](const auto& near) { return (near.point_m - load.contact_m).norm() < 1e-6; });
+        if (!known) finer.push_back({load.contact_m, 1.5 * tool->radius_m, tool->radius_m / 3});
+      }
+    }
+  }
+  return finer;
+}
+
 /// Volume mesh of a recording that gives a surface; planes and boxes of its supports then have to find nodes of a mesh that
 /// follows the surface, so their tolerance becomes a share of its edges.
 void fill_with_tetrahedra(Recording& recording) {
@@ -43,9 +71,10 @@ void fill_with_tetrahedra(Recording& recording) {
   }
   geometry::TetrahedraliseOptions options;
   options.tetrahedra = default_tetrahedra;
+  if (recording.model.refine == "auto") options.finer = finer_under_tools(recording);
   auto filled = geometry::tetrahedralise(*recording.rest.surface, options);
   for (const auto& warning : filled.warnings) recording.warnings.push_back(warning.message);
-  const double edge_m = std::cbrt(6 * std::sqrt(2.0) * filled.check.volume_m3 / static_cast<double>(filled.mesh.tetrahedra.rows()));
+  const double edge_m = std::cbrt(6 * std::sqrt(2.0) * filled.check.volume_m3 / default_tetrahedra);
   for (auto& support : recording.supports) support.tolerance_m = std::max(support.tolerance_m, 0.1 * edge_m);
   recording.rest.volume = std::move(filled.mesh);
   recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
@@ -96,8 +125,8 @@ estimation::Inputs observe(const Recording& recording) {
       for (const auto& observation : step.observations) {
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
           const auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
-          terms.push_back(estimation::RayObservation{sensing::back_project(masked), frame->pose_std_m, frame->pose_std_rad,
-                                                     frame->noise.bias_std_m});
+          terms.push_back(
+              estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad, frame->noise.bias_std_m});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
           terms.push_back(*cloud);
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {

@@ -115,7 +115,8 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     tare_axis_.push_back(axis);
     tare_.push_back(unknowns.add_block("force_tare" + in_push, "N", push.force_tare_std_n,
                                        axis.norm() > 0 ? std::vector<std::string>{""} : xyz));
-    travel_offset_.push_back(unknowns.add_block("travel_offset" + in_push, "m", push.travel_offset_std_m, {""}));
+    const double offset_std_m = driven_tools(push).empty() ? 0 : push.travel_offset_std_m;  // else it belongs to the readings
+    travel_offset_.push_back(unknowns.add_block("travel_offset" + in_push, "m", offset_std_m, {""}));
     for (std::size_t s = 0; s < push.steps.size(); ++s) {
       steps_.push_back({p, s});
       const std::string in_step = "[" + push.name + ":" + std::to_string(s) + "]";
