@@ -3,11 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/version.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/geometry/embedding.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/plane_mask.hpp"
@@ -44,6 +48,48 @@ TetMesh to_linear(const TetMesh& mesh) {
   return linear;
 }
 
+/// Edge of a regular tetrahedron of the mesh's mean volume.
+double typical_edge_m(const TetMesh& mesh) {
+  const geometry::VolumeCheck check = geometry::check_volume(mesh);
+  return std::cbrt(6 * std::sqrt(2.0) * check.volume_m3 / static_cast<double>(mesh.tetrahedra.rows()));
+}
+
+/// Splits every triangle in four until none is larger than elements are, so that the surface can follow a dent; a surface
+/// that is fine already stays as it is.
+TriMesh subdivided(TriMesh surface, double edge_m) {
+  constexpr Index most = 60000;
+  const auto longest_m = [&] {
+    double longest = 0;
+    for (Index t = 0; t < surface.triangles.rows(); ++t) {
+      for (int k = 0; k < 3; ++k) {
+        longest = std::max(longest, (surface.vertices_m.row(surface.triangles(t, k)) -
+                                     surface.vertices_m.row(surface.triangles(t, (k + 1) % 3))).norm());
+      }
+    }
+    return longest;
+  };
+  while (4 * surface.triangles.rows() <= most && longest_m() > edge_m) {
+    std::map<std::pair<Index, Index>, Index> middle_of;
+    std::vector<Eigen::RowVector3d> added;
+    const Index before = static_cast<Index>(surface.vertices_m.rows());
+    const auto middle = [&](Index a, Index b) {
+      const auto [it, fresh] = middle_of.emplace(std::minmax(a, b), before + static_cast<Index>(added.size()));
+      if (fresh) added.push_back(0.5 * (surface.vertices_m.row(a) + surface.vertices_m.row(b)));
+      return it->second;
+    };
+    Triangles finer(4 * surface.triangles.rows(), 3);
+    for (Index t = 0; t < surface.triangles.rows(); ++t) {
+      const Index a = surface.triangles(t, 0), b = surface.triangles(t, 1), c = surface.triangles(t, 2);
+      const Index ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+      finer.middleRows<4>(4 * t) << a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca;
+    }
+    surface.triangles = std::move(finer);
+    surface.vertices_m.conservativeResize(before + static_cast<Index>(added.size()), 3);
+    for (std::size_t k = 0; k < added.size(); ++k) surface.vertices_m.row(before + static_cast<Index>(k)) = added[k];
+  }
+  return surface;
+}
+
 /// The dent under a tool is what measures E, and its error is first in h / radius: three quadratic elements a radius keep it
 /// within a few per cent.
 std::vector<geometry::FinerNear> finer_under_tools(const Recording& recording) {
@@ -74,7 +120,7 @@ void fill_with_tetrahedra(Recording& recording) {
   if (recording.model.refine == "auto") options.finer = finer_under_tools(recording);
   auto filled = geometry::tetrahedralise(*recording.rest.surface, options);
   for (const auto& warning : filled.warnings) recording.warnings.push_back(warning.message);
-  const double edge_m = std::cbrt(6 * std::sqrt(2.0) * filled.check.volume_m3 / default_tetrahedra);
+  const double edge_m = typical_edge_m(filled.mesh);
   for (auto& support : recording.supports) support.tolerance_m = std::max(support.tolerance_m, 0.1 * edge_m);
   recording.rest.volume = std::move(filled.mesh);
   recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
@@ -154,8 +200,14 @@ estimation::SimulatedObject build_simulated_object(Recording& recording) {
     object.mesh = given.tetrahedra.cols() == 10 ? given : fem::to_quadratic(given);
   }
   recording.model.element = quadratic ? "tet10" : "tet4";
-  object.surface = estimation::SimulatedSurface::boundary_of(
-      object.mesh, recording.rest.observed_triangles ? &*recording.rest.observed_triangles : nullptr);
+  if (recording.rest.surface) {
+    // Sensors see the given surface, not the mesh that fills it.
+    const TriMesh surface = subdivided(*recording.rest.surface, 0.5 * typical_edge_m(object.mesh));
+    object.surface = estimation::SimulatedSurface::embedded(object.mesh, surface, geometry::embed(surface.vertices_m, object.mesh));
+  } else {
+    object.surface = estimation::SimulatedSurface::boundary_of(
+        object.mesh, recording.rest.observed_triangles ? &*recording.rest.observed_triangles : nullptr);
+  }
   return object;
 }
 

@@ -189,7 +189,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
       pulls += std::pow((optimum.unknowns(k) - unknowns[k].prior_mean) / unknowns[k].prior_std, 2);
     }
   }
-  answer.fit.points_used = residuals.rows - residuals.outliers;
+  answer.fit.points_used = residuals.rows + residuals.missed - residuals.outliers;
   answer.fit.rms_m = residuals.lengths > 0 ? std::sqrt(residuals.sum_squared_m2 / static_cast<double>(residuals.lengths)) : 0;
   answer.fit.chi2_per_dof =
       (residuals.chi2 + pulls) / std::max(1.0, static_cast<double>(residuals.rows) - static_cast<double>(flat));

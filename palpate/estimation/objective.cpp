@@ -179,13 +179,15 @@ ResidualSummary Objective::summarise(const Loss& loss) const {
       std::map<int, std::pair<double, std::size_t>> cell_sums;
       for (Index i = 0; i < rows.residual.size(); ++i) {
         const double r = rows.residual(i);
-        ++summary.rows;
         if (rows.robust) ++summary.points;
-        const bool inside = std::abs(r) < loss.tukey;
-        if (rows.robust && !inside) {
+        if (std::isinf(r)) {  // a ray beside the silhouette: no residual that could be tested
           ++summary.outliers;
-          summary.missed += std::isinf(r);
+          ++summary.missed;
+          continue;
         }
+        ++summary.rows;
+        const bool inside = std::abs(r) < loss.tukey;
+        if (rows.robust && !inside) ++summary.outliers;
         summary.chi2 += rows.robust ? std::min(r * r, loss.tukey * loss.tukey) : r * r;
         if (rows.unit == "m" && (inside || !rows.robust)) {
           summary.sum_squared_m2 += std::pow(r * rows.sigma(i), 2);

@@ -82,9 +82,18 @@ SimulatedSurface SimulatedSurface::embedded(const TetMesh& mesh, const TriMesh& 
   surface.observed_.assign(static_cast<std::size_t>(triangles.triangles.rows()), 1);
   for (Index v = 0; v < triangles.vertices_m.rows(); ++v) {
     surface.start_.push_back(static_cast<int>(surface.nodes_.size()));
-    for (int k = 0; k < 4; ++k) {
-      surface.nodes_.push_back(mesh.tetrahedra(embedding.element(v), k));
-      surface.weights_.push_back(embedding.weights(v, k));
+    const auto element = mesh.tetrahedra.row(embedding.element(v));
+    const Eigen::Vector4d l = embedding.weights.row(v);
+    const auto add = [&](int local, double weight) {
+      surface.nodes_.push_back(element(local));
+      surface.weights_.push_back(weight);
+    };
+    if (element.size() == 4) {
+      for (int k = 0; k < 4; ++k) add(k, l(k));
+    } else {  // Lagrange polynomials of second order in barycentric coordinates
+      static constexpr int edges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+      for (int k = 0; k < 4; ++k) add(k, l(k) * (2 * l(k) - 1));
+      for (int e = 0; e < 6; ++e) add(4 + e, 4 * l(edges[e][0]) * l(edges[e][1]));
     }
   }
   surface.start_.push_back(static_cast<int>(surface.nodes_.size()));

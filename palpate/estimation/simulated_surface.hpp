@@ -13,7 +13,8 @@ class SimulatedSurface {
  public:
   /// The boundary of `mesh` (quadratic faces split in four); `observed` (corner triples) marks the part that sensors see.
   static SimulatedSurface boundary_of(const TetMesh& mesh, const Triangles* observed);
-  /// An embedded surface; weights refer to the corners of the elements.
+  /// A surface embedded in `mesh`: it stays where it is at rest and moves by the element's shape functions (linear or quadratic)
+  /// at its barycentric weights, so a mesh that rounds an edge off does not round the surface.
   static SimulatedSurface embedded(const TetMesh& mesh, const TriMesh& surface, const SurfaceEmbedding& embedding);
 
   const TriMesh& rest() const { return rest_; }
