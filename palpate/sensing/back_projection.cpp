@@ -199,7 +199,11 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
       const double cosine = std::min(1.0, -normal.dot(ray) / stretch);
       if (cosine < min_cosine) continue;
       const double z = frame.depth_m(row, column);
-      const double sigma = axial_sigma_m(frame.noise, {z, std::acos(cosine), frame.camera.fx_px});
+      const double incidence_rad = std::acos(cosine);
+      const NoiseInput at{z, incidence_rad, frame.camera.fx_px};
+      // A sample that belongs to a point beside the pixel's centre is off by the surface's slope times that distance.
+      const double sideways_m = lateral_sigma_px(frame.noise, at) * z / frame.camera.fx_px;
+      const double sigma = std::hypot(axial_sigma_m(frame.noise, at), sideways_m * std::tan(incidence_rad));
       hits.push_back({row, column, ray / stretch, normal, z * stretch, sigma * stretch});
     }
 
