@@ -189,6 +189,7 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
     double range_m, sigma_m;
   };
   std::vector<Hit> hits;
+  auto* const lateral = frame.noise.model == "constant" ? nullptr : depth_noise_model(frame.noise.model).lateral_sigma_px;
   for (int row = 0; row < invalid.rows(); row += options.stride_px)
     for (int column = 0; column < invalid.cols(); column += options.stride_px) {
       if (invalid(row, column)) continue;
@@ -200,9 +201,9 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
       if (cosine < min_cosine) continue;
       const double z = frame.depth_m(row, column);
       const double incidence_rad = std::acos(cosine);
-      const NoiseInput at{z, incidence_rad, frame.camera.fx_px};
+      const DepthNoiseInput at{z, incidence_rad, frame.camera.fx_px};
       // A sample that belongs to a point beside the pixel's centre is off by the surface's slope times that distance.
-      const double sideways_m = lateral_sigma_px(frame.noise, at) * z / frame.camera.fx_px;
+      const double sideways_m = lateral != nullptr ? lateral(at) * z / frame.camera.fx_px : 0;
       const double sigma = std::hypot(axial_sigma_m(frame.noise, at), sideways_m * std::tan(incidence_rad));
       hits.push_back({row, column, ray / stretch, normal, z * stretch, sigma * stretch});
     }
