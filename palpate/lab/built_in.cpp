@@ -12,11 +12,9 @@
 #include <thread>
 
 #include "palpate/core/error.hpp"
-#include "palpate/fem/boundary.hpp"
-#include "palpate/fem/statics.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/lab/depth_sensor.hpp"
-#include "palpate/lab/graded_block.hpp"
+#include "palpate/lab/pressed_block.hpp"
 #include "palpate/lab/random.hpp"
 #include "palpate/lab/scene.hpp"
 #include "palpate/sensing/depth_render.hpp"
@@ -25,110 +23,6 @@ namespace palpate::lab {
 namespace {
 
 const Vec3 cube_centre_m(0.6, 0.0, 0.0);  // of its base, in the base frame
-
-// Half of the cube: the contacts lie on its plane of symmetry, so the other half is a mirror image.
-class TrueCube {
- public:
-  TrueCube(const DemoOptions& options, double site_m) : options_(options) {
-    GradedBlockOptions block;
-    block.min_m = {-0.5 * options.edge_m, 0, 0};
-    block.max_m = {0.5 * options.edge_m, 0.5 * options.edge_m, options.edge_m};
-    block.contact_m = {site_m, 0, options.edge_m};
-    block.contact_radius_m = options.disc_radius_m;
-    block.cells_in_radius = options.cells_in_radius;
-    mesh_ = fem::to_quadratic(graded_block(block));
-    const std::vector<Index> under_pad = contact_nodes(mesh_, block);
-
-    fem::Boundary boundary;
-    for (Index n = 0; n < Index(mesh_.nodes_m.rows()); ++n) {
-      if (mesh_.nodes_m(n, 2) < 1e-9) {
-        boundary.constraints.push_back({n, Mat3::Identity(), 3});
-      } else if (mesh_.nodes_m(n, 1) < 1e-9) {
-        Mat3 axes;
-        axes << Vec3::UnitY(), Vec3::UnitZ(), Vec3::UnitX();
-        boundary.constraints.push_back({n, axes, 1});
-      }
-    }
-    // Uniform traction on a flat quadratic face: a third of its force at each midpoint, nothing at the corners.
-    std::vector<char> inside(std::size_t(mesh_.nodes_m.rows()), 0);
-    for (const Index n : under_pad) inside[std::size_t(n)] = 1;
-    share_ = VectorX::Zero(mesh_.nodes_m.rows());
-    const Tetrahedra faces = fem::boundary_faces(mesh_);
-    for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-      if (!inside[std::size_t(faces(f, 0))] || !inside[std::size_t(faces(f, 1))] || !inside[std::size_t(faces(f, 2))])
-        continue;
-      const Vec3 a = mesh_.nodes_m.row(faces(f, 0)), b = mesh_.nodes_m.row(faces(f, 1)), c = mesh_.nodes_m.row(faces(f, 2));
-      const double area = 0.5 * (b - a).cross(c - a).norm();
-      for (int k = 3; k < 6; ++k) share_(faces(f, k)) += area / 3;
-    }
-    share_ /= share_.sum();
-    std::vector<Eigen::Triplet<double>> entries;
-    for (Index n = 0; n < Index(share_.size()); ++n)
-      if (share_(n) != 0) entries.emplace_back(3 * n + 2, 0, -share_(n));
-    boundary.forces.resize(3 * mesh_.nodes_m.rows(), 1);
-    boundary.forces.setFromTriplets(entries.begin(), entries.end());
-
-    fem::StaticsOptions statics;
-    statics.residual_tolerance = 1e-7;  // five orders below the sensors' errors
-    statics_ = std::make_unique<fem::Statics>(mesh_, options.material, std::move(boundary), statics);
-    half_surface_ = fem::boundary_triangles(mesh_);
-  }
-
-  /// Deforms the cube by a force (newton, downwards, on the whole cube). Starts from the last state, extrapolated.
-  void press(double young_pa, double poisson, double force_n) {
-    const VectorX coefficient = VectorX::Constant(1, 0.5 * force_n);
-    const VectorX start = displacement_m_.size() ? VectorX(force_n / force_n_ * displacement_m_) : VectorX();
-    fem::Equilibrium state = statics_->solve(young_pa, poisson, coefficient, VectorX(0), start.size() ? &start : nullptr);
-    if (!state.converged)
-      throw Error("the true cube found no equilibrium under " + std::to_string(force_n) + " N (" + state.reason +
-                      "): press less deep",
-                  "DemoOptions.depth_m");
-    displacement_m_ = std::move(state.displacement_m);
-    force_n_ = force_n;
-  }
-
-  /// Mean motion of the pad's face into the cube.
-  double travel_m() const {
-    double travel = 0;
-    for (Eigen::Index n = 0; n < share_.size(); ++n) travel -= share_(n) * displacement_m_(3 * n + 2);
-    return travel;
-  }
-
-  /// Both halves, deformed, in the base frame.
-  TriMesh surface() const {
-    const Eigen::Index n = mesh_.nodes_m.rows();
-    TriMesh whole;
-    whole.vertices_m.resize(2 * n, 3);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      Vec3 p = mesh_.nodes_m.row(i);
-      if (displacement_m_.size()) p += displacement_m_.segment<3>(3 * i);
-      whole.vertices_m.row(i) = cube_centre_m + p;
-      whole.vertices_m.row(n + i) = cube_centre_m + Vec3(p.x(), -p.y(), p.z());
-    }
-    std::vector<Eigen::RowVector3i> kept;
-    for (Eigen::Index t = 0; t < half_surface_.rows(); ++t) {
-      const auto corner = half_surface_.row(t);
-      if (mesh_.nodes_m(corner(0), 1) < 1e-9 && mesh_.nodes_m(corner(1), 1) < 1e-9 && mesh_.nodes_m(corner(2), 1) < 1e-9)
-        continue;  // the cut through the middle
-      kept.emplace_back(corner(0), corner(1), corner(2));
-      kept.emplace_back(int(n) + corner(0), int(n) + corner(2), int(n) + corner(1));
-    }
-    whole.triangles.resize(Eigen::Index(kept.size()), 3);
-    for (std::size_t t = 0; t < kept.size(); ++t) whole.triangles.row(Eigen::Index(t)) = kept[t];
-    return whole;
-  }
-
-  const TetMesh& mesh() const { return mesh_; }
-
- private:
-  const DemoOptions& options_;
-  TetMesh mesh_;
-  Triangles half_surface_;
-  VectorX share_;           // of the pad's force, a node
-  VectorX displacement_m_;  // empty = at rest
-  double force_n_ = 0;
-  std::unique_ptr<fem::Statics> statics_;
-};
 
 // What one push does to the cube: nothing here is measured yet.
 struct TruePush {
@@ -139,12 +33,21 @@ struct TruePush {
 
 TruePush press_step_by_step(const DemoOptions& options, double site_m, double young_pa, double poisson, double level_n,
                             const std::function<bool()>& keep_going) {
-  TrueCube cube(options, site_m);
+  PressedBlockOptions block;
+  block.edge_m = options.edge_m;
+  block.pad_radius_m = options.disc_radius_m;
+  block.site_m = site_m;
+  block.base_centre_m = cube_centre_m;
+  block.cells_in_radius = options.cells_in_radius;
+  block.material = options.material;
+  block.young_modulus_pa = young_pa;
+  block.poisson_ratio = poisson;
+  PressedBlock cube(block);
   TruePush push;
   push.nodes = Index(cube.mesh().nodes_m.rows());
   push.tetrahedra = Index(cube.mesh().tetrahedra.rows());
   for (int level = 0; level <= options.levels && keep_going(); ++level) {
-    if (level > 0) cube.press(young_pa, poisson, level * level_n);
+    if (level > 0) cube.press(level * level_n);
     push.force_n.push_back(level * level_n);
     push.travel_m.push_back(level > 0 ? cube.travel_m() : 0.0);
     push.surfaces.push_back(cube.surface());

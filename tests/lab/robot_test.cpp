@@ -1,0 +1,130 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// The push protocol on the lab's robot: what is recorded belongs to the truth within what the recording states.
+#include "palpate/lab/robot.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::lab {
+namespace {
+
+LabOptions quick() {
+  LabOptions options;
+  options.seed = 3;
+  options.object.cells_in_radius = 1;
+  return options;
+}
+
+acquisition::PushOptions small_push() {
+  acquisition::PushOptions options;
+  options.force_limit_n = 4;
+  options.force_step_n = 2;
+  options.unloading_steps = 1;
+  return options;
+}
+
+struct Made {
+  acquisition::PushReport report;
+  std::vector<Step> steps;
+  std::vector<double> true_force_n, true_travel_m;
+};
+
+Made run(const LabOptions& options) {
+  LabRobot robot(options);
+  Made made;
+  made.report = acquisition::run_push(robot, robot.plan(), small_push(), [&](const Push&, const Step& step) {
+    made.steps.push_back(step);
+    made.true_force_n.push_back(robot.true_force_n());
+    made.true_travel_m.push_back(robot.true_travel_m());
+  });
+  return made;
+}
+
+TEST(LabRobot, PushIsRecordedAsItHappened) {
+  const Made made = run(quick());
+  EXPECT_EQ(made.report.stop, acquisition::StopReason::force_limit) << made.report.message;
+  ASSERT_EQ(made.steps.size(), 5u);  // rest, 2 N, 4 N, half of it on the way back, rest
+  double offset = 0, worst = 0;
+  int loaded = 0;
+  for (std::size_t i = 0; i < made.steps.size(); ++i) {
+    const Step& step = made.steps[i];
+    EXPECT_EQ(step.joints_rad.size(), 7u);
+    if (step.loads.empty()) {
+      EXPECT_EQ(made.true_force_n[i], 0);
+      continue;
+    }
+    // The tare is known to 0.05 N / sqrt(50); a settled force may still creep a little.
+    EXPECT_NEAR((*step.loads[0].force_n + Vec3(0, 0, made.true_force_n[i])).norm(), 0, 0.1) << i;
+    for (const Observation& o : step.observations)
+      if (const auto* travel = std::get_if<ToolTravel>(&o)) {
+        offset += travel->travel_m - made.true_travel_m[i];
+        worst = std::max(worst, std::abs(travel->travel_m - made.true_travel_m[i]));
+        ++loaded;
+        EXPECT_GT(travel->sigma_m, 1e-4);
+        EXPECT_LT(travel->sigma_m, 1e-3);
+      }
+  }
+  ASSERT_EQ(loaded, 3);
+  // Contact is noticed late by what the threshold needs, at most 1.5 mm here, and the encoders err by 0.4 mm.
+  EXPECT_LT(worst, 0.003);
+}
+
+TEST(LabRobot, SameSeedSameRecording) {
+  const Made a = run(quick()), b = run(quick());
+  ASSERT_EQ(a.steps.size(), b.steps.size());
+  for (std::size_t i = 0; i < a.steps.size(); ++i) {
+    EXPECT_EQ(a.steps[i].joints_rad, b.steps[i].joints_rad);
+    const auto& first = std::get<DepthFrame>(a.steps[i].observations.back());
+    const auto& second = std::get<DepthFrame>(b.steps[i].observations.back());
+    EXPECT_EQ(first.depth_m, second.depth_m);
+    EXPECT_EQ(first.mask, second.mask);
+    EXPECT_GT(first.mask.cast<int>().sum(), 1000) << "the arm is in the picture";
+  }
+}
+
+TEST(LabRobot, SlipEndsThePush) {
+  LabOptions options = quick();
+  options.slip_at_m = 0.004;
+  EXPECT_EQ(run(options).report.stop, acquisition::StopReason::slip);
+}
+
+TEST(LabRobot, RefusesWhatTheArmCannotReach) {
+  LabRobot robot(quick());
+  Pose far = Pose::Identity();
+  far.translation() = Vec3(4, 0, 0);
+  EXPECT_EQ(robot.move(far, 0.1), acquisition::Motion::refused);
+  EXPECT_THROW(robot.move(far, 0), Error);
+  const Recording scene = robot.scene();
+  EXPECT_EQ(scene.tools.size(), 1u);
+  EXPECT_EQ(scene.joint_names.size(), 7u);
+}
+
+TEST(LabRobot, BadOptionsAreRefused) {
+  const auto refused = [](auto change) {
+    LabOptions options = quick();
+    change(options);
+    try {
+      check(options);
+    } catch (const Error&) {
+      return true;
+    }
+    return false;
+  };
+  using O = LabOptions;
+  EXPECT_FALSE(refused([](O&) {}));
+  EXPECT_TRUE(refused([](O& o) { o.joint_std_rad = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.force_sigma_n = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.force_unit_n = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.force_bias_n = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.force_drift_n_s = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.relaxation = 1; }));
+  EXPECT_TRUE(refused([](O& o) { o.relaxation_s = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.depth.noise.model = "eye"; }));
+}
+
+}  // namespace
+}  // namespace palpate::lab
