@@ -64,10 +64,15 @@ QuotientGraph quotient_graph(const Eigen::SparseMatrix<double>& lower, int large
 std::vector<Index> minimum_degree_order(const QuotientGraph& graph) {
   const Index groups = graph.group_count();
   Eigen::SparseMatrix<double> pattern(groups, groups);
-  pattern.resizeNonZeros(static_cast<Index>(graph.neighbour.size()));
-  std::copy(graph.begin.begin(), graph.begin.end(), pattern.outerIndexPtr());
-  std::copy(graph.neighbour.begin(), graph.neighbour.end(), pattern.innerIndexPtr());
-  std::fill_n(pattern.valuePtr(), graph.neighbour.size(), 1.0);
+  pattern.resizeNonZeros(static_cast<Index>(graph.neighbour.size()) + groups);
+  for (Index group = 0; group < groups; ++group) {  // with the diagonal: without it Eigen takes a column for a dense one
+    const Index from = graph.begin[static_cast<std::size_t>(group)], to = graph.begin[static_cast<std::size_t>(group) + 1];
+    pattern.outerIndexPtr()[group] = from + group;
+    pattern.innerIndexPtr()[from + group] = group;
+    std::copy(graph.neighbour.begin() + from, graph.neighbour.begin() + to, pattern.innerIndexPtr() + from + group + 1);
+  }
+  pattern.outerIndexPtr()[groups] = static_cast<Index>(graph.neighbour.size()) + groups;
+  std::fill_n(pattern.valuePtr(), pattern.nonZeros(), 1.0);
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, Index> order;
   Eigen::internal::minimum_degree_ordering(pattern, order);
   return {order.indices().data(), order.indices().data() + groups};

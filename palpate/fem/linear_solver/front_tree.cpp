@@ -13,8 +13,9 @@ namespace {
 using Indices = std::vector<Index>;
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-// Below this number of nodes both orders are tried; above, nested dissection always wins on volume meshes.
-constexpr Index kTryBothBelow = 2500;
+// Nodes. Minimum degree costs a third of nested dissection; its factor is within 20 % on cubes below the first limit, always
+// worse above the second, and in between both are tried.
+constexpr Index kMinimumDegreeBelow = 400, kTryBothBelow = 2000;
 
 /// Elimination tree of the graph under an order; both arrays are in positions (Liu 1986, path compression).
 Indices elimination_tree(const QuotientGraph& graph, const Indices& order, const Indices& position) {
@@ -125,6 +126,7 @@ Elimination eliminate(const QuotientGraph& graph, Indices order) {
 }
 
 Elimination best_elimination(const QuotientGraph& graph) {
+  if (graph.group_count() < kMinimumDegreeBelow) return eliminate(graph, minimum_degree_order(graph));
   Elimination dissected = eliminate(graph, nested_dissection_order(graph));
   if (graph.group_count() >= kTryBothBelow) return dissected;
   Elimination minimum_degree = eliminate(graph, minimum_degree_order(graph));
