@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/discretisation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+
+namespace palpate::fem {
+namespace {
+
+double longest_edge_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m) {
+  double longest = 0;
+  for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
+    double distance = std::numeric_limits<double>::infinity(), edge = 0;
+    for (int a = 0; a < 4; ++a) {
+      const Vec3 x = mesh.nodes_m.row(mesh.tetrahedra(e, a)).transpose();
+      distance = std::min(distance, (x - centre_m).norm());
+      for (int b = 0; b < a; ++b) edge = std::max(edge, (x - mesh.nodes_m.row(mesh.tetrahedra(e, b)).transpose()).norm());
+    }
+    if (distance <= radius_m) longest = std::max(longest, edge);
+  }
+  return longest;
+}
+
+}  // namespace
+
+Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double radius_m, const BoundaryOn& boundary_on,
+                          const VectorX& force, const DiscretisationOptions& options) {
+  if (!(radius_m > 0)) throw Error("must be positive, is " + std::to_string(radius_m), "radius_m");
+  if (!(options.tolerance > 0))
+    throw Error("must be positive, is " + std::to_string(options.tolerance), "options.tolerance");
+  StaticsOptions statics;
+  statics.dilatation = options.dilatation;
+  const auto work = [&](const RefinedMesh& linear, const TetMesh& quadratic) {
+    const Boundary boundary = boundary_on(quadratic, linear);
+    const Eigen::SparseMatrix<double> forces = boundary.forces;
+    const Statics body(quadratic, "linear", boundary, statics);
+    const Equilibrium e =
+        body.solve(1.0, options.poisson_ratio, force, VectorX::Zero(static_cast<Index>(boundary.motions.cols())));
+    return force.dot(forces.transpose() * e.displacement_m);
+  };
+
+  Discretisation out;
+  out.linear = {base, {}};
+  out.mesh = to_quadratic(base);
+  double last = work(out.linear, out.mesh);
+  if (!(std::abs(last) > 0)) throw Error("does no work: is the force zero or held by the supports?", "force");
+  // The first level already resolves the disc: quadratic tetrahedra need about two edges a radius.
+  double edge = std::min(longest_edge_near(base, contact_m, radius_m) / 2, radius_m);
+  double change = 0;
+  const double base_work = last;
+  for (int level = 1; level <= options.max_levels; ++level, edge /= 2) {
+    RefinedMesh finer = refine_near(base, contact_m, 1.2 * radius_m, edge, 1.0, options.node_limit);
+    const bool full = finer.mesh.nodes_m.rows() >= options.node_limit;
+    if (full && level > 1) break;
+    TetMesh quadratic = to_quadratic(finer.mesh);
+    const double now = work(finer, quadratic);
+    const double previous_change = change;
+    change = std::abs(now - last) / std::abs(now);
+    const double ratio = level == 1 ? 1.0 / 3 : std::clamp(change / std::max(previous_change, 1e-12), 0.2, 0.67);
+    out.young_error = change * ratio / (1 - ratio);
+    out.base_young_error = std::abs(base_work - now) / std::abs(now);
+    out.linear = std::move(finer);
+    out.mesh = std::move(quadratic);
+    out.levels = level;
+    last = now;
+    if (out.young_error <= options.tolerance) {
+      out.tolerance_met = true;
+      break;
+    }
+    if (full) break;
+  }
+  out.edge_m = longest_edge_near(out.linear.mesh, contact_m, radius_m);
+  return out;
+}
+
+}  // namespace palpate::fem

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// A mesh for one contact, derived from the object's base mesh, that knows its own error. Discretisation error goes straight
+// into the estimated E: with linear tetrahedra and edges of the size of the tool, E from the probe's depth is 30 to 70 % too
+// low.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "palpate/core/mesh.hpp"
+#include "palpate/fem/statics.hpp"
+
+namespace palpate::fem {
+
+/// A linear mesh whose first nodes are those of the mesh it came from; node i of the others halves the edge `parents[i -
+/// first]`.
+struct RefinedMesh {
+  TetMesh mesh;
+  std::vector<std::array<Index, 2>> parents;
+};
+
+/// Halves longest edges (Rivara's propagation path, so that the mesh stays conforming and its angles bounded) until every
+/// edge is shorter than edge_m within radius_m of the centre, and than edge_m + growth * (distance - radius_m) outside.
+/// @param mesh  linear tetrahedra; @param node_limit  refinement stops there (the mesh is still conforming)
+/// @throws Error on a mesh that is not linear or an edge length that is not positive
+RefinedMesh refine_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m, double edge_m, double growth = 1.0,
+                        Index node_limit = 50000);
+
+/// Adds to a list of nodes of the base mesh the refined nodes whose two parents are in it.
+std::vector<Index> extend_nodes(std::vector<Index> nodes, const RefinedMesh& refined);
+
+struct DiscretisationOptions {
+  double tolerance = 0.01;  ///< of the relative error in E that the mesh may cause
+  int max_levels = 4;
+  Index node_limit = 4000;  ///< corners, before edge midpoints are added
+  double poisson_ratio = 0.3;
+  Dilatation dilatation = Dilatation::pointwise;
+};
+
+/// Quadratic tetrahedra refined under the tool.
+struct Discretisation {
+  RefinedMesh linear;  ///< corners; `mesh` adds the midpoints
+  TetMesh mesh;
+  double young_error = 0;       ///< estimated relative error in E from the depth under the load
+  double base_young_error = 0;  ///< the same of the base mesh with quadratic tetrahedra
+  double edge_m = 0;            ///< longest edge under the tool
+  int levels = 0;
+  bool tolerance_met = false;
+};
+
+/// Boundary of the object on a refined mesh: supports and the force columns of the contact.
+using BoundaryOn = std::function<Boundary(const TetMesh& quadratic, const RefinedMesh& linear)>;
+
+/// Refines under the tool until the work of the load, W = a' F' u, which is what a force-controlled probe's depth sees
+/// (E_hat / E = u_h / u), changes by so little from level to level that the error left is below the tolerance. Small strains
+/// are used for the choice. The error left is the geometric continuation of the last two changes (half of the first one,
+/// where there is no second): the rim of the load keeps convergence between first and second order.
+/// @param force  coefficients of the boundary's force columns
+Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double radius_m, const BoundaryOn& boundary_on,
+                          const VectorX& force, const DiscretisationOptions& options = {});
+
+}  // namespace palpate::fem
