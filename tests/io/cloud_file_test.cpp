@@ -10,6 +10,9 @@
 #include "io/broken_bytes.hpp"
 
 namespace palpate::io {
+
+void PrintTo(const CloudFormat& format, std::ostream* out) { *out << format.name; }
+
 namespace {
 
 using namespace palpate::io::test;

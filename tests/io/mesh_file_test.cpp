@@ -12,6 +12,9 @@
 #include "palpate/io/file.hpp"
 
 namespace palpate::io {
+
+void PrintTo(const MeshFormat& format, std::ostream* out) { *out << format.name; }
+
 namespace {
 
 using namespace palpate::io::test;
