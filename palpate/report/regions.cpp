@@ -50,7 +50,8 @@ std::vector<std::vector<Spot>> region_outlines(const Grid& density, double level
   for (int i = -1; i < rows; ++i) {
     for (int j = -1; j < columns; ++j) {
       const std::array<std::array<int, 2>, 4> corners = {{{i, j}, {i, j + 1}, {i + 1, j + 1}, {i + 1, j}}};
-      std::vector<std::pair<Edge, Spot>> entering, leaving;
+      std::vector<std::pair<Edge, Spot>> entering, leaving;  // as met going round the cell
+      bool leaving_first = false;
       for (std::size_t k = 0; k < 4; ++k) {
         const auto a = corners[k], b = corners[(k + 1) % 4];
         const double va = value(a), vb = value(b);
@@ -58,9 +59,13 @@ std::vector<std::vector<Spot>> region_outlines(const Grid& density, double level
         const double t = (level - va) / (vb - va);
         const Spot spot{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
         const Edge edge = a < b ? Edge{a[0], a[1], b[0], b[1]} : Edge{b[0], b[1], a[0], a[1]};
+        if (entering.empty() && vb <= level) leaving_first = true;
         (vb > level ? entering : leaving).emplace_back(edge, spot);
       }
-      for (std::size_t k = 0; k < entering.size(); ++k) links[entering[k].first] = {leaving[k].first, entering[k].second};
+      // Each entrance goes to the exit that follows it: at a saddle (two of each) this keeps the corners apart.
+      for (std::size_t k = 0; k < entering.size(); ++k) {
+        links[entering[k].first] = {leaving[(k + (leaving_first ? 1 : 0)) % leaving.size()].first, entering[k].second};
+      }
     }
   }
   std::vector<std::vector<Spot>> outlines;

@@ -57,15 +57,18 @@ export function outlines(density: number[][], level: number): Point[][] {
       const corners: Point[] = [[i, j], [i, j + 1], [i + 1, j + 1], [i + 1, j]];
       const entering: { key: string; point: Point }[] = [];
       const leaving: { key: string; point: Point }[] = [];
+      let leavingFirst = false;
       for (let k = 0; k < 4; ++k) {
         const [a, b] = [corners[k], corners[(k + 1) % 4]];
         const [inA, inB] = [at(...a) > level, at(...b) > level];
         if (inA === inB) continue;
         const crossed = { key: edgeKey(...a, ...b), point: crossing(...a, ...b) };
+        if (entering.length === 0 && !inB) leavingFirst = true;
         (inB ? entering : leaving).push(crossed);
       }
-      // Two of each happen at a saddle: each entrance goes to the exit that follows it, which keeps the corners apart.
-      entering.forEach((start, n) => next.set(start.key, { key: leaving[n].key, from: start.point }));
+      // Each entrance goes to the exit that follows it: at a saddle (two of each) this keeps the corners apart.
+      const shift = leavingFirst ? 1 : 0;
+      entering.forEach((start, n) => next.set(start.key, { key: leaving[(n + shift) % leaving.length].key, from: start.point }));
     }
   }
   const loops: Point[][] = [];
