@@ -8,24 +8,10 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/bvh.hpp"
+#include "palpate/geometry/triangle_distance.hpp"
 
 namespace palpate::geometry {
 namespace {
-
-/// Squared distance to a triangle, used for tetrahedra that do not contain the point.
-double squared_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 n = (b - a).cross(c - a);
-  const double n2 = n.squaredNorm();
-  if (n2 > 0 && n.cross(b - a).dot(p - a) >= 0 && n.cross(c - b).dot(p - b) >= 0 && n.cross(a - c).dot(p - c) >= 0) {
-    const double h = n.dot(p - a);
-    return h * h / n2;
-  }
-  const auto segment = [&](const Vec3& u, const Vec3& v) {
-    const Vec3 d = v - u;
-    return (p - u - std::clamp(d.dot(p - u) / d.squaredNorm(), 0.0, 1.0) * d).squaredNorm();
-  };
-  return std::min({segment(a, b), segment(b, c), segment(c, a)});
-}
 
 struct Element {
   Vec3 origin;
@@ -43,7 +29,7 @@ struct Element {
     const std::array<Vec3, 4> x{origin, origin + edges.col(0), origin + edges.col(1), origin + edges.col(2)};
     double best = std::numeric_limits<double>::infinity();
     for (int k = 0; k < 4; ++k)  // only faces that see the point from outside can be nearest
-      if (w[k] < 0) best = std::min(best, squared_to_triangle(p, x[(k + 1) % 4], x[(k + 2) % 4], x[(k + 3) % 4]));
+      if (w[k] < 0) best = std::min(best, squared_distance_to_triangle(p, x[(k + 1) % 4], x[(k + 2) % 4], x[(k + 3) % 4]));
     return best;
   }
 };

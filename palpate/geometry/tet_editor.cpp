@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "palpate/geometry/tet_quality.hpp"
+#include "palpate/geometry/triangle_distance.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -27,6 +28,7 @@ void sort_unique(std::vector<T>& v) {
 TetEditor::TetEditor(std::vector<Vec3> points, const std::vector<Tet>& list) : x(std::move(points)) {
   boundary.assign(x.size(), 0);
   size_m.assign(x.size(), 0);
+  drift_m.assign(x.size(), 0);
   star.resize(x.size());
   for (const Tet& t : list) add(t);
   for (const Tri& t : all_boundary_triangles())
@@ -212,7 +214,7 @@ bool TetEditor::link_condition(Index a, Index b, const std::vector<Index>& ring)
   return shared_edges.empty();
 }
 
-bool TetEditor::collapse(Index gone, Index kept, double above, const Accept& accept) {
+bool TetEditor::collapse(Index gone, Index kept, double above, const Accept& accept, double tolerance) {
   if (boundary[gone] && !boundary[kept]) return false;
   std::vector<Index> ring;
   std::vector<Tet> fresh;
@@ -235,8 +237,14 @@ bool TetEditor::collapse(Index gone, Index kept, double above, const Accept& acc
       t[0] = kept;
       after.push_back(t);
     }
-    const Vec3 lost = x[gone];
-    if (accept && !accept(before, after, &lost)) return false;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Tri& t : after)
+      nearest = std::min(nearest, std::sqrt(squared_distance_to_triangle(x[gone], x[t[0]], x[t[1]], x[t[2]])));
+    // a thin tip must not be eaten up by many small bites
+    const double drift = std::max(drift_m[kept], drift_m[gone] + nearest);
+    if (drift > allowed_m(tolerance, std::min(size_m[gone], size_m[kept]))) return false;
+    if (accept && !accept(before, after)) return false;
+    drift_m[kept] = drift;
   }
   const std::vector<Index> old = star[gone];
   for (const Index id : old) remove(id);
@@ -320,7 +328,7 @@ bool TetEditor::remove_edge(Index a, Index b, const Accept& accept) {
   if (open && accept) {
     const Index f = ring.front(), l = ring.back();
     const std::vector<Tri> before{{b, a, f}, {a, b, l}}, after{{a, f, l}, {b, l, f}};
-    if (!accept(before, after, nullptr)) return false;
+    if (!accept(before, after)) return false;
   }
   std::vector<std::array<int, 2>> todo{{0, m - 1}};
   for (const Index id : around) remove(id);
@@ -352,7 +360,7 @@ bool TetEditor::peel(Index id, Index a, Index b, const Accept& accept) {
   std::vector<Tri> before, after;
   for (const int k : {place(t, p), place(t, q)}) before.push_back({t[faces[k][0]], t[faces[k][1]], t[faces[k][2]]});
   for (const Tri& f : {fa, fb}) after.push_back({f[0], f[2], f[1]});
-  if (accept && !accept(before, after, nullptr)) return false;
+  if (accept && !accept(before, after)) return false;
   remove(id);
   return true;
 }
@@ -390,6 +398,7 @@ Index TetEditor::split_edge(Index a, Index b) {
   x.push_back(0.5 * (x[a] + x[b]));
   boundary.push_back(outer);
   size_m.push_back(0.5 * (size_m[a] + size_m[b]));
+  drift_m.push_back(0);
   star.emplace_back();
   for (const Index id : around) {
     Tet p = tets[id], q = p;
@@ -402,40 +411,28 @@ Index TetEditor::split_edge(Index a, Index b) {
   return v;
 }
 
-std::pair<Index, double> TetEditor::drop_small_pieces(double share) {
-  std::vector<Index> piece(tets.size(), -1);
-  std::vector<double> volume;
-  double total = 0;
+TetEditor::Pieces TetEditor::pieces() const {
+  Pieces out;
+  out.of.assign(tets.size(), -1);
   for (Index seed = 0; seed < static_cast<Index>(tets.size()); ++seed) {
-    if (!alive[seed] || piece[seed] >= 0) continue;
-    const auto id = static_cast<Index>(volume.size());
-    volume.push_back(0);
+    if (!alive[seed] || out.of[seed] >= 0) continue;
+    const auto id = static_cast<Index>(out.volume_m3.size());
+    out.volume_m3.push_back(0);
     std::vector<Index> todo{seed};
-    piece[seed] = id;
+    out.of[seed] = id;
     while (!todo.empty()) {
-      const Index at = todo.back();
+      const Tet& t = tets[todo.back()];
       todo.pop_back();
-      const Tet& t = tets[at];
-      const double v = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]]);
-      volume.back() += v;
-      total += v;
+      out.volume_m3.back() += (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]]) / 6;
       for (const auto& f : faces)
         for (const Index n : star[t[f[0]]])
-          if (piece[n] < 0 && has(tets[n], t[f[1]]) && has(tets[n], t[f[2]])) {
-            piece[n] = id;
+          if (out.of[n] < 0 && has(tets[n], t[f[1]]) && has(tets[n], t[f[2]])) {
+            out.of[n] = id;
             todo.push_back(n);
           }
     }
   }
-  const double largest = volume.empty() ? 0 : *std::max_element(volume.begin(), volume.end());
-  std::pair<Index, double> dropped{0, 0.0};
-  const auto small = [&](double v) { return v < share * total && v < largest; };
-  for (const double v : volume)
-    if (small(v)) ++dropped.first, dropped.second += v / total;
-  if (dropped.first > 0)
-    for (Index t = 0; t < static_cast<Index>(tets.size()); ++t)
-      if (alive[t] && small(volume[piece[t]])) remove(t);
-  return dropped;
+  return out;
 }
 
 TetMesh TetEditor::compact(std::vector<Index>* vertex_of) const {

@@ -2,6 +2,7 @@
 // Inside of tetrahedralise: a tetrahedral mesh that can be changed locally without ever becoming inverted or non-manifold.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <vector>
@@ -18,8 +19,10 @@ class TetEditor {
   TetEditor(std::vector<Vec3> points, const std::vector<Tet>& tets);
 
   std::vector<Vec3> x;
-  std::vector<char> boundary;  ///< vertex lies on the boundary; the operations keep that as it is
-  std::vector<double> size_m;  ///< wished edge length at a vertex
+  std::vector<char> boundary;   ///< vertex lies on the boundary; the operations keep that as it is
+  std::vector<double> size_m;   ///< wished edge length at a vertex
+  std::vector<double> drift_m;  ///< how far merges may have cut the surface short at a vertex, summed up
+  double coarse_m = 0;          ///< edge length of thick parts: refined ones need not be truer than half as true as these
   std::vector<Tet> tets;
   std::vector<char> alive;
   std::vector<double> quality;
@@ -40,10 +43,11 @@ class TetEditor {
   Vec3 boundary_normal(Index v) const;
 
   /// Judges new boundary triangles before they are made: true = near enough to the true surface.
-  using Accept = std::function<bool(const std::vector<Tri>& before, const std::vector<Tri>& after, const Vec3* lost)>;
+  using Accept = std::function<bool(const std::vector<Tri>& before, const std::vector<Tri>& after)>;
 
   /// Merges `gone` into `kept` at kept's place, if the result stays manifold and its smallest quality exceeds `above`.
-  bool collapse(Index gone, Index kept, double above, const Accept& accept);
+  /// `tolerance`: how much of the wished edge length repeated merges may cut off the boundary.
+  bool collapse(Index gone, Index kept, double above, const Accept& accept, double tolerance = 1e300);
   /// Replaces the tetrahedra around an edge by the best triangulation of its ring (Shewchuk 2002), interior or boundary.
   bool remove_edge(Index a, Index b, const Accept& accept);
   /// Two tetrahedra at a face become three around the edge between their far corners.
@@ -51,8 +55,16 @@ class TetEditor {
   /// Splits an edge in the middle.
   Index split_edge(Index a, Index b);
 
-  /// Removes pieces (joined by faces) with less than this share of the volume; returns how many and their share.
-  std::pair<Index, double> drop_small_pieces(double share);
+  /// Pieces joined by faces; of a tetrahedron its piece (-1: removed), and the pieces' volumes.
+  struct Pieces {
+    std::vector<Index> of;
+    std::vector<double> volume_m3;
+  };
+  Pieces pieces() const;
+  void remove_tet(Index t) { remove(t); }
+
+  /// Distance from the surface that `share` of the wished edge length allows.
+  double allowed_m(double share, double size) const { return share * std::max(size, 0.5 * coarse_m); }
 
   TetMesh compact(std::vector<Index>* vertex_of = nullptr) const;
 

@@ -12,23 +12,9 @@
 namespace palpate::geometry {
 namespace {
 
-double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 n = (b - a).cross(c - a);
-  const double n2 = n.squaredNorm();
-  if (n2 > 0 && n.cross(b - a).dot(p - a) >= 0 && n.cross(c - b).dot(p - b) >= 0 && n.cross(a - c).dot(p - c) >= 0)
-    return std::abs(n.dot(p - a)) / std::sqrt(n2);
-  const auto segment = [&](const Vec3& u, const Vec3& v) {
-    const Vec3 d = v - u;
-    const double l2 = d.squaredNorm();
-    return (p - u - (l2 > 0 ? std::clamp(d.dot(p - u) / l2, 0.0, 1.0) : 0.0) * d).norm();
-  };
-  return std::min({segment(a, b), segment(b, c), segment(c, a)});
-}
-
 /// Lets a change of the boundary pass when the new triangles stay near the surface and do not fold.
 TetEditor::Accept near_surface(const TetEditor& mesh, const Solid& solid, double tolerance) {
-  return [&mesh, &solid, tolerance](const std::vector<TetEditor::Tri>& before, const std::vector<TetEditor::Tri>& after,
-                                    const Vec3* lost) {
+  return [&mesh, &solid, tolerance](const std::vector<TetEditor::Tri>& before, const std::vector<TetEditor::Tri>& after) {
     const auto& x = mesh.x;
     const auto normal = [&](const TetEditor::Tri& t) { return Vec3((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]])); };
     double size = 0, was = 0;
@@ -39,12 +25,7 @@ TetEditor::Accept near_surface(const TetEditor& mesh, const Solid& solid, double
       hint = c.triangle;
       was = std::max(was, std::sqrt(c.squared_distance_m2));
     }
-    const double allowed = std::max(tolerance * size, was);
-    if (lost != nullptr) {
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const auto& t : after) nearest = std::min(nearest, distance_to_triangle(*lost, x[t[0]], x[t[1]], x[t[2]]));
-      if (nearest > tolerance * size) return false;
-    }
+    const double allowed = std::max(mesh.allowed_m(tolerance, size), was);
     for (const auto& t : after) {
       const Vec3 n = normal(t), middle = (x[t[0]] + x[t[1]] + x[t[2]]) / 3;
       const ClosestPoint c = solid.closest(middle, hint);
@@ -76,8 +57,8 @@ class Improver {
     for (int round = 0; round < o_.most_rounds; ++round) {
       if (progress && !progress("quality", double(round) / o_.most_rounds)) return false;
       const double floor = std::min(o_.target_quality, 0.2 + 0.04 * round);
-      fit_to_surface(m_, solid_, samples_, floor);
-      const double below = round < 3 ? 0.7 : std::min(0.6, o_.target_quality + 0.08);
+      if (round < 4 || round % 2 == 0) fit_to_surface(m_, solid_, samples_, floor);
+      const double below = round < 3 ? 0.7 : o_.target_quality + (round < 6 ? 0.08 : 0.03);
       swap(below);
       smooth(below);
       if (round % 2 == 1) merge(o_.target_quality);
@@ -136,7 +117,7 @@ class Improver {
         return (m_.x[a[0]] - m_.x[a[1]]).squaredNorm() < (m_.x[b[0]] - m_.x[b[1]]).squaredNorm();
       });
       for (const auto& [gone, kept] : edges)
-        if (m_.collapse(gone, kept, std::min(below, m_.star_quality(gone) + 1e-6), accept_)) break;
+        if (m_.collapse(gone, kept, std::min(below, m_.star_quality(gone) + 1e-6), accept_, o_.tolerance)) break;
     }
   }
 
@@ -286,7 +267,7 @@ void merge_short_edges(TetEditor& mesh, const Solid& solid, double share, double
       for (const auto& [gone, kept] : {std::pair{s.a, s.b}, std::pair{s.b, s.a}}) {
         if (mesh.boundary[gone] && !mesh.boundary[kept]) continue;
         const double above = std::min(above_quality, mesh.star_quality(gone));
-        if (mesh.collapse(gone, kept, above, accept)) {
+        if (mesh.collapse(gone, kept, above, accept, 0.12)) {
           ++merged;
           break;
         }

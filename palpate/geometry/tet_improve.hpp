@@ -12,7 +12,7 @@ void merge_short_edges(TetEditor& mesh, const Solid& solid, double share, double
 
 struct ImproveOptions {
   double target_quality = 0.43;  ///< tet_quality of the worst element at which work stops
-  int most_rounds = 12;
+  int most_rounds = 9;
   double tolerance = 0.1;  ///< how far a local change may leave the surface, share of the wished edge length
 };
 

@@ -3,8 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
+#include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/lattice_cut.hpp"
@@ -39,6 +42,35 @@ struct Draft {
   double dropped_share = 0;
 };
 
+bool is_small(const TetEditor::Pieces& pieces, Index id, double share) {
+  const auto& v = pieces.volume_m3;
+  const double largest = *std::max_element(v.begin(), v.end());
+  return v[id] < largest && v[id] < share * std::accumulate(v.begin(), v.end(), 0.0);
+}
+
+/// Corners of small pieces, with the edge length there.
+std::vector<std::pair<Vec3, double>> loose_points(const TetEditor& mesh, double share) {
+  const auto pieces = mesh.pieces();
+  std::vector<std::pair<Vec3, double>> out;
+  std::vector<char> done(mesh.x.size(), 0);
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    if (mesh.alive[t] && is_small(pieces, pieces.of[t], share))
+      for (const Index v : mesh.tets[t])
+        if (!std::exchange(done[v], 1)) out.emplace_back(mesh.x[v], mesh.size_m[v]);
+  return out;
+}
+
+std::pair<Index, double> drop_small_pieces(TetEditor& mesh, double share) {
+  const auto pieces = mesh.pieces();
+  std::pair<Index, double> dropped{0, 0.0};
+  for (Index id = 0; id < static_cast<Index>(pieces.volume_m3.size()); ++id)
+    if (is_small(pieces, id, share)) ++dropped.first, dropped.second += pieces.volume_m3[id];
+  for (Index t = 0; t < static_cast<Index>(mesh.tets.size()); ++t)
+    if (mesh.alive[t] && is_small(pieces, pieces.of[t], share)) mesh.remove_tet(t);
+  dropped.second /= std::accumulate(pieces.volume_m3.begin(), pieces.volume_m3.end(), 0.0);
+  return dropped;
+}
+
 std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, const TetrahedraliseOptions& o, double cell) {
   Lattice lattice(solid, cell);
   lattice.refine_to_surface(samples, o.detail * cell, cell / o.finest);
@@ -51,7 +83,21 @@ std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, co
     });
   Draft out{cut_lattice(lattice, solid), 0, 0};
   if (out.mesh.count() == 0) return std::nullopt;
-  std::tie(out.dropped, out.dropped_share) = out.mesh.drop_small_pieces(0.01);
+  // thin parts that the lattice tears into pieces get a finer one around the pieces, as long as that brings them together
+  constexpr double small = 0.01;
+  for (int attempt = 0; attempt < 4; ++attempt) {
+    const auto loose = loose_points(out.mesh, small);
+    if (loose.empty()) break;
+    lattice.refine_to_size([&](const Vec3& p) {
+      double edge = std::numeric_limits<double>::infinity();
+      for (const auto& [at, size] : loose)
+        if ((p - at).squaredNorm() < 4 * size * size) edge = std::min(edge, std::max(0.75 * size, cell / (2 * o.finest)));
+      return edge;
+    });
+    out.mesh = cut_lattice(lattice, solid);
+  }
+  std::tie(out.dropped, out.dropped_share) = drop_small_pieces(out.mesh, small);
+  out.mesh.coarse_m = cell;
   if (o.improve) merge_short_edges(out.mesh, solid, 0.5, 0.05);
   return out;
 }
@@ -114,14 +160,26 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   const double shrinks = 0.95;  // improvement merges some more
   std::optional<Draft> best;
   double best_miss = std::numeric_limits<double>::infinity();
-  for (int attempt = 0; attempt < 5; ++attempt) {
-    if (progress && !progress("lattice", attempt / 5.0)) out.cancelled = true;
+  double too_few = std::numeric_limits<double>::infinity(), too_many = 0;  // cells that gave too few and too many
+  double last_cell = 0, last_ratio = 0;
+  constexpr int attempts = 6;
+  for (int attempt = 0; attempt < attempts; ++attempt) {
+    if (progress && !progress("lattice", double(attempt) / attempts)) out.cancelled = true;
     auto fresh = draft(solid, samples, o, cell);
     const double ratio = fresh ? shrinks * fresh->mesh.count() / o.tetrahedra : 0.2;
     const double miss = std::abs(std::log(ratio));
     if (fresh && (o.edge_m > 0 || miss < best_miss)) best = std::move(fresh), best_miss = miss;
     if ((best && (o.edge_m > 0 || best_miss < 0.06)) || out.cancelled) break;
-    cell *= std::pow(ratio, 1 / 2.3);
+    // the next cell by the secant of log count over log cell, within the bracket once there is one
+    const double log_cell = std::log(cell), log_ratio = std::log(ratio);
+    double slope = -2.3;
+    if (attempt > 0 && log_cell != last_cell)
+      slope = std::clamp((log_ratio - last_ratio) / (log_cell - last_cell), -3.0, -0.7);
+    last_cell = log_cell, last_ratio = log_ratio;
+    (ratio < 1 ? too_few : too_many) = cell;
+    cell = std::exp(log_cell + std::clamp(-log_ratio / slope, -0.6, 0.6));
+    const auto [low, high] = std::minmax(too_few, too_many);
+    if (too_many > 0 && std::isfinite(too_few) && (cell <= low || cell >= high)) cell = std::sqrt(low * high);
   }
   if (!best)
     throw Error(fmt::format("the object is thinner everywhere than {} tetrahedra can show; ask for more", o.tetrahedra),

@@ -7,6 +7,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/bvh.hpp"
+#include "palpate/geometry/wide_bvh.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -147,6 +148,7 @@ void check_vertices(const Points& vertices) {
 struct TriangleTree::Impl {
   TriMesh mesh;
   Bvh bvh;
+  WideBvh wide;
   std::vector<Corner> corners;  ///< in the order of the leaves
   std::vector<Index> slot;      ///< of a triangle in `corners`
 
@@ -163,6 +165,7 @@ TriangleTree::TriangleTree(TriMesh mesh) : impl_(std::make_unique<Impl>()) {
   check_vertices(mesh.vertices_m);
   impl_->mesh = std::move(mesh);
   impl_->bvh = build_bvh(triangle_boxes(impl_->mesh), leaf_size);
+  impl_->wide = widen(impl_->bvh);
   impl_->corners.resize(impl_->bvh.order.size());
   impl_->slot.resize(impl_->bvh.order.size());
   for (std::size_t i = 0; i < impl_->slot.size(); ++i) impl_->slot[impl_->bvh.order[i]] = static_cast<Index>(i);
@@ -182,6 +185,7 @@ void TriangleTree::refit(const Points& vertices_m) {
   impl_->mesh.vertices_m = vertices_m;
   impl_->fill_corners();
   refit_bvh(impl_->bvh, vertices_m, impl_->mesh.triangles);
+  copy_boxes(impl_->wide, impl_->bvh);
 }
 
 ClosestPoint TriangleTree::closest(const Vec3& p, Index hint) const {
@@ -196,39 +200,44 @@ ClosestPoint TriangleTree::closest(const Vec3& p, Index hint) const {
     best = closest_on(s.corners[best_slot], p);
   }
   struct Visit {
-    double squared;
+    float squared;
     Index node;
   };
-  std::array<Visit, bvh_stack_size> stack;
+  const WideQuery query(s.wide, p);
+  // lower bounds are floats: the limit is rounded up
+  const auto as_limit = [](double d) {
+    const auto f = static_cast<float>(d);
+    return static_cast<double>(f) < d ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
+  };
+  float limit = as_limit(best.squared);
+  std::array<Visit, 3 * bvh_stack_size> stack;
   int top = 0;
   stack[top++] = {0, 0};
   while (top > 0) {
     const Visit visit = stack[--top];
-    if (visit.squared >= best.squared) continue;
-    const BvhNode* node = &s.bvh.nodes[visit.node];
-    while (node != nullptr) {
-      const std::array<double, 2> d{node->box[0].squared_distance(p), node->box[1].squared_distance(p)};
-      const int first = d[1] < d[0] ? 1 : 0;
-      const BvhNode* next = nullptr;
-      double waiting = 0;
-      Index waiting_node = -1;
-      for (const int side : {first, 1 - first}) {
-        if (!(d[side] < best.squared)) break;
-        if (node->count[side] > 0) {
-          const Index begin = node->child[side];
-          for (Index i = begin; i < begin + node->count[side]; ++i) {
-            const Candidate c = closest_on(s.corners[i], p);
-            if (c.squared < best.squared) best = c, best_slot = i;
-          }
-        } else if (next == nullptr) {
-          next = &s.bvh.nodes[node->child[side]];
-        } else {
-          waiting_node = node->child[side];
-          waiting = d[side];
-        }
+    if (visit.squared > limit) continue;
+    const WideNode& node = s.wide.nodes[visit.node];
+    const Eigen::Array4f d = query.squared(node);
+    std::array<int, 4> order;
+    int n = 0;
+    for (int i = 0; i < 4; ++i) {
+      if (!(d[i] <= limit) || node.child[i] < 0) continue;
+      int at = n++;
+      for (; at > 0 && d[order[at - 1]] > d[i]; --at) order[at] = order[at - 1];
+      order[at] = i;
+    }
+    for (int i = 0; i < n; ++i) {  // leaves first, nearest first: they shrink the limit
+      const int c = order[i];
+      if (node.count[c] == 0 || d[c] > limit) continue;
+      for (Index t = node.child[c]; t < node.child[c] + node.count[c]; ++t) {
+        const Candidate candidate = closest_on(s.corners[t], p);
+        if (candidate.squared < best.squared) best = candidate, best_slot = t;
       }
-      if (waiting_node >= 0) stack[top++] = {waiting, waiting_node};
-      node = next;
+      limit = as_limit(best.squared);
+    }
+    for (int i = n - 1; i >= 0; --i) {
+      const int c = order[i];
+      if (node.count[c] == 0 && d[c] <= limit) stack[top++] = {d[c], node.child[c]};
     }
   }
   if (best_slot < 0) return out;  // coordinates so large that squares overflow

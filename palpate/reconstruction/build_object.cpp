@@ -51,6 +51,23 @@ BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& sup
   return out;
 }
 
+BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions& fuse, const std::vector<Support>& supports,
+                         const BuildOptions& options, const OnProgress& progress) {
+  const FusedViews fused = fuse_views(views, fuse);
+  BuiltObject out = build_object(fused.facets, supports, options, progress);
+  out.model.surface = geometry::boundary_surface(out.model.volume).surface;
+  out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
+  // the plane's share was not seen either
+  const double all = fused.seen_area_m2 + fused.support_area_m2;
+  out.model.unseen_share += (1 - out.model.unseen_share) * (all > 0 ? fused.support_area_m2 / all : 0);
+  out.model.warnings.clear();  // facets are open by nature; what they say of holes is said by the share
+  add_warnings(out.model, out.check.findings);
+  if (out.model.unseen_share > 0.05)
+    out.model.warnings.push_back(std::to_string(static_cast<int>(100 * out.model.unseen_share + 0.5)) +
+                                 " % of the surface was not seen and is completed");
+  return out;
+}
+
 BuiltObject build_object(const TetMesh& volume, const std::vector<Support>& supports) {
   BuiltObject out;
   out.check = geometry::check_volume(volume);

@@ -4,6 +4,7 @@
 
 #include "palpate/core/recording.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
+#include "palpate/reconstruction/fuse_views.hpp"
 
 namespace palpate::reconstruction {
 
@@ -24,6 +25,10 @@ struct BuiltObject {
 /// @throws Error as geometry::tetrahedralise.
 BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options = {},
                          const OnProgress& progress = {});
+
+/// Fuses views (see fuse_views) and fills them; the surface is the watertight boundary of the volume.
+BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions& fuse, const std::vector<Support>& supports,
+                         const BuildOptions& options = {}, const OnProgress& progress = {});
 
 /// Takes a volume as it is; its boundary is the surface. @throws Error when an element is inverted or has no volume.
 BuiltObject build_object(const TetMesh& volume, const std::vector<Support>& supports);
