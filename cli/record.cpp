@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `palpate record --demo -o FOLDER`: writes the built-in recording, made by the program's own lab.
+// `palpate record -o FOLDER`: the push protocol on the lab's robot, written step by step, so that a run that was cut off can
+// go on. `--demo` writes the built-in recording instead.
 #include <fmt/core.h>
 
 #include <filesystem>
@@ -8,9 +9,11 @@
 #include <string>
 
 #include "cli/verbs.hpp"
+#include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/lab/built_in.hpp"
+#include "palpate/lab/robot.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -21,6 +24,8 @@ struct RecordArguments {
   std::string truth;
   double young_modulus_pa = 0;
   double poisson_ratio = -1;
+  bool resume = false;
+  acquisition::PushOptions push;
 };
 
 nlohmann::json truth_json(const lab::DemoTruth& truth) {
@@ -37,8 +42,56 @@ nlohmann::json truth_json(const lab::DemoTruth& truth) {
   return json;
 }
 
-int record(Session& session, const RecordArguments& arguments) {
-  if (!arguments.demo) throw Error("records the built-in demonstration only; say --demo", "record");
+// Runs the protocol; every finished step is on the disk before the next one begins.
+int record_push(Session& session, const RecordArguments& arguments) {
+  const std::filesystem::path folder = arguments.output;
+  const bool exists = std::filesystem::exists(folder) && !std::filesystem::is_empty(folder);
+  if (exists && !arguments.resume)
+    throw Error("is there already; say --resume to go on, or choose another folder", folder.string());
+  lab::LabOptions options;
+  options.seed = session.seed;
+  if (arguments.young_modulus_pa != 0) options.object.young_modulus_pa = arguments.young_modulus_pa;
+  if (arguments.poisson_ratio >= 0) options.object.poisson_ratio = arguments.poisson_ratio;
+  lab::LabRobot robot(options);
+  Recording recording = robot.scene();
+  if (exists) {
+    recording = io::read_recording_unchecked(folder);
+    // The recording's clock goes on from its last step.
+    if (!recording.pushes.empty() && !recording.pushes.back().steps.empty())
+      robot.wait(recording.pushes.back().steps.back().time_s + 1);
+  }
+  const acquisition::PushPlan plan = robot.plan();
+  const Push* so_far = nullptr;
+  for (const Push& push : recording.pushes)
+    if (push.name == plan.name) so_far = &push;
+  io::RecordingWriter writer(folder, recording);
+  bool begun = so_far != nullptr;
+  const acquisition::PushReport report = acquisition::run_push(
+      robot, plan, arguments.push,
+      [&](const Push& push, const Step& step) {
+        if (!begun) writer.begin_push(push);
+        begun = true;
+        writer.add_step(step);
+        const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
+        session.say(fmt::format("step at {:.1f} s: {:.2f} N{}", step.time_s, force, step.unloading ? ", going back" : ""));
+      },
+      [] { return !Session::interrupted(); }, so_far);
+  for (const int step : report.unsettled) session.warn(fmt::format("step {} had not settled when it was recorded", step));
+  session.say(fmt::format("stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps in {}", acquisition::to_words(report.stop),
+                          report.message, report.highest_force_n, 1000 * report.deepest_m, report.steps, arguments.output));
+  session.result({{"recording", arguments.output},
+                  {"stop", acquisition::to_words(report.stop)},
+                  {"message", report.message},
+                  {"steps", report.steps},
+                  {"highest_force_n", report.highest_force_n},
+                  {"deepest_m", report.deepest_m},
+                  {"unsettled", report.unsettled},
+                  {"seed", options.seed}});
+  return report.stop == acquisition::StopReason::user || report.stop == acquisition::StopReason::no_contact ? exit_numbers
+                                                                                                            : exit_done;
+}
+
+int record_demo(Session& session, const RecordArguments& arguments) {
   if (std::filesystem::exists(arguments.output) && !std::filesystem::is_empty(arguments.output))
     throw Error("is there already; choose another folder or remove it", arguments.output);
   lab::DemoOptions options;
@@ -66,6 +119,9 @@ int record(Session& session, const RecordArguments& arguments) {
 
 Run verbs::record(CLI::App& app) {
   auto arguments = std::make_shared<RecordArguments>();
+  // The lab's foam caves in beyond what a soft pad can press: less than the paper's 50 N and 10 cm.
+  arguments->push.force_limit_n = 8;
+  arguments->push.travel_limit_m = 0.013;
   app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
   app.add_option("-o,--output", arguments->output, "folder to write; must not exist or be empty")->required();
   app.add_option("--truth", arguments->truth, "also write what the simulation knows and the recording does not (JSON)");
@@ -74,7 +130,13 @@ Run verbs::record(CLI::App& app) {
       ->check(CLI::PositiveNumber);
   app.add_option("--poisson-ratio", arguments->poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
-  return [arguments](Session& session) { return palpate::cli::record(session, *arguments); };
+  app.add_option("--force-limit", arguments->push.force_limit_n, "stop at this force, N")->check(CLI::PositiveNumber);
+  app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m")->check(CLI::PositiveNumber);
+  app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N")->check(CLI::PositiveNumber);
+  app.add_flag("--resume", arguments->resume, "go on with a recording that was cut off");
+  return [arguments](Session& session) {
+    return arguments->demo ? record_demo(session, *arguments) : record_push(session, *arguments);
+  };
 }
 
 }  // namespace palpate::cli

@@ -23,7 +23,7 @@ using SetUp = Run(CLI::App& app);
 #define PALPATE_VERBS(VERB) \
   VERB(demo,       "start",   "the whole way on a made-up foam cube: push, fit, report",               "palpate demo -o out") \
   VERB(model,      "object",  "make tetrahedra that can be simulated from a surface, however broken",  "palpate model teddy.obj -o out --tetrahedra 10000 --unit mm") \
-  VERB(record,     "measure", "make a recording: the built-in demonstration",                         "palpate record --demo -o foam_cube") \
+  VERB(record,     "measure", "push an object and record it: the software lab, or the demonstration",  "palpate record -o foam_cube --force-limit 8") \
   VERB(info,       "measure", "what is in a recording, in units, and what is wrong with it",           "palpate info recording") \
   VERB(estimate,   "measure", "Young's modulus and Poisson ratio of a recording, with intervals",      "palpate estimate recording -o result") \
   VERB(report,     "show",    "the figures of a result as SVG and PNG files, without a display",       "palpate report out --png figures") \

@@ -32,11 +32,12 @@ struct PushOptions {
   double approach_speed_m_s = 0.02;
   double push_speed_m_s = 0.005;
   double sample_period_s = 0.02;
-  int free_air_samples = 50;        ///< for the tare and its noise
-  double settling_timeout_s = 5.0;  ///< a step that has not settled by then is recorded and reported
-  double contact_std_m = 0.0;       ///< prior on the contact point that the recording will state
+  int free_air_samples = 50;         ///< for the tare and its noise
+  double settling_timeout_s = 10.0;  ///< a step that has not settled by then is recorded and reported
+  double contact_std_m = 0.0;        ///< prior on the contact point that the recording will state
   sensing::ContactOptions contact;
-  sensing::SettlingOptions settling;
+  /// The window is long enough for 0.05 N of noise at 50 Hz to leave the slope known to 0.01 N/s.
+  sensing::SettlingOptions settling{0.05, 0.005, 2.0};
   sensing::SlipOptions slip;
 };
 

@@ -47,6 +47,7 @@ Made run(const LabOptions& options) {
 TEST(LabRobot, PushIsRecordedAsItHappened) {
   const Made made = run(quick());
   EXPECT_EQ(made.report.stop, acquisition::StopReason::force_limit) << made.report.message;
+  EXPECT_TRUE(made.report.unsettled.empty()) << "noise of the sensor must not look like a creeping force";
   ASSERT_EQ(made.steps.size(), 5u);  // rest, 2 N, 4 N, half of it on the way back, rest
   double offset = 0, worst = 0;
   int loaded = 0;
