@@ -28,6 +28,9 @@ void check(const FitOptions& options);
 /// What the sensors of one step contribute, in the recording's order of pushes and steps.
 using Inputs = std::vector<std::vector<TermInput>>;
 
+/// How the solver is set up for a recording: threads, and the cure for locking where nu may come near 0.5.
+fem::StaticsOptions statics_options(const Recording& recording, const SimulatedObject& object, const FitOptions& options);
+
 /// @param recording  loads, supports, priors; recording.model gives nu's prior range and whether it is fixed
 /// @param inputs     one list a step
 /// @throws Error when no answer can exist (no observation, supports that hold nothing, ...). Numbers that did not work out

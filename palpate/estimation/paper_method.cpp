@@ -76,8 +76,7 @@ struct PaperError::Impl {
 PaperError::PaperError(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
                        const FitOptions& options)
     : impl_(std::make_unique<Impl>()) {
-  fem::StaticsOptions statics;
-  statics.threads = options.threads;
+  const fem::StaticsOptions statics = statics_options(recording, object, options);
   impl_->model = std::make_unique<ForwardModel>(recording, object, impl_->unknowns, statics);
   std::vector<std::size_t> with_points;
   for (std::size_t s = 0; s < inputs.size(); ++s) {
