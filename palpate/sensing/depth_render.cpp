@@ -163,14 +163,16 @@ MaskImage mask_rendered(const DepthFrame& frame, const DepthImage& rendered_m, c
             if (wide(r, c) == 0 || wide(r, c) > z) wide(r, c) = z;
     }
 
+  // The model is looked up once, not by name for every pixel.
+  axial_sigma_m(frame.noise, {1.0, 0.0, frame.camera.fx_px});  // throws when it cannot be told
+  const auto model = frame.noise.model == "constant" ? nullptr : depth_noise_model(frame.noise.model).axial_sigma_m;
   MaskImage mask = MaskImage::Zero(rows, columns);
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column) {
       const double body = wide(row, column), seen = frame.depth_m(row, column);
       if (body == 0 || !(seen > 0)) continue;
-      const double tolerance =
-          options.depth_margin_m + options.depth_sigmas * axial_sigma_m(frame.noise, {body, 0.0, frame.camera.fx_px});
-      mask(row, column) = seen > body - tolerance;
+      const double sigma = model ? model({body, 0.0, frame.camera.fx_px}) : frame.noise.sigma_m;
+      mask(row, column) = seen > body - options.depth_margin_m - options.depth_sigmas * sigma;
     }
   return mask;
 }
