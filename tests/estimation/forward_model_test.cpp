@@ -112,7 +112,8 @@ TEST(ForwardModel, BarBetweenSmoothPlatensIsTheClosedForm) {
   EXPECT_LT((predicted.d_force[0].col(log_young) - force_n).norm(), 1e-8 * force_n.norm());
   EXPECT_LT(predicted.d_force[0].col(poisson).norm(), 1e-8 * force_n.norm());
   EXPECT_NEAR(predicted.travel_m(0), travel_m, 1e-15);
-  // The bar may turn on the table, so its stretches are read along its own edges (the linear law's strain ignores small turns).
+  // The bar may turn on the table, so its stretches are read along its own edges (the linear law's strain ignores small
+  // turns).
   const double strain = travel_m / size_m.z();
   const Points& rest_m = model.object().surface.rest().vertices_m;
   const Vec3 stretch(1 + nu * strain, 1 + nu * strain, 1 - strain);

@@ -1,0 +1,261 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// The whole fit against closed forms, and against clouds of a finer mesh with seeded noise.
+#include "palpate/estimation/fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+// ---- Uniaxial compression between smooth platens: the state is homogeneous, so any mesh is exact.
+
+const Vec3 bar_m(0.03, 0.02, 0.05);
+
+/// Force on a bar that is shortened by `travel_m` and free to bulge.
+double linear_force_n(double young_pa, double, double travel_m) {
+  return young_pa * bar_m.x() * bar_m.y() * travel_m / bar_m.z();
+}
+
+/// W = mu/2 (I1 - 3) - mu ln J + lambda/2 ln(J)^2: P = mu (F - F^-T) + lambda ln(J) F^-T with stretches (s, s, l); s from
+/// P_xx = 0.
+double neo_hookean_force_n(double young_pa, double nu, double travel_m) {
+  const double mu = young_pa / (2 * (1 + nu)), lambda = young_pa * nu / ((1 + nu) * (1 - 2 * nu));
+  const double l = 1 - travel_m / bar_m.z();
+  double low = 0.5, high = 3;
+  for (int i = 0; i < 200; ++i) {
+    const double s = 0.5 * (low + high);
+    (mu * (s - 1 / s) + lambda * std::log(s * s * l) / s < 0 ? low : high) = s;
+  }
+  const double p_zz = mu * (l - 1 / l) + lambda * std::log(low * low * l) / l;
+  return -p_zz * bar_m.x() * bar_m.y();
+}
+
+Recording pressed_bar(double (*force_n)(double, double, double), double young_pa, double nu) {
+  Recording recording;
+  recording.supports = {sliding("table", Vec3::Zero(), Vec3::UnitZ())};
+  Tool plate;
+  plate.name = "plate";
+  plate.shape = ToolShape::platen;
+  plate.plane = {Vec3(0, 0, bar_m.z()), -Vec3::UnitZ()};
+  plate.contact = ContactLaw::frictionless;
+  recording.tools = {plate};
+  Push push;
+  push.name = "press";
+  for (double travel_m : {0.0, 0.003, 0.006, 0.009, 0.012, 0.015}) {
+    Step step;
+    Load load;
+    load.tool = "plate";
+    load.travel_m = travel_m;
+    step.loads = {load};
+    Wrench wrench;
+    wrench.force_n = Vec3(0, 0, -force_n(young_pa, nu, travel_m));
+    wrench.force_sigma_n = 0.02;
+    step.observations = {wrench};
+    push.steps.push_back(step);
+  }
+  recording.pushes = {push};
+  return recording;
+}
+
+Inputs wrenches_of(const Recording& recording) {
+  Inputs inputs;
+  for (const auto& step : recording.pushes[0].steps) inputs.push_back({std::get<Wrench>(step.observations[0])});
+  return inputs;
+}
+
+class UniaxialCompression : public testing::TestWithParam<const char*> {};
+
+TEST_P(UniaxialCompression, ClosedFormForcesGiveYoungsModulusExactly) {
+  const std::string material = GetParam();
+  const double young_pa = 31415, nu = 0.37;
+  Recording recording = pressed_bar(material == "linear" ? linear_force_n : neo_hookean_force_n, young_pa, nu);
+  recording.model.poisson_fixed = nu;
+  const Identification answer = fit(recording, simulated(kuhn_block(2, 1, 2, bar_m), material), wrenches_of(recording), {});
+  ASSERT_EQ(answer.termination, Termination::converged) << answer.message;
+  const Parameter& young = parameter(answer, "young_modulus");
+  EXPECT_NEAR(young.value, young_pa, 1e-6 * young_pa);
+  // With nu known the forces are E times known numbers f: var(E)/E^2 = sigma^2 / sum f^2.
+  double information = 0;
+  for (const auto& step : recording.pushes[0].steps) {
+    information += std::pow(std::get<Wrench>(step.observations[0]).force_n.z() / 0.02, 2);
+  }
+  EXPECT_NEAR(young.std / young.value, 1 / std::sqrt(information), 1e-4 / std::sqrt(information));
+  EXPECT_NEAR(std::log(young.upper_95 / young.lower_95), 2 * 1.959964 / std::sqrt(information),
+              1e-3 / std::sqrt(information));
+  EXPECT_DOUBLE_EQ(parameter(answer, "poisson_ratio").value, nu);
+  EXPECT_DOUBLE_EQ(parameter(answer, "poisson_ratio").std, 0);
+  EXPECT_FALSE(says(answer, "nu_not_determined"));
+  EXPECT_FALSE(says(answer, "model_does_not_fit"));
+  EXPECT_EQ(answer.fit.steps, 6u);
+}
+
+TEST(UniaxialForces, OfTheLinearLawDoNotDetermineNuAndThatIsSaid) {
+  const Recording recording = pressed_bar(linear_force_n, 31415, 0.37);
+  const Identification answer = fit(recording, simulated(kuhn_block(1, 1, 1, bar_m), "linear"), wrenches_of(recording), {});
+  EXPECT_TRUE(says(answer, "nu_not_determined"));
+  EXPECT_FALSE(parameter(answer, "poisson_ratio").determined);
+  EXPECT_NEAR(parameter(answer, "young_modulus").value, 31415, 1e-3 * 31415);
+}
+
+TEST(UniaxialForces, OfTheNeoHookeanLawDetermineNuByTheirCurvature) {
+  const Recording recording = pressed_bar(neo_hookean_force_n, 31415, 0.37);
+  const Identification answer =
+      fit(recording, simulated(kuhn_block(1, 1, 1, bar_m), "neo_hookean"), wrenches_of(recording), {});
+  EXPECT_FALSE(says(answer, "nu_not_determined"));
+  EXPECT_NEAR(parameter(answer, "poisson_ratio").value, 0.37, 0.5 * parameter(answer, "poisson_ratio").std);
+  EXPECT_NEAR(parameter(answer, "young_modulus").value, 31415, 0.5 * parameter(answer, "young_modulus").std);
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, UniaxialCompression, testing::Values("linear", "neo_hookean"));
+
+TEST(ForceScale, ItsPriorBecomesTheErrorOfYoungsModulus) {
+  Recording recording = pressed_bar(linear_force_n, 2e4, 0.3);
+  recording.model.poisson_fixed = 0.3;
+  recording.force_scale_std = 0.05;
+  for (auto& step : recording.pushes[0].steps) std::get<Wrench>(step.observations[0]).force_sigma_n = 1e-3;
+  const Identification answer = fit(recording, simulated(kuhn_block(1, 1, 1, bar_m), "linear"), wrenches_of(recording), {});
+  const Parameter& young = parameter(answer, "young_modulus");
+  EXPECT_NEAR(young.value, 2e4, 1e-4 * 2e4);
+  EXPECT_NEAR(young.std / young.value, 0.05, 0.001);
+  ASSERT_FALSE(answer.budget.empty());
+  EXPECT_EQ(answer.budget.front().input, "force_scale");
+}
+
+// ---- A pushed block, seen by noisy clouds.
+
+void expect_inside(const Parameter& p, double truth) {
+  EXPECT_LT(p.lower_95, truth) << p.name << " " << p.value;
+  EXPECT_GT(p.upper_95, truth) << p.name << " " << p.value;
+}
+
+TEST(PushedBlockFit, CloudOfAFinerMeshGivesBothParametersWithinTheirIntervals) {
+  const PushedBlock truth;
+  const Identification answer = fit(pushed_block_recording(), coarse_block(), clouds_of(truth), {});
+  ASSERT_EQ(answer.termination, Termination::converged) << answer.message;
+  expect_inside(parameter(answer, "young_modulus"), truth.young_pa);
+  expect_inside(parameter(answer, "poisson_ratio"), truth.poisson);
+  EXPECT_LT(parameter(answer, "young_modulus").std, 0.1 * truth.young_pa);  // an interval that says something
+  EXPECT_NEAR(answer.fit.chi2_per_dof, 1, 0.25);
+  EXPECT_FALSE(says(answer, "model_does_not_fit"));
+  EXPECT_FALSE(says(answer, "many_outliers"));
+  ASSERT_EQ(answer.covariance.rows(), 2);
+}
+
+TEST(PushedBlockFit, FivePercentGrossOutliersMoveLittle) {
+  PushedBlock truth;
+  const Identification clean = fit(pushed_block_recording(), coarse_block(), clouds_of(truth), {});
+  truth.outlier_share = 0.05;
+  const Identification spoilt = fit(pushed_block_recording(), coarse_block(), clouds_of(truth), {});
+  const Parameter& young = parameter(clean, "young_modulus");
+  EXPECT_NE(parameter(spoilt, "young_modulus").value, young.value);
+  EXPECT_LT(std::abs(parameter(spoilt, "young_modulus").value - young.value), young.std);
+  EXPECT_LT(spoilt.fit.points_used, clean.fit.points_used);
+}
+
+TEST(PushedBlockFit, SameInputSameDigitsAndAnyStart) {
+  const Inputs inputs = clouds_of({});
+  const Recording recording = pushed_block_recording();
+  const Identification first = fit(recording, coarse_block(), inputs, {});
+  const Identification second = fit(recording, coarse_block(), inputs, {});
+  for (std::size_t k = 0; k < first.parameters.size(); ++k) {
+    EXPECT_EQ(first.parameters[k].value, second.parameters[k].value);
+    EXPECT_EQ(first.parameters[k].lower_95, second.parameters[k].lower_95);
+    EXPECT_EQ(first.parameters[k].upper_95, second.parameters[k].upper_95);
+  }
+  for (double factor : {0.01, 100.0}) {
+    FitOptions options;
+    options.young_start_pa = factor * 2e4;
+    options.poisson_start = factor < 1 ? 0.1 : 0.45;
+    const Identification far = fit(recording, coarse_block(), inputs, options);
+    EXPECT_EQ(far.termination, Termination::converged) << factor << " " << far.message;
+    for (std::size_t k = 0; k < 2; ++k) {
+      EXPECT_NEAR(far.parameters[k].value, first.parameters[k].value, 0.03 * first.parameters[k].std) << factor;
+    }
+  }
+}
+
+TEST(PushedBlockFit, FixedNuStaysAndDoesNotWidenYoungsModulus) {
+  Recording recording = pushed_block_recording();
+  const Inputs inputs = clouds_of({});
+  const Identification open = fit(recording, coarse_block(), inputs, {});
+  recording.model.poisson_fixed = 0.3;
+  const Identification held = fit(recording, coarse_block(), inputs, {});
+  EXPECT_EQ(parameter(held, "poisson_ratio").value, 0.3);
+  EXPECT_EQ(parameter(held, "poisson_ratio").lower_95, 0.3);
+  EXPECT_EQ(parameter(held, "poisson_ratio").upper_95, 0.3);
+  EXPECT_LE(parameter(held, "young_modulus").std, 1.01 * parameter(open, "young_modulus").std);
+  expect_inside(parameter(held, "young_modulus"), 2e4);
+}
+
+PushedBlock with_displaced_clamp() {
+  PushedBlock truth;
+  truth.clamp.translation_m = Vec3(0.001, -0.002, 0.004);
+  truth.clamp.rotation_rad = Vec3(0.02, 0.06, -0.03);
+  return truth;
+}
+
+TEST(DisplacedClamp, HeldFixedItDoesNotFitAndThatIsSaid) {
+  const Identification answer = fit(pushed_block_recording(), coarse_block(), clouds_of(with_displaced_clamp()), {});
+  EXPECT_TRUE(says(answer, "model_does_not_fit")) << answer.fit.chi2_per_dof;
+}
+
+TEST(DisplacedClamp, WithAPriorItFitsAndThePoseIsFound) {
+  Recording recording = pushed_block_recording();
+  recording.supports[0].pose_std_m = 0.005;
+  recording.supports[0].pose_std_rad = 0.05;
+  const PushedBlock truth = with_displaced_clamp();
+  const Identification answer = fit(recording, coarse_block(), clouds_of(truth), {});
+  ASSERT_EQ(answer.termination, Termination::converged) << answer.message;
+  EXPECT_FALSE(says(answer, "model_does_not_fit")) << answer.fit.chi2_per_dof;
+  EXPECT_FALSE(says(answer, "nuisance_beyond_prior"));
+  expect_inside(parameter(answer, "young_modulus"), truth.young_pa);
+  ASSERT_EQ(answer.nuisances.size(), 6u);
+  for (int d = 0; d < 3; ++d) {
+    const Nuisance& translation = answer.nuisances[static_cast<std::size_t>(d)];
+    const Nuisance& rotation = answer.nuisances[static_cast<std::size_t>(d) + 3];
+    EXPECT_NEAR(translation.value, truth.clamp.translation_m(d), 4 * translation.std) << translation.name;
+    EXPECT_NEAR(rotation.value, truth.clamp.rotation_rad(d), 4 * rotation.std) << rotation.name;
+    EXPECT_LT(translation.std, 1e-3);
+  }
+}
+
+TEST(DisplacedClamp, FarBeyondItsPriorIsSaid) {
+  Recording recording = pushed_block_recording();
+  recording.supports[0].pose_std_m = 0.0005;
+  recording.supports[0].pose_std_rad = 0.01;
+  const Identification answer = fit(recording, coarse_block(), clouds_of(with_displaced_clamp()), {});
+  EXPECT_TRUE(says(answer, "nuisance_beyond_prior"));
+}
+
+TEST(FitOptionsCheck, EveryFieldOutOfItsRangeIsNamed) {
+  const auto where = [](auto&& spoil) -> std::string {
+    FitOptions options;
+    spoil(options);
+    try {
+      check(options);
+    } catch (const Error& error) {
+      return error.where();
+    }
+    return "";
+  };
+  EXPECT_EQ(where([](FitOptions&) {}), "");
+  EXPECT_EQ(where([](FitOptions& o) { o.max_iterations = 0; }), "FitOptions.max_iterations");
+  EXPECT_EQ(where([](FitOptions& o) { o.tukey_cut = 1; }), "FitOptions.tukey_cut");
+  EXPECT_EQ(where([](FitOptions& o) { o.tukey_cut = std::nan(""); }), "FitOptions.tukey_cut");
+  EXPECT_EQ(where([](FitOptions& o) { o.young_start_pa = -1; }), "FitOptions.young_start_pa");
+  EXPECT_EQ(where([](FitOptions& o) { o.poisson_start = 0.5; }), "FitOptions.poisson_start");
+  EXPECT_EQ(where([](FitOptions& o) { o.threads = 0; }), "FitOptions.threads");
+}
+
+TEST(FitWithoutObservations, IsAnError) {
+  EXPECT_THROW(fit(pushed_block_recording(), coarse_block(), Inputs(2), {}), Error);
+}
+
+}  // namespace
+}  // namespace palpate::estimation

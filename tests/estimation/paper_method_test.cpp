@@ -1,0 +1,55 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// The paper's method as a baseline must be a fair one: it reaches the minimum of its own error function.
+#include "palpate/estimation/paper_method.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+TEST(PaperMethod, ReachesTheMinimumThatAGridSearchFinds) {
+  PushedBlock truth;
+  truth.points = 150;
+  const Recording recording = pushed_block_recording();
+  const SimulatedObject object = simulated(kuhn_block(6, 4, 3, block_size_m), "linear");
+  truth.material = "linear";
+  const Inputs inputs = clouds_of(truth);
+  const Identification answer = fit_as_in_paper(recording, object, inputs, {});
+  ASSERT_EQ(answer.termination, Termination::converged) << answer.message;
+  const double young_pa = parameter(answer, "young_modulus").value, nu = parameter(answer, "poisson_ratio").value;
+
+  PaperError error(recording, object, inputs, {});
+  const double reached = error(young_pa, nu);
+  EXPECT_NEAR(std::sqrt(reached), answer.fit.rms_m, 1e-3 * answer.fit.rms_m);
+  double lowest = std::numeric_limits<double>::infinity(), at_pa = 0, at_nu = 0;
+  for (int i = -12; i <= 12; ++i) {
+    for (int j = 0; j <= 9; ++j) {
+      const double e = 2e4 * std::exp(0.06 * i), n = std::min(0.05 * j + 0.02, 0.4995);
+      const double value = error(e, n);
+      if (value < lowest) {
+        lowest = value;
+        at_pa = e;
+        at_nu = n;
+      }
+    }
+  }
+  // Correspondences are found anew at every evaluation: the error is only smooth up to a small roughness.
+  EXPECT_LT(reached, lowest * 1.002) << "the grid's best is E " << at_pa << " nu " << at_nu << ", the method ended at E "
+                                     << young_pa << " nu " << nu;
+  EXPECT_TRUE(says(answer, "no_uncertainty"));
+}
+
+TEST(PaperMethod, WithoutASurfaceIsAnError) {
+  Inputs inputs(2);
+  inputs[0].push_back(ToolTravel{"finger", 0.001, 1e-4});
+  EXPECT_THROW(PaperError(pushed_block_recording(), coarse_block(), inputs, {}), Error);
+}
+
+}  // namespace
+}  // namespace palpate::estimation
