@@ -208,7 +208,16 @@ ObjectPicture draw_object(const json& page, int width, int height) {
   const Vec3 up = gravity.norm() > 1e-6 ? Vec3(-gravity.normalized()) : Vec3(Vec3::UnitZ());
   Vec3 level = -force + force.dot(up) * up;  // look from the side that is pushed
   if (level.norm() < 0.2 * force.norm() || level.norm() < 1e-12) {
-    level = Vec3(1, -1.6, 0) - Vec3(1, -1.6, 0).dot(up) * up;
+    // Pushed from above: look from where the sensors looked.
+    Vec3 seen = Vec3::Zero();
+    if (step.contains("points")) {
+      const Points points = decoded_points(step["points"].get<std::string>(), box);
+      if (points.rows() > 0) seen = (points.colwise().mean() - rest.colwise().mean()).transpose();
+    }
+    level = seen - seen.dot(up) * up;
+    if (level.norm() < 0.02 * (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm()) {
+      level = Vec3(1, -1.6, 0) - Vec3(1, -1.6, 0).dot(up) * up;
+    }
     if (level.norm() < 1e-6) level = Vec3::UnitZ();
   }
   level = Eigen::AngleAxisd(0.6, up) * level.normalized();

@@ -173,7 +173,7 @@ export function nuisances(report: Report, width: number): SVGElement | null {
 function bars(width: number, items: { label: string; value: number; text: string; colour: string }[], label: string, title: string): SVGElement {
   const longest = Math.max(...items.map((r) => Math.min(r.label.length, 30)));
   const left = Math.min(Math.max(60, longest * 6.6 + 14), width * 0.45);
-  const plot = new Plot(width, 48 + items.length * 26, { label, from: 0, to: Math.max(...items.map((r) => r.value)) * 1.35 || 1 }, null, title, left);
+  const plot = new Plot(width, 48 + items.length * 26, { label, from: 0, to: Math.max(...items.map((r) => r.value)) * 1.7 || 1 }, null, title, left);
   items.forEach((row, i) => {
     const y = plot.top + 3 + i * 26;
     const short = row.label.length > 30 ? `${row.label.slice(0, 29)}\u2026` : row.label;

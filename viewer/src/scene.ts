@@ -102,8 +102,16 @@ export class View {
     for (const step of this.report.steps) push.add(new Vector3(...step.force_n.map((f) => f ?? 0)));
     const level = push.clone().negate().addScaledVector(up, push.dot(up));
     if (level.length() < 0.2 * push.length() || level.length() < 1e-12) {
+      // Pushed from above: look from where the sensors looked.
+      const seen = this.report.steps.find((s) => s.points && s.points.length > 0)?.points;
       level.set(1, -1.6, 0);
+      if (seen) {
+        level.set(0, 0, 0);
+        for (let i = 0; i < seen.length; i += 3) level.add(new Vector3(seen[i], seen[i + 1], seen[i + 2]).sub(this.centre));
+        level.divideScalar(seen.length / 3);
+      }
       level.addScaledVector(up, -level.dot(up));
+      if (level.length() < 0.02 * this.size) level.set(1, -1.6, 0).addScaledVector(up, -up.x + 1.6 * up.y);
       if (level.length() < 1e-6) level.set(0, 0, 1);
     }
     level.normalize().applyAxisAngle(up, 0.6);
