@@ -196,11 +196,14 @@ void Lattice::split(Index a, Index b, const std::vector<Index>& around) {
 bool Lattice::misses(Index tet) const {
   std::array<Vec3, 4> x;
   for (int k = 0; k < 4; ++k) x[k] = points_[tets_[tet][k]];
+  const auto inside = std::count_if(tets_[tet].begin(), tets_[tet].end(), [&](Index v) { return distances_[v] < 0; });
+  // a part that slips through between the lattice's points leaves only small distances behind: without a cut be stricter
+  const double limit = inside == 0 || inside == 4 ? 0.25 * tolerance_m_ : tolerance_m_;
   for (const Index s : samples_[tet]) {
     const Eigen::Vector4d w = barycentric(sample_set_->point[s], x);
     double d = 0;
     for (int k = 0; k < 4; ++k) d += w[k] * distances_[tets_[tet][k]];
-    if (std::abs(d) > tolerance_m_) return true;
+    if (std::abs(d) > limit) return true;
   }
   if (!solid_.watertight()) return false;  // over a hole the surface is nowhere near
   // the cut's own middle, which shows a gap that the lattice bridges
