@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `palpate model`: a mesh file, however broken, becomes tetrahedra that can be simulated.
+// `palpate model`: a mesh file, however broken, or a recording's object at rest becomes tetrahedra that can be simulated.
 #include <fmt/core.h>
 
 #include <chrono>
@@ -10,7 +10,9 @@
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/mesh_file.hpp"
+#include "palpate/io/recording.hpp"
 #include "palpate/reconstruction/build_object.hpp"
+#include "palpate/sensing/observe.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -29,7 +31,30 @@ double metres_per(const std::string& unit) {
   return 1;
 }
 
+/// The object at rest as a recording gives it: a volume, a surface, or views to be fused.
+reconstruction::BuiltObject build_from_recording(const Options& o, const reconstruction::BuildOptions& options,
+                                                 Session& session) {
+  const Recording recording = io::read_recording_unchecked(o.input);
+  const Rest& rest = recording.rest;
+  if (rest.volume) return reconstruction::build_object(*rest.volume, recording.supports);
+  if (rest.surface) return reconstruction::build_object(*rest.surface, recording.supports, options, session.progress());
+  std::vector<PointCloud> clouds;
+  for (const DepthFrame& view : rest.views) {
+    Points normals;
+    const RayCloud rays = sensing::observe(view, recording.environment, {}, &normals);
+    clouds.push_back(sensing::to_point_cloud(rays, normals));
+  }
+  reconstruction::FuseOptions fuse;
+  if (!recording.environment.planes.empty()) fuse.support = recording.environment.planes.front();
+  return reconstruction::build_object(clouds, fuse, recording.supports, options, session.progress());
+}
+
 reconstruction::BuiltObject build(const Options& o, Session& session) {
+  reconstruction::BuildOptions options;
+  if (o.tetrahedra > 0) options.mesh.tetrahedra = o.tetrahedra;
+  options.mesh.edge_m = o.edge_m;
+  if (!o.finer.empty()) options.mesh.finer = {{Vec3(o.finer[0], o.finer[1], o.finer[2]), o.finer[3], o.finer[4]}};
+  if (std::filesystem::is_directory(o.input)) return build_from_recording(o, options, session);
   io::MeshData data = io::read_mesh(o.input);
   data.points_m *= metres_per(o.unit);
   const bool keep = data.tetrahedra.rows() > 0 && o.tetrahedra == 0;
@@ -39,10 +64,6 @@ reconstruction::BuiltObject build(const Options& o, Session& session) {
     surface = geometry::boundary_surface(io::tet_mesh_of(std::move(data), o.input)).surface;
   else
     surface = io::tri_mesh_of(std::move(data), o.input);
-  reconstruction::BuildOptions options;
-  if (o.tetrahedra > 0) options.mesh.tetrahedra = o.tetrahedra;
-  options.mesh.edge_m = o.edge_m;
-  if (!o.finer.empty()) options.mesh.finer = {{Vec3(o.finer[0], o.finer[1], o.finer[2]), o.finer[3], o.finer[4]}};
   return reconstruction::build_object(surface, {}, options, session.progress());
 }
 
@@ -89,7 +110,8 @@ int run(const Options& o, Session& session) {
 
 Run verbs::model(CLI::App& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("INPUT", o->input, "mesh file: a surface (OBJ, STL, PLY, ...), however broken, or a volume (MSH, VTK, VTU)")
+  app.add_option("INPUT", o->input,
+                 "mesh file: a surface (OBJ, STL, PLY, ...), however broken, or a volume (MSH, VTK, VTU); or a recording")
       ->required();
   app.add_option("-o,--output", o->output, "folder for model.vtu, model.msh, model.vtk and surface.ply")->required();
   app.add_option("--tetrahedra", o->tetrahedra, "wished number of tetrahedra; 0 keeps those of a volume as they are")

@@ -127,20 +127,25 @@ std::vector<Facet> down_to(const Plane& plane, const std::vector<Facet>& facets,
   const auto [u, v] = tangents(plane.normal);
   const double step = 2 * cell;
   using Square = std::pair<std::int64_t, std::int64_t>;
-  std::map<Square, double> height;  // lowest facet over a square of the plane
+  struct Lowest {
+    double height;
+    bool underside;  ///< faces the plane: seen from below, nothing is hidden under it
+  };
+  std::map<Square, Lowest> lowest;  // facet over a square of the plane
   Square low{0, 0}, high{0, 0};
   for (const Facet& f : facets) {
     const Vec3 d = f.middle - plane.point_m;
     const double z = plane.normal.dot(d);
     if (z < -cell) continue;
     const Square at{std::int64_t(std::floor(u.dot(d) / step)), std::int64_t(std::floor(v.dot(d) / step))};
-    const auto [it, fresh] = height.try_emplace(at, z);
-    if (!fresh) it->second = std::min(it->second, z);
-    if (height.size() == 1) low = high = at;
+    const Lowest here{z, plane.normal.dot(f.normal) < -0.1};
+    const auto [it, fresh] = lowest.try_emplace(at, here);
+    if (!fresh && z < it->second.height) it->second = here;
+    if (lowest.size() == 1) low = high = at;
     low = {std::min(low.first, at.first), std::min(low.second, at.second)};
     high = {std::max(high.first, at.first), std::max(high.second, at.second)};
   }
-  if (height.empty()) return {};
+  if (lowest.empty()) return {};
   // what the rim of the picture reaches without crossing the shadow is outside: gaps within the shadow are filled
   const auto neighbours = [](const Square& s) {
     return std::array<Square, 4>{
@@ -153,25 +158,29 @@ std::vector<Facet> down_to(const Plane& plane, const std::vector<Facet>& facets,
     todo.pop_back();
     for (const Square& n : neighbours(s))
       if (n.first >= low.first - 1 && n.first <= high.first + 1 && n.second >= low.second - 1 &&
-          n.second <= high.second + 1 && !height.contains(n) && outside.insert(n).second)
+          n.second <= high.second + 1 && !lowest.contains(n) && outside.insert(n).second)
         todo.push_back(n);
   }
+  const auto seen_below = [&](const Square& s) {
+    const auto it = lowest.find(s);
+    return it != lowest.end() && it->second.underside;
+  };
   std::vector<Facet> out;
   for (std::int64_t x = low.first; x <= high.first; ++x)
     for (std::int64_t y = low.second; y <= high.second; ++y) {
       const Square s{x, y};
-      if (outside.contains(s)) continue;
+      if (outside.contains(s) || seen_below(s)) continue;
       const Vec3 middle = plane.point_m + (double(x) + 0.5) * step * u + (double(y) + 0.5) * step * v;
       out.push_back({middle, -plane.normal, step * step});
-      const auto top = height.find(s);
-      if (top == height.end()) continue;
       for (const Square& n : neighbours(s)) {
-        if (!outside.contains(n)) continue;
+        // up to the lower end of a flank that was seen, or of what was seen from above
+        const auto top = lowest.find(seen_below(n) ? n : s);
+        if (top == lowest.end() || !(outside.contains(n) || seen_below(n))) continue;
         const Vec3 away = double(n.first - x) * u + double(n.second - y) * v;
-        const int rows = std::max(0, static_cast<int>(std::lround(top->second / step)));
+        const double tall = top->second.height;
+        const int rows = std::max(0, static_cast<int>(std::lround(tall / step)));
         for (int k = 0; k < rows; ++k)
-          out.push_back(
-              {middle + 0.5 * step * away + (k + 0.5) * top->second / rows * plane.normal, away, step * top->second / rows});
+          out.push_back({middle + 0.5 * step * away + (k + 0.5) * tall / rows * plane.normal, away, step * tall / rows});
       }
     }
   return out;
