@@ -18,6 +18,17 @@ void judge_end(const VerdictInput& in, std::vector<Verdict>& out) {
                                       "a start with --young-modulus-start."});
 }
 
+void judge_young(const VerdictInput& in, std::vector<Verdict>& out) {
+  for (const auto& parameter : in.answer.parameters) {
+    if (parameter.name != "young_modulus" || parameter.determined) continue;
+    out.push_back({"e_not_determined",
+                   "These data hardly determine Young's modulus: its interval spans a factor of " +
+                       number(parameter.upper_95 / parameter.lower_95, "{:.2g}") +
+                       ". A motion without its force, or a force without a visible deformation, cannot: press harder, and "
+                       "record both."});
+  }
+}
+
 void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
   const Unknown& nu = in.objective.unknowns()[poisson];
   if (nu.fixed) return;
@@ -105,6 +116,7 @@ std::vector<Verdict> judge(const VerdictInput& input) {
   std::vector<Verdict> verdicts;
   judge_end(input, verdicts);
   judge_fit(input, verdicts);
+  judge_young(input, verdicts);
   judge_poisson(input, verdicts);
   judge_nuisances(input, verdicts);
   judge_state(input, verdicts);
