@@ -129,7 +129,14 @@ std::vector<Index> platen_nodes(const TetMesh& mesh, const Tool& platen) {
 
 HeldBody hold(const TetMesh& mesh, const std::vector<Support>& supports, const std::vector<const Tool*>& platens) {
   Holds holds;
+  const auto refuse_friction = [](ContactLaw contact, const std::string& where) {
+    if (contact != ContactLaw::friction) return;
+    throw Error("the fit knows bonded and frictionless contact; choose the nearer of the two, and fit with the other as well to "
+                "see how much it matters",
+                where + ".contact friction");
+  };
   for (const Support& support : supports) {
+    refuse_friction(support.contact, "supports." + support.name);
     for (Index node : fem::support_nodes(mesh, support)) {
       if (support.contact == ContactLaw::bonded) {
         holds.clamp(node);
@@ -141,6 +148,7 @@ HeldBody hold(const TetMesh& mesh, const std::vector<Support>& supports, const s
 
   std::vector<Eigen::Triplet<double>> motion;
   for (std::size_t p = 0; p < platens.size(); ++p) {
+    refuse_friction(platens[p]->contact, "tools." + platens[p]->name);
     const Vec3 direction = platens[p]->plane.normal.normalized();
     for (Index node : platen_nodes(mesh, *platens[p])) {
       holds.add(node, direction);

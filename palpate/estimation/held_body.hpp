@@ -20,7 +20,7 @@ struct HeldBody {
 };
 
 /// @param platens  tools of shape `platen` whose motion is prescribed; their nodes are those within the plane's tolerance.
-/// @throws Error naming the support or platen that touches no node.
+/// @throws Error naming the support or platen that touches no node, or that asks for friction.
 HeldBody hold(const TetMesh& mesh, const std::vector<Support>& supports, const std::vector<const Tool*>& platens);
 
 }  // namespace palpate::estimation

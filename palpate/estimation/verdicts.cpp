@@ -103,6 +103,22 @@ void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
                                             " elements of the simulation are turned inside out: the load is beyond what "
                                             "this material model describes. Use neo_hookean, or smaller forces."});
   }
+  std::string unused;
+  const auto note = [&](bool given, const std::string& name) {
+    if (given && unused.find(name) == std::string::npos) unused += (unused.empty() ? "" : ", ") + name;
+  };
+  note(in.recording.rest.surface_std_m > 0, "rest.surface_std_m");
+  for (const auto& tool : in.recording.tools) note(tool.compliance_m_per_n > 0, "tools.compliance_m_per_n");
+  for (const auto& push : in.recording.pushes) {
+    for (const auto& step : push.steps) {
+      for (const auto& load : step.loads) note(load.contact_std_m > 0, "loads.contact_std_m");
+    }
+  }
+  if (!unused.empty()) {
+    out.push_back({"input_not_used", "The recording states " + unused +
+                                         ", which this fit does not propagate: the true uncertainty is larger than the "
+                                         "interval says."});
+  }
   if (in.recording.rest.state == RestState::under_pressure) {
     out.push_back({"apparent_modulus_only",
                    "The object is inflated: a solid model gives an apparent modulus that depends on pressure and tool, not "
