@@ -153,8 +153,11 @@ TEST(BackProjection, SigmaFollowsTheNoiseModel) {
   const RayCloud rays = back_project(frame);
   for (Eigen::Index i = 0; i < rays.range_m.size(); i += 101) {
     const double cosine = 1.2 / rays.range_m(i);
-    const double axial = depth_noise_model("kinect_v1").axial_sigma_m({1.2, std::acos(cosine), 140});
-    EXPECT_NEAR(rays.sigma_m(i), axial / cosine, 1e-7);
+    const DepthNoiseInput at{1.2, std::acos(cosine), 140};
+    const double axial_m = depth_noise_model("kinect_v1").axial_sigma_m(at);
+    // A sample that stands beside the pixel's centre is off by the slope times that distance.
+    const double sideways_m = depth_noise_model("kinect_v1").lateral_sigma_px(at) * 1.2 / 140;
+    EXPECT_NEAR(rays.sigma_m(i), std::hypot(axial_m, sideways_m * std::tan(std::acos(cosine))) / cosine, 1e-7);
   }
 }
 
