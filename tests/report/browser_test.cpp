@@ -1,6 +1,6 @@
 // label: unit
 // SPDX-License-Identifier: Apache-2.0
-// The page in a browser without a window. Needs node, viewer/node_modules (npm ci) and Chromium; says so and skips without.
+// The page in a browser without a window. Needs node, viewer/node_modules (npm install) and Chromium; says so and skips without.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -25,7 +25,7 @@ class Browser : public testing::Test {
   void SetUp() override {
     if (!runs("node --version")) GTEST_SKIP() << "no node: the page is not tested in a browser";
     if (!fs::exists(viewer / "node_modules/playwright-core"))
-      GTEST_SKIP() << "run `npm ci` in viewer/ to test the page in a browser";
+      GTEST_SKIP() << "run `npm install --no-package-lock` in viewer/ to test the page in a browser";
     if (!runs("chromium --version")) GTEST_SKIP() << "no chromium: the page is not tested in a browser";
     folder_ = fs::path(testing::TempDir()) /
               ("palpate_browser_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
