@@ -12,7 +12,7 @@
 #include "cli/info_bag.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/io/file.hpp"
+#include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_names.hpp"
 
@@ -250,9 +250,9 @@ int look(Session& session, const std::filesystem::path& folder) {
 
 Run verbs::info(CLI::App& app) {
   auto folder = std::make_shared<std::filesystem::path>();
-  app.add_option("recording", *folder, "folder of the recording, or an MCAP file")->required();
+  app.add_option("recording", *folder, "folder of the recording, or a bag: MCAP, rosbag2 (a folder or .db3), ROS 1")->required();
   return [folder](Session& session) {
-    return io::extension_of(*folder) == ".mcap" ? look_into_bag(session, *folder) : look(session, *folder);
+    return io::is_bag(*folder) ? look_into_bag(session, *folder) : look(session, *folder);
   };
 }
 

@@ -6,8 +6,7 @@
 #include <algorithm>
 #include <map>
 
-#include "palpate/io/file.hpp"
-#include "palpate/io/mcap.hpp"
+#include "palpate/io/message_source.hpp"
 #include "palpate/io/ros_messages.hpp"
 
 namespace palpate::cli {
@@ -16,7 +15,7 @@ namespace {
 struct Topic {
   std::string type;
   std::size_t count = 0;
-  std::uint64_t first_ns = 0, last_ns = 0;
+  std::int64_t first_ns = 0, last_ns = 0;
   double rate_hz() const {
     return count > 1 && last_ns > first_ns ? static_cast<double>(count - 1) * 1e9 / static_cast<double>(last_ns - first_ns)
                                            : 0.0;
@@ -31,11 +30,11 @@ bool is_understood(const std::string& type) {
 }  // namespace
 
 int look_into_bag(Session& session, const std::filesystem::path& path) {
-  const io::McapFile file = io::McapFile::parse(io::read_file(path), path.string());
+  const io::MessageSource file = io::read_bag(path);
   std::map<std::string, Topic> topics;
-  for (const auto& [id, channel] : file.channels) topics[channel.topic].type = channel.schema_name;
-  for (const io::McapMessage& message : file.messages) {
-    Topic& topic = topics[file.channels.at(message.channel).topic];
+  for (const io::MessageTopic& one : file.topics) topics[one.name].type = one.type;
+  for (const io::Message& message : file.messages) {
+    Topic& topic = topics[file.topics[message.topic].name];
     if (topic.count++ == 0) topic.first_ns = message.log_time_ns;
     topic.last_ns = message.log_time_ns;
   }

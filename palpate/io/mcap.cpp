@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/io/mcap.hpp"
 
-#include <lz4frame.h>
 #include <zlib.h>
 #include <zstd.h>
 
@@ -10,6 +9,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/io/bytes.hpp"
+#include "palpate/io/unpack.hpp"
 
 namespace palpate::io {
 namespace {
@@ -28,50 +28,7 @@ enum Opcode : std::uint8_t {
   op_summary_offset = 0x0E,
   op_data_end = 0x0F
 };
-constexpr std::uint64_t largest_chunk = std::uint64_t{1} << 31;
 constexpr std::size_t chunk_target = 1 << 20;
-
-/// Walks through the content of one record; asking for more than there is sets `good` to false and gives zeros.
-class Fields {
- public:
-  explicit Fields(std::string_view bytes) : bytes_(bytes) {}
-  template <typename T>
-  T number() {
-    const std::string_view raw = take(sizeof(T));
-    return good ? load<T>(raw.data()) : T{};
-  }
-  std::string text() { return std::string(take(number<std::uint32_t>())); }
-  std::string_view take(std::uint64_t size) {
-    if (size > bytes_.size() - at_) {
-      good = false;
-      return {};
-    }
-    const std::string_view result = bytes_.substr(at_, size);
-    at_ += size;
-    return result;
-  }
-  std::string_view rest() { return take(bytes_.size() - at_); }
-  bool good = true;
-
- private:
-  std::string_view bytes_;
-  std::size_t at_ = 0;
-};
-
-bool unpack_lz4(std::string_view packed, std::string& out) {
-  LZ4F_dctx* context = nullptr;
-  if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION))) return false;
-  std::size_t read = 0, written = 0, hint = 1;
-  while (hint != 0 && read < packed.size()) {
-    std::size_t in = packed.size() - read, room = out.size() - written;
-    hint = LZ4F_decompress(context, out.data() + written, &room, packed.data() + read, &in, nullptr);
-    if (LZ4F_isError(hint) || (in == 0 && room == 0)) break;
-    read += in;
-    written += room;
-  }
-  LZ4F_freeDecompressionContext(context);
-  return written == out.size();
-}
 
 void text_field(std::string& out, std::string_view text) {
   store(out, static_cast<std::uint32_t>(text.size()));
@@ -106,7 +63,7 @@ class McapParser {
       const std::string_view content = bytes.substr(at, size);
       at += size;
       if (opcode == op_data_end && !in_chunk) whole_ = true;  // the summary that follows repeats schemas and channels
-      if (!record_of(opcode, Fields(content), in_chunk)) ++damaged_;
+      if (!record_of(opcode, ByteFields(content), in_chunk)) ++damaged_;
     }
     return in_chunk || whole_;
   }
@@ -115,7 +72,7 @@ class McapParser {
   bool has_header() const { return has_header_; }
 
  private:
-  bool record_of(std::uint8_t opcode, Fields fields, bool in_chunk) {
+  bool record_of(std::uint8_t opcode, ByteFields fields, bool in_chunk) {
     if (opcode == op_header) {
       file_.profile = fields.text();
       file_.library = fields.text();
@@ -149,26 +106,19 @@ class McapParser {
     return fields.good;  // other records are of no interest here
   }
 
-  bool chunk(Fields& fields) {
+  bool chunk(ByteFields& fields) {
     fields.number<std::uint64_t>();  // first and last time
     fields.number<std::uint64_t>();
     const auto size = fields.number<std::uint64_t>();
     const auto crc = fields.number<std::uint32_t>();
     const std::string compression = fields.text();
     const std::string_view packed = fields.take(fields.number<std::uint64_t>());
-    if (!fields.good || size > largest_chunk) return false;
+    if (!fields.good) return false;
     std::string_view unpacked = packed;
     if (!compression.empty()) {
-      std::string out(size, '\0');
-      bool good = false;
-      if (compression == "zstd") {
-        const std::size_t written = ZSTD_decompress(out.data(), out.size(), packed.data(), packed.size());
-        good = !ZSTD_isError(written) && written == size;
-      } else if (compression == "lz4") {
-        good = unpack_lz4(packed, out);
-      }
-      if (!good) return false;
-      file_.storage_.push_back(std::move(out));
+      auto out = unpack(packed, compression, size);
+      if (!out) return false;
+      file_.storage_.push_back(std::move(*out));
       unpacked = file_.storage_.back();
     }
     if (unpacked.size() != size || (crc != 0 && crc != checksum(unpacked))) return false;

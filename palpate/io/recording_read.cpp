@@ -75,6 +75,30 @@ void read_robot(const YamlField& field, RecordingContext& context) {
 
 }  // namespace
 
+void read_object(YamlKeys& keys, RecordingContext& context) {
+  Recording& recording = context.recording;
+  recording.name = keys.text_or("name", fs::absolute(context.folder.root()).lexically_normal().filename().string());
+  recording.description = keys.text_or("description", "");
+  recording.accept_size = keys.boolean_or("accept_size", false);
+  recording.force_scale_std = keys.non_negative_or("force_scale_std", 0);
+  read_density(keys, recording);
+  read_environment(keys, recording);
+  // Keys are asked for in an order that lets each part refer to what it needs, and all before any is missed, so that a
+  // mistyped key is recognised as such.
+  const auto model = keys.optional("model"), robot = keys.optional("robot"), tools = keys.optional("tools"),
+             cameras = keys.optional("cameras");
+  const YamlField rest = keys.required("rest", "say what the object looks like untouched");
+  const YamlField supports =
+      keys.required("supports", "say how the object is held, or 'supports: free' if nothing holds it");
+  keys.finish();
+  if (model) read_model(*model, recording.model);
+  if (robot) read_robot(*robot, context);
+  if (cameras) read_cameras(*cameras, context);
+  read_rest(rest, context);
+  read_supports(supports, context);
+  if (tools) read_tools(*tools, context);
+}
+
 std::string RecordingFolder::read(const std::string& file, const std::string& where) {
   const fs::path relative(file);
   if (file.empty()) throw Error("a file name is expected", where);
@@ -110,27 +134,9 @@ Recording read_recording_unchecked(const fs::path& given) {
     format.fail("'" + format.text().substr(0, 60) + "' is not a format that this version reads; it reads " + format_name);
   }
   recording.source = given.string();
-  recording.name = keys.text_or("name", fs::absolute(root).lexically_normal().filename().string());
-  recording.description = keys.text_or("description", "");
-  recording.accept_size = keys.boolean_or("accept_size", false);
-  recording.force_scale_std = keys.non_negative_or("force_scale_std", 0);
-  read_density(keys, recording);
-  read_environment(keys, recording);
-  // Keys are asked for in an order that lets each part refer to what it needs, and all before any is missed, so that a
-  // mistyped key is recognised as such.
-  const auto model = keys.optional("model"), robot = keys.optional("robot"), tools = keys.optional("tools"),
-             cameras = keys.optional("cameras"), markers = keys.optional("markers");
-  const YamlField rest = keys.required("rest", "say what the object looks like untouched");
-  const YamlField supports =
-      keys.required("supports", "say how the object is held, or 'supports: free' if nothing holds it");
+  const auto markers = keys.optional("markers");
   const YamlField pushes = keys.required("pushes", "list what was done to the object");
-  keys.finish();
-  if (model) read_model(*model, recording.model);
-  if (robot) read_robot(*robot, context);
-  if (cameras) read_cameras(*cameras, context);
-  read_rest(rest, context);
-  read_supports(supports, context);
-  if (tools) read_tools(*tools, context);
+  read_object(keys, context);
   if (markers) read_markers(*markers, context);
   read_pushes(pushes, context);
   recording.input_hashes = context.folder.hashes();

@@ -247,6 +247,16 @@ void read_tools(const YamlField& field, RecordingContext& context) {
   }
 }
 
+DepthNoise read_depth_noise(const YamlField& field) {
+  YamlKeys keys(field);
+  DepthNoise noise;
+  noise.model = keys.required("model").text();
+  if (noise.model == "constant") noise.sigma_m = keys.required("sigma_m").positive();
+  noise.bias_std_m = keys.non_negative_or("bias_std_m", 0);
+  keys.finish();
+  return noise;
+}
+
 void read_cameras(const YamlField& field, RecordingContext& context) {
   for (const YamlField& item : field.items()) {
     YamlKeys keys(item);
@@ -280,11 +290,7 @@ void read_cameras(const YamlField& field, RecordingContext& context) {
     }
     entry.frame.pose_std_m = keys.non_negative_or("pose_std_m", 0);
     entry.frame.pose_std_rad = keys.non_negative_or("pose_std_rad", 0);
-    YamlKeys noise(keys.required("noise", "e.g. {model: constant, sigma_m: 0.002}"));
-    entry.frame.noise.model = noise.required("model").text();
-    if (entry.frame.noise.model == "constant") entry.frame.noise.sigma_m = noise.required("sigma_m").positive();
-    entry.frame.noise.bias_std_m = noise.non_negative_or("bias_std_m", 0);
-    noise.finish();
+    entry.frame.noise = read_depth_noise(keys.required("noise", "e.g. {model: constant, sigma_m: 0.002}"));
     keys.finish();
     if (!context.cameras.emplace(name.text(), std::move(entry)).second)
       name.fail("there is a camera '" + name.text() + "' already");

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layouts: the .msg files of sensor_msgs, geometry_msgs, tf2_msgs and std_msgs (ROS 2); ros_types.cpp repeats them.
+// Layouts: the .msg files of sensor_msgs, geometry_msgs, tf2_msgs and std_msgs; ros_types.cpp repeats them.
 #include "palpate/io/ros_messages.hpp"
 
 #include <cmath>
 
-#include "palpate/io/cdr.hpp"
+#include "palpate/io/message_bytes.hpp"
 #include "palpate/io/depth_file.hpp"
 #include "palpate/io/png_image.hpp"
 
 namespace palpate::io {
 namespace {
 
-RosHeader header_of(CdrReader& in) {
+RosHeader header_of(MessageReader& in) {
   RosHeader header;
+  if (!in.is_cdr()) in.number<std::uint32_t>();  // seq, of ROS 1 alone
   const auto seconds = in.number<std::int32_t>();
   header.stamp_ns = std::int64_t{seconds} * 1000000000 + in.number<std::uint32_t>();
   header.frame = in.text();
@@ -25,7 +26,7 @@ void put(CdrWriter& out, const RosHeader& header) {
   out.text(header.frame);
 }
 
-Vec3 vector_of(CdrReader& in) {
+Vec3 vector_of(MessageReader& in) {
   Vec3 value;
   for (int axis = 0; axis < 3; ++axis) value[axis] = in.number<double>();
   return value;
@@ -58,7 +59,7 @@ double value_of(const PointField& field, const char* raw, std::endian order) {
 
 /// A depth image in one of the two encodings of REP 118.
 DepthImage depth_of(std::string_view data, std::size_t rows, std::size_t columns, std::size_t step,
-                    const std::string& encoding, std::endian order, const CdrReader& in) {
+                    const std::string& encoding, std::endian order, const MessageReader& in) {
   const bool whole = encoding == "16UC1" || encoding == "mono16";
   if (!whole && encoding != "32FC1")
     in.fail("holds an image of encoding '" + encoding.substr(0, 20) + "'; depth is 16UC1 or 32FC1");
@@ -79,8 +80,8 @@ DepthImage depth_of(std::string_view data, std::size_t rows, std::size_t columns
 
 }  // namespace
 
-RosPointCloud decode_point_cloud(std::string_view message, const std::string& where) {
-  CdrReader in(message, where);
+RosPointCloud decode_point_cloud(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
   RosPointCloud result;
   result.header = header_of(in);
   const std::size_t rows = in.number<std::uint32_t>(), columns = in.number<std::uint32_t>();
@@ -118,20 +119,20 @@ RosPointCloud decode_point_cloud(std::string_view message, const std::string& wh
   return result;
 }
 
-RosImage decode_image(std::string_view message, const std::string& where) {
-  CdrReader in(message, where);
+RosImage decode_image(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
   RosImage result;
   result.header = header_of(in);
   const std::size_t rows = in.number<std::uint32_t>(), columns = in.number<std::uint32_t>();
-  const std::string encoding = in.text();
+  const std::string pixels = in.text();
   const std::endian order = in.number<std::uint8_t>() != 0 ? std::endian::big : std::endian::little;
   const std::size_t step = in.number<std::uint32_t>();
-  result.depth_m = depth_of(in.octets(), rows, columns, step, encoding, order, in);
+  result.depth_m = depth_of(in.octets(), rows, columns, step, pixels, order, in);
   return result;
 }
 
-RosImage decode_compressed_depth(std::string_view message, const std::string& where) {
-  CdrReader in(message, where);
+RosImage decode_compressed_depth(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
   RosImage result;
   result.header = header_of(in);
   const std::string format = in.text();
@@ -153,8 +154,8 @@ RosImage decode_compressed_depth(std::string_view message, const std::string& wh
   return result;
 }
 
-RosCameraInfo decode_camera_info(std::string_view message, const std::string& where) {
-  CdrReader in(message, where);
+RosCameraInfo decode_camera_info(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
   RosCameraInfo result;
   result.header = header_of(in);
   Camera& camera = result.camera;
@@ -186,8 +187,8 @@ RosCameraInfo decode_camera_info(std::string_view message, const std::string& wh
   return result;
 }
 
-RosJointState decode_joint_state(std::string_view message, const std::string& where) {
-  CdrReader in(message, where);
+RosJointState decode_joint_state(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
   RosJointState result;
   result.header = header_of(in);
   for (std::size_t i = in.count(5); i > 0; --i) result.names.push_back(in.text());
@@ -201,8 +202,8 @@ RosJointState decode_joint_state(std::string_view message, const std::string& wh
   return result;
 }
 
-RosWrench decode_wrench(std::string_view message, const std::string& where) {
-  CdrReader in(message, where);
+RosWrench decode_wrench(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
   RosWrench result;
   result.header = header_of(in);
   result.force_n = vector_of(in);
@@ -210,8 +211,8 @@ RosWrench decode_wrench(std::string_view message, const std::string& where) {
   return result;
 }
 
-std::vector<RosTransform> decode_transforms(std::string_view message, const std::string& where) {
-  CdrReader in(message, where);
+std::vector<RosTransform> decode_transforms(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
   std::vector<RosTransform> result;
   for (std::size_t i = in.count(60); i > 0; --i) {
     RosTransform one;
@@ -227,7 +228,33 @@ std::vector<RosTransform> decode_transforms(std::string_view message, const std:
   return result;
 }
 
-std::string decode_string(std::string_view message, const std::string& where) { return CdrReader(message, where).text(); }
+std::string decode_string(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  return MessageReader(message, encoding, where).text();
+}
+
+RosHeader decode_header(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
+  return header_of(in);
+}
+
+MaskImage decode_mask(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
+  header_of(in);
+  const std::size_t rows = in.number<std::uint32_t>(), columns = in.number<std::uint32_t>();
+  const std::string pixels = in.text();
+  in.number<std::uint8_t>();  // byte order
+  const std::size_t step = in.number<std::uint32_t>();
+  const std::string_view data = in.octets();
+  if (pixels != "mono8" && pixels != "8UC1") in.fail("holds an image of encoding '" + pixels.substr(0, 20) + "'; a mask is mono8");
+  if (rows == 0 || columns == 0 || rows > 20000 || columns > 20000 || step < columns || data.size() < step * rows)
+    in.fail("holds less than its image");
+  MaskImage mask(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t column = 0; column < columns; ++column)
+      mask(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)) = data[row * step + column] != 0 ? 1 : 0;
+  }
+  return mask;
+}
 
 std::string encode(const RosPointCloud& message) {
   CdrWriter out;
@@ -265,6 +292,16 @@ std::string encode(const RosImage& message) {
   out.text(millimetres ? "16UC1" : "32FC1").number(std::uint8_t{0});
   out.number(static_cast<std::uint32_t>(depth.cols() * (millimetres ? 2 : 4))).octets(millimetres ? whole : real);
   return out.take();
+}
+
+std::string encode(const RosHeader& header, const MaskImage& mask) {
+  CdrWriter out;
+  put(out, header);
+  out.number(static_cast<std::uint32_t>(mask.rows())).number(static_cast<std::uint32_t>(mask.cols()));
+  out.text("mono8").number(std::uint8_t{0}).number(static_cast<std::uint32_t>(mask.cols()));
+  std::string data;
+  for (Eigen::Index i = 0; i < mask.size(); ++i) data += mask.data()[i] != 0 ? '\xff' : '\0';
+  return out.octets(data).take();
 }
 
 std::string encode(const RosCameraInfo& message) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ROS messages that recordings need, from CDR into our nouns and back. `where` stands in the Error of a message that is
-// damaged or of an unknown kind.
+// The ROS messages that recordings need, from CDR (or ROS 1's layout) into our nouns, and back to CDR. `where` stands in the
+// Error of a message that is damaged or of an unknown kind.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "palpate/core/recording.hpp"
+#include "palpate/io/message_source.hpp"
 
 namespace palpate::io {
 
@@ -46,25 +47,31 @@ struct RosTransform {
 
 /// A message type that is understood, with its definition for the files that we write.
 struct RosType {
-  const char* name;  ///< "sensor_msgs/msg/PointCloud2"
-  const char* definition;
+  std::string name;  ///< "sensor_msgs/msg/PointCloud2"
+  std::string definition;
 };
 std::span<const RosType> ros_types();
 /// Throws Error for a name that is not in the table.
 const RosType& ros_type(const std::string& name);
 
-RosPointCloud decode_point_cloud(std::string_view message, const std::string& where);
-RosImage decode_image(std::string_view message, const std::string& where);
+RosPointCloud decode_point_cloud(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+RosImage decode_image(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
 /// The compressedDepth transport: PNG of 16UC1, or of quantised inverse depth for 32FC1.
-RosImage decode_compressed_depth(std::string_view message, const std::string& where);
-RosCameraInfo decode_camera_info(std::string_view message, const std::string& where);
-RosJointState decode_joint_state(std::string_view message, const std::string& where);
-RosWrench decode_wrench(std::string_view message, const std::string& where);
-std::vector<RosTransform> decode_transforms(std::string_view message, const std::string& where);
-std::string decode_string(std::string_view message, const std::string& where);
+RosImage decode_compressed_depth(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+RosCameraInfo decode_camera_info(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+RosJointState decode_joint_state(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+RosWrench decode_wrench(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+std::vector<RosTransform> decode_transforms(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+std::string decode_string(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+
+/// Time and frame of any message that begins with a header, without the rest.
+RosHeader decode_header(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+/// An image of 8 bits: 1 where it is not zero.
+MaskImage decode_mask(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
 
 std::string encode(const RosPointCloud& message);
 std::string encode(const RosImage& message);  ///< 32FC1, or 16UC1 when every depth is a whole number of millimetres
+std::string encode(const RosHeader& header, const MaskImage& mask);  ///< mono8, 255 = invalid
 std::string encode(const RosCameraInfo& message);
 std::string encode(const RosJointState& message);
 std::string encode(const RosWrench& message);

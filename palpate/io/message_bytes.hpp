@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// CDR as ROS 2 writes it (OMG CORBA 3.3, part 2, section 9.3; encapsulation of DDSI-RTPS): 4 bytes of header, then numbers
-// aligned to their size, counted from the end of the header.
+// The two ways in which ROS lays out a message. ROS 2: CDR (OMG CORBA 3.3, part 2, section 9.3; encapsulation of
+// DDSI-RTPS): 4 bytes of header, then numbers aligned to their size, counted from the end of the header; texts end in NUL.
+// ROS 1 (wiki.ros.org/msg): little endian, nothing aligned, no NUL. Apart from the header's `seq`, which ROS 2 dropped, the
+// fields of the messages that we read are the same, so one decoder serves both.
 #pragma once
 
 #include <bit>
@@ -10,25 +12,31 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/io/bytes.hpp"
+#include "palpate/io/message_source.hpp"
 
 namespace palpate::io {
 
-class CdrReader {
+class MessageReader {
  public:
-  CdrReader(std::string_view message, std::string where) : where_(std::move(where)) {
+  /// @throws Error when the message is of neither encoding.
+  MessageReader(std::string_view message, MessageEncoding encoding, std::string where)
+      : bytes_(message), where_(std::move(where)), is_cdr_(encoding == MessageEncoding::cdr) {
+    if (encoding == MessageEncoding::other) fail("is encoded neither as CDR nor in the way of ROS 1");
+    if (!is_cdr_) return;
     if (message.size() < 4 || message[0] != 0 || (message[1] != 0 && message[1] != 1)) fail("is not encoded as plain CDR");
     order_ = message[1] == 1 ? std::endian::little : std::endian::big;
     bytes_ = message.substr(4);
   }
+  bool is_cdr() const { return is_cdr_; }
   template <typename T>
   T number() {
-    at_ = (at_ + sizeof(T) - 1) / sizeof(T) * sizeof(T);
+    if (is_cdr_) at_ = (at_ + sizeof(T) - 1) / sizeof(T) * sizeof(T);
     return load<T>(raw(sizeof(T)).data(), order_);
   }
   std::string text() {
     const auto size = number<std::uint32_t>();
     const std::string_view all = raw(size);
-    return std::string(size > 0 ? all.substr(0, size - 1) : all);  // ends in NUL
+    return std::string(is_cdr_ && size > 0 ? all.substr(0, size - 1) : all);
   }
   /// Length of a sequence whose items take at least `bytes_each`.
   std::size_t count(std::size_t bytes_each) {
@@ -43,7 +51,6 @@ class CdrReader {
     return result;
   }
   std::string_view octets() { return raw(count(1)); }
-  std::endian order() const { return order_; }
   [[noreturn]] void fail(const std::string& what) const { throw Error("the message " + what, where_); }
 
  private:
@@ -51,6 +58,7 @@ class CdrReader {
   std::string where_;
   std::size_t at_ = 0;
   std::endian order_ = std::endian::little;
+  bool is_cdr_ = true;
 };
 
 class CdrWriter {

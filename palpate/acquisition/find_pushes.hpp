@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where in a long series of force and tip somebody pushed: from contact to its loss, and the times in between at which the
+// tool stood still and the force had settled.
+#pragma once
+
+#include <vector>
+
+#include "palpate/core/streams.hpp"
+#include "palpate/sensing/push_events.hpp"
+
+namespace palpate::acquisition {
+
+/// Force on the object (not tared) and tip, in the base frame, with the direction that the tool points in.
+struct Track {
+  std::vector<sensing::ContactSample> samples;  ///< times rise
+  std::vector<Vec3> direction;                  ///< of each sample, unit length
+};
+
+struct ContactSpan {
+  std::size_t begin = 0, end = 0;  ///< samples of the track, end excluded
+  Vec3 tare_n = Vec3::Zero();
+  double free_air_std_n = 0;         ///< of one sample, largest of the three axes
+  std::size_t free_air_samples = 0;  ///< that made the tare
+  Vec3 contact_m = Vec3::Zero();     ///< tip at the first sample in contact
+  Vec3 direction = -Vec3::UnitZ();
+};
+
+/// Contact begins where the force along the push exceeds the plan's threshold and five standard deviations of the free air
+/// before it, three samples in a row, and ends below half of that. Spans that are closer than `hold_s` are one.
+std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& plan);
+
+struct StillTime {
+  double time_s = 0;
+  bool settled = false;
+};
+/// Ends of the stretches of a span in which the tip stood still for `hold_s`.
+std::vector<StillTime> find_still_times(const Track& track, const ContactSpan& span, const StreamPlan& plan);
+
+}  // namespace palpate::acquisition

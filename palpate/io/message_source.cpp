@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/io/message_source.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+
+#include "palpate/core/error.hpp"
+#include "palpate/io/bag_formats.hpp"
+#include "palpate/io/file.hpp"
+#include "palpate/io/unpack.hpp"
+#include "palpate/io/yaml_field.hpp"
+
+namespace palpate::io {
+namespace {
+
+namespace fs = std::filesystem;
+using std::string_view_literals::operator""sv;
+constexpr const char* metadata_name = "metadata.yaml";
+
+bool starts_as_a_bag(const fs::path& path) {
+  std::string first(16, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(first.data(), static_cast<std::streamsize>(first.size()));
+  first.resize(static_cast<std::size_t>(file.gcount()));
+  const auto formats = bag_formats();
+  return std::any_of(formats.begin(), formats.end(), [&](const BagFormat& one) { return first.starts_with(one.magic); });
+}
+
+bool has_bag_extension(const fs::path& path) {
+  for (const BagFormat& format : bag_formats()) {
+    for (const std::string& extension : format.extensions) {
+      if (path.string().ends_with(extension) || path.string().ends_with(extension + ".zstd")) return true;
+    }
+  }
+  return false;
+}
+
+/// What metadata.yaml says of the files; it is written by many versions of rosbag2, so that only what is needed is looked at.
+struct Metadata {
+  std::vector<std::string> files;
+  bool packed_messages = false;
+};
+
+Metadata metadata_of(const fs::path& path) {
+  Metadata result;
+  const YamlField top = YamlField::parse(read_file(path), path.string());
+  YamlKeys keys(YamlKeys(top).required("rosbag2_bagfile_information"));
+  for (const YamlField& file : keys.required("relative_file_paths").items()) result.files.push_back(file.text());
+  const std::string mode = keys.text_or("compression_mode", ""), format = keys.text_or("compression_format", "");
+  result.packed_messages = mode == "MESSAGE" || mode == "message";
+  if (!mode.empty() && mode != "NONE" && !format.empty() && format != "zstd")
+    throw Error("is compressed as '" + format + "'; only zstd is read. Convert it: ros2 bag convert", path.string());
+  return result;
+}
+
+std::vector<std::string> bag_files_in(const fs::path& folder) {
+  std::vector<std::string> files;
+  std::error_code code;
+  for (const auto& entry : fs::directory_iterator(folder, code)) {
+    if (entry.is_regular_file(code) && has_bag_extension(entry.path())) files.push_back(entry.path().filename().string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// Several files of one bag (rosbag2 splits them by size or time) as one.
+MessageSource joined(std::vector<MessageSource> sources, const std::string& name) {
+  MessageCollector collector;
+  auto memory = std::make_shared<std::vector<MessageSource>>(std::move(sources));
+  for (const MessageSource& source : *memory) {
+    std::vector<std::size_t> place;
+    for (const MessageTopic& topic : source.topics) place.push_back(collector.topic(topic.name, topic.type, topic.encoding));
+    for (const Message& message : source.messages) collector.add(place[message.topic], message.log_time_ns, message.data);
+    for (const std::string& warning : source.warnings)
+      collector.warnings.push_back(fs::path(source.name).filename().string() + ": " + warning);
+  }
+  MessageSource result = collector.finish(memory, name);
+  result.format = memory->front().format;
+  return result;
+}
+
+MessageSource with_unpacked_messages(MessageSource source) {
+  auto texts = std::make_shared<std::pair<std::shared_ptr<const void>, std::vector<std::string>>>();
+  texts->first = source.memory;
+  texts->second.reserve(source.messages.size());  // views must stay where they are
+  std::size_t lost = 0;
+  for (Message& message : source.messages) {
+    auto text = unpack_zstd(message.data);
+    if (!text) ++lost;
+    texts->second.push_back(text ? std::move(*text) : std::string());
+    message.data = texts->second.back();
+  }
+  if (lost > 0) source.warnings.push_back(std::to_string(lost) + " messages could not be unpacked");
+  source.memory = texts;
+  return source;
+}
+
+MessageSource read_bag_file(const fs::path& path) {
+  std::string bytes = read_file(path);
+  if (path.extension() == ".zstd") {
+    auto unpacked = unpack_zstd(bytes);
+    if (!unpacked) throw Error("is damaged: it cannot be unpacked", path.string());
+    bytes = std::move(*unpacked);
+  }
+  return parse_bag(std::move(bytes), path.string());
+}
+
+MessageSource read_bag_folder(const fs::path& folder) {
+  std::error_code code;
+  Metadata metadata;
+  std::vector<std::string> warnings;
+  if (fs::exists(folder / metadata_name, code)) {
+    metadata = metadata_of(folder / metadata_name);
+  } else {
+    metadata.files = bag_files_in(folder);
+    warnings.push_back("there is no metadata.yaml (the recorder was cut off): all bag files of the folder are read");
+  }
+  std::vector<MessageSource> sources;
+  for (const std::string& file : metadata.files) {
+    // Old versions of rosbag2 put the folder's name in front.
+    const fs::path path = fs::exists(folder / file, code) ? folder / file : folder / fs::path(file).filename();
+    if (!fs::exists(path, code)) {
+      warnings.push_back("the file '" + file + "' is not there");
+      continue;
+    }
+    sources.push_back(read_bag_file(path));
+    const fs::path log = path.string() + "-wal";
+    if (fs::exists(log, code) && fs::file_size(log, code) > 0)
+      sources.back().warnings.push_back("what is in '" + log.filename().string() +
+                                        "' is not read; open the file once with sqlite3 to fold it in");
+    if (metadata.packed_messages) sources.back() = with_unpacked_messages(std::move(sources.back()));
+  }
+  if (sources.empty()) throw Error("holds no bag file (.mcap, .db3, .bag)", folder.string());
+  MessageSource result = joined(std::move(sources), folder.string());
+  result.warnings.insert(result.warnings.begin(), warnings.begin(), warnings.end());
+  return result;
+}
+
+}  // namespace
+
+std::span<const BagFormat> bag_formats() {
+  static const std::array<BagFormat, 3> formats = {{
+      {"mcap", {".mcap"}, "MCAP, the default of rosbag2", "\x89MCAP0\r\n"sv, parse_mcap_bag},
+      {"sqlite3", {".db3"}, "SQLite, the older default of rosbag2", "SQLite format 3\0"sv, parse_sqlite_bag},
+      {"ros1", {".bag", ".bag.active"}, "ROS 1 bag, version 2.0", "#ROSBAG V"sv, parse_ros1_bag},
+  }};
+  return formats;
+}
+
+bool is_bag(const fs::path& path) {
+  std::error_code code;
+  if (fs::is_regular_file(path, code)) return starts_as_a_bag(path) || has_bag_extension(path);
+  if (!fs::is_directory(path, code) || fs::exists(path / "recording.yaml", code)) return false;
+  return fs::exists(path / metadata_name, code) || !bag_files_in(path).empty();
+}
+
+MessageSource read_bag(const fs::path& path) {
+  std::error_code code;
+  return fs::is_directory(path, code) ? read_bag_folder(path) : read_bag_file(path);
+}
+
+MessageSource parse_bag(std::string bytes, const std::string& name) {
+  for (const BagFormat& format : bag_formats()) {
+    if (!bytes.starts_with(format.magic)) continue;
+    MessageSource source = format.parse(std::move(bytes), name);
+    source.format = format.name;
+    return source;
+  }
+  std::string known;
+  for (const BagFormat& format : bag_formats()) known += (known.empty() ? "" : "; ") + format.about;
+  throw Error(bytes.empty() ? "is an empty file" : "does not start as a bag does. These are read: " + known, name);
+}
+
+std::string ros2_type_name(const std::string& type) {
+  const std::size_t slash = type.find('/');
+  if (slash == std::string::npos || type.find('/', slash + 1) != std::string::npos) return type;
+  return type.substr(0, slash) + "/msg" + type.substr(slash);
+}
+
+std::size_t MessageCollector::topic(const std::string& name, const std::string& type, MessageEncoding encoding) {
+  const std::string ros2 = ros2_type_name(type);
+  for (std::size_t i = 0; i < topics_.size(); ++i) {
+    if (topics_[i].name == name && topics_[i].type == ros2 && topics_[i].encoding == encoding) return i;
+  }
+  topics_.push_back({name, ros2, encoding, 0});
+  return topics_.size() - 1;
+}
+
+MessageSource MessageCollector::finish(std::shared_ptr<const void> memory, const std::string& name) {
+  MessageSource source;
+  source.name = name;
+  source.memory = std::move(memory);
+  std::vector<std::size_t> order(topics_.size()), place(topics_.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return topics_[a].name < topics_[b].name; });
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    place[order[i]] = i;
+    source.topics.push_back(topics_[order[i]]);
+  }
+  source.messages = std::move(messages_);
+  for (Message& message : source.messages) {
+    message.topic = place[message.topic];
+    ++source.topics[message.topic].messages;
+  }
+  std::stable_sort(source.messages.begin(), source.messages.end(),
+                   [](const Message& a, const Message& b) { return a.log_time_ns < b.log_time_ns; });
+  source.warnings = std::move(warnings);
+  return source;
+}
+
+}  // namespace palpate::io

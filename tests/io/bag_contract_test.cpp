@@ -1,0 +1,210 @@
+// label: contract
+// SPDX-License-Identifier: Apache-2.0
+// What every container of messages promises, whoever wrote it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zstd.h>
+
+#include <functional>
+#include <random>
+
+#include "io/bag_files.hpp"
+#include "io/broken_bytes.hpp"
+#include "io/recording_folder.hpp"
+#include "palpate/io/file.hpp"
+
+namespace palpate::io {
+namespace {
+
+using namespace palpate::io::test;
+using testing::HasSubstr;
+
+struct Container {
+  const char* name;
+  std::function<std::string(const std::vector<TestMessage>&)> write;
+  const char* format;  ///< in bag_formats()
+};
+
+const Container containers[] = {
+    {"mcap_none", [](const auto& m) { return mcap_bytes(m, McapWriter::Compression::none); }, "mcap"},
+    {"mcap_zstd", [](const auto& m) { return mcap_bytes(m, McapWriter::Compression::zstd); }, "mcap"},
+    {"mcap_unindexed", [](const auto& m) { return bare_mcap_bytes(m); }, "mcap"},
+    {"sqlite3", [](const auto& m) { return sqlite_bytes(m); }, "sqlite3"},
+    {"ros1_none", [](const auto& m) { return ros1_bytes(m, "none"); }, "ros1"},
+    {"ros1_bz2", [](const auto& m) { return ros1_bytes(m, "bz2"); }, "ros1"},
+    {"ros1_lz4", [](const auto& m) { return ros1_bytes(m, "lz4"); }, "ros1"},
+};
+
+std::string noise(std::size_t size, unsigned seed) {
+  std::mt19937 random(seed);
+  std::string bytes(size, '\0');
+  for (char& letter : bytes) letter = static_cast<char>(random() & 0xff);
+  return bytes;
+}
+
+/// Two topics whose messages come out of order, and one of a type that nobody knows.
+std::vector<TestMessage> mixed(std::size_t size = 20000) {
+  std::vector<TestMessage> all;
+  for (unsigned i = 0; i < 12; ++i) {
+    all.push_back({"/camera/depth", "sensor_msgs/msg/Image", 5'000'000'000 + 100 * i, noise(size, i)});
+    all.push_back({"/wrench", "geometry_msgs/msg/WrenchStamped", 5'000'000'010 + 100 * (11 - i), noise(50, 100 + i)});
+  }
+  all.push_back({"/battery", "vendor_msgs/msg/BatteryOfTheVendor", 5'000'000'005, noise(7, 200)});
+  return all;
+}
+
+class EveryContainer : public testing::TestWithParam<Container> {
+ protected:
+  std::string bytes(const std::vector<TestMessage>& messages) const { return GetParam().write(messages); }
+};
+
+TEST_P(EveryContainer, GivesBackEveryMessageInTheOrderOfTime) {
+  const std::vector<TestMessage> written = mixed();
+  const MessageSource bag = parse_bag(bytes(written), "a");
+  EXPECT_EQ(bag.format, GetParam().format);
+  EXPECT_TRUE(bag.warnings.empty()) << bag.warnings.front();
+  ASSERT_EQ(bag.topics.size(), 3u);
+  EXPECT_EQ(bag.topics[0].name, "/battery");
+  EXPECT_EQ(bag.topics[0].type, "vendor_msgs/msg/BatteryOfTheVendor") << "unknown types are listed like any other";
+  EXPECT_EQ(bag.topics[1].name, "/camera/depth");
+  EXPECT_EQ(bag.topics[1].messages, 12u);
+  EXPECT_EQ(bag.topics[2].type, "geometry_msgs/msg/WrenchStamped");
+  EXPECT_EQ(bag.topics[2].encoding, std::string(GetParam().format) == "ros1" ? MessageEncoding::ros1 : MessageEncoding::cdr);
+  ASSERT_EQ(bag.messages.size(), written.size());
+  std::map<std::pair<std::string, std::int64_t>, std::string> expected;
+  for (const TestMessage& one : written) expected[{one.topic, one.time_ns}] = one.data;
+  for (std::size_t i = 0; i < bag.messages.size(); ++i) {
+    const Message& message = bag.messages[i];
+    if (i > 0) {
+      EXPECT_LE(bag.messages[i - 1].log_time_ns, message.log_time_ns);
+    }
+    EXPECT_EQ(message.data, (expected.at({bag.topics[message.topic].name, message.log_time_ns})));
+  }
+}
+
+TEST_P(EveryContainer, MessagesOutliveTheSourceThatWasCopied) {
+  MessageSource copy;
+  {
+    const MessageSource bag = parse_bag(bytes(mixed()), "a");
+    copy = bag;
+  }
+  EXPECT_EQ(copy.messages.front().data, noise(20000, 0));
+}
+
+TEST_P(EveryContainer, WhatWasWrittenBeforeACutIsRead) {
+  const std::string whole = bytes(mixed());
+  std::size_t last = 0;
+  for (std::size_t eighth = 2; eighth < 8; ++eighth) {
+    const MessageSource bag = parse_bag(whole.substr(0, whole.size() * eighth / 8), "a");
+    EXPECT_FALSE(bag.warnings.empty()) << eighth;
+    EXPECT_GE(bag.messages.size(), last);
+    EXPECT_LT(bag.messages.size(), 25u);
+    for (const Message& message : bag.messages) {
+      if (bag.topics[message.topic].name != "/camera/depth") continue;
+      EXPECT_EQ(message.data, noise(20000, static_cast<unsigned>((message.log_time_ns - 5'000'000'000) / 100))) << eighth;
+    }
+    last = bag.messages.size();
+  }
+  if (std::string(GetParam().name) != "mcap_zstd" && std::string(GetParam().name) != "mcap_none") {
+    EXPECT_GE(last, 8u) << "a file of 1 MB that is cut at 7/8";  // the two have one chunk, which is whole or lost
+  }
+}
+
+TEST_P(EveryContainer, DamageIsSurvived) {
+  const Reader read = [](std::string_view bytes, const std::string& name) { parse_bag(std::string(bytes), name); };
+  survives(read, damaged(bytes(mixed(300)), 80));
+}
+
+TEST_P(EveryContainer, ABagWithoutAMessageIsEmptyNotWrong) {
+  const MessageSource bag = parse_bag(bytes({}), "a");
+  EXPECT_TRUE(bag.messages.empty());
+}
+
+TEST_P(EveryContainer, IsRecognisedByItsContent) {
+  const TemporaryFolder folder("bag_content");
+  folder.put("a.dat", bytes(mixed(50)));
+  EXPECT_TRUE(is_bag(folder.path() / "a.dat"));
+  EXPECT_EQ(read_bag(folder.path() / "a.dat").messages.size(), 25u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bags, EveryContainer, testing::ValuesIn(containers),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+TEST(Bags, EveryFormatIsInTheContract) {
+  for (const BagFormat& format : bag_formats()) {
+    EXPECT_TRUE(std::any_of(std::begin(containers), std::end(containers), [&](const Container& one) { return format.name == one.format; }))
+        << format.name;
+  }
+}
+
+TEST(Bags, WhatIsNoBagIsRefused) {
+  const Reader read = [](std::string_view bytes, const std::string& name) { parse_bag(std::string(bytes), name); };
+  for (const std::string& bytes : garbage()) EXPECT_TRUE(refuses(read, bytes));
+  EXPECT_TRUE(refuses(read, ""));
+  EXPECT_TRUE(refuses(read, "#ROSBAG V1.2\n"));
+  sqlite3* database = nullptr;
+  sqlite3_open(":memory:", &database);
+  sqlite3_exec(database, "CREATE TABLE topics(id INTEGER)", nullptr, nullptr, nullptr);
+  sqlite3_int64 size = 0;
+  unsigned char* raw = sqlite3_serialize(database, "main", &size, 0);
+  EXPECT_TRUE(refuses(read, std::string(reinterpret_cast<const char*>(raw), static_cast<std::size_t>(size)))) << "another database";
+  sqlite3_free(raw);
+  sqlite3_close(database);
+}
+
+TEST(Bags, AFolderOfRosbag2IsReadByItsMetadata) {
+  const TemporaryFolder folder("bag_folder");
+  const std::vector<TestMessage> all = mixed(50);
+  folder.put("part_0.db3", sqlite_bytes({all.begin(), all.begin() + 10}));
+  folder.put("part_1.db3", sqlite_bytes({all.begin() + 10, all.end()}));
+  EXPECT_TRUE(is_bag(folder.path()));
+  const MessageSource without = read_bag(folder.path());
+  EXPECT_EQ(without.messages.size(), 25u);
+  ASSERT_EQ(without.warnings.size(), 1u);
+  EXPECT_THAT(without.warnings[0], HasSubstr("metadata.yaml"));
+  folder.put("metadata.yaml",
+             "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: sqlite3\n  duration: {nanoseconds: 5}\n"
+             "  relative_file_paths: [part_0.db3, part_1.db3, part_2.db3]\n  compression_format: \"\"\n  compression_mode: \"\"\n");
+  const MessageSource bag = read_bag(folder.path());
+  EXPECT_EQ(bag.topics.size(), 3u);
+  EXPECT_EQ(bag.messages.size(), 25u);
+  ASSERT_EQ(bag.warnings.size(), 1u);
+  EXPECT_THAT(bag.warnings[0], HasSubstr("part_2.db3"));
+}
+
+std::string packed(const std::string& bytes) {
+  std::string out(ZSTD_compressBound(bytes.size()), '\0');
+  out.resize(ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), 3));
+  return out;
+}
+
+TEST(Bags, PackedFilesAndPackedMessagesAreUnpacked) {
+  const std::string head = "rosbag2_bagfile_information:\n  version: 5\n  compression_format: zstd\n";
+  const std::vector<TestMessage> all = mixed(50);
+  const TemporaryFolder files("bag_packed_files");
+  files.put("a.db3.zstd", packed(sqlite_bytes(all)));
+  files.put("metadata.yaml", head + "  compression_mode: FILE\n  relative_file_paths: [a.db3.zstd]\n");
+  EXPECT_EQ(read_bag(files.path()).messages[0].data, all[0].data);
+  std::vector<TestMessage> each = all;
+  for (TestMessage& one : each) one.data = packed(one.data);
+  const TemporaryFolder messages("bag_packed_messages");
+  messages.put("a.db3", sqlite_bytes(each));
+  messages.put("metadata.yaml", head + "  compression_mode: MESSAGE\n  relative_file_paths: [a.db3]\n");
+  EXPECT_EQ(read_bag(messages.path()).messages[0].data, all[0].data);
+  messages.put("metadata.yaml", "rosbag2_bagfile_information:\n  compression_format: fake\n  compression_mode: FILE\n  relative_file_paths: [a.db3]\n");
+  EXPECT_THROW(read_bag(messages.path()), Error);
+}
+
+TEST(Bags, ADatabaseThatWasLeftInWriteAheadModeIsRead) {
+  std::string bytes = sqlite_bytes(mixed(50));
+  bytes[18] = bytes[19] = 2;
+  EXPECT_EQ(parse_bag(bytes, "a").messages.size(), 25u);
+}
+
+TEST(Bags, AMissingFolderIsAnError) {
+  EXPECT_FALSE(is_bag("/nowhere/at/all"));
+  EXPECT_THROW(read_bag("/nowhere/at/all"), Error);
+}
+
+}  // namespace
+}  // namespace palpate::io
