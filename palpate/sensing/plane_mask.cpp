@@ -1,19 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/sensing/plane_mask.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/camera.hpp"
 #include "palpate/sensing/depth_noise.hpp"
 
 namespace palpate::sensing {
+namespace {
+
+// Of the pixels around one that have data.
+double median_depth_m(const DepthImage& depth_m, Eigen::Index row, Eigen::Index column, int window_px,
+                      std::vector<float>& scratch) {
+  scratch.clear();
+  for (Eigen::Index r = std::max<Eigen::Index>(0, row - window_px); r <= std::min(depth_m.rows() - 1, row + window_px); ++r)
+    for (Eigen::Index c = std::max<Eigen::Index>(0, column - window_px); c <= std::min(depth_m.cols() - 1, column + window_px);
+         ++c)
+      if (depth_m(r, c) > 0) scratch.push_back(depth_m(r, c));
+  const auto middle = scratch.begin() + std::ptrdiff_t(scratch.size() / 2);
+  std::nth_element(scratch.begin(), middle, scratch.end());
+  return *middle;
+}
+
+}  // namespace
 
 MaskImage mask_planes(const DepthFrame& frame, const std::vector<Plane>& planes, const PlaneMaskOptions& options) {
   if (!(options.margin_m >= 0)) throw Error("must not be negative", "PlaneMaskOptions.margin_m");
   if (!(options.sigmas >= 0)) throw Error("must not be negative", "PlaneMaskOptions.sigmas");
+  if (options.window_px < 0) throw Error("must not be negative", "PlaneMaskOptions.window_px");
   MaskImage mask = MaskImage::Zero(frame.depth_m.rows(), frame.depth_m.cols());
+  std::vector<float> scratch;
   if (planes.empty()) return mask;
   const Points directions = pixel_directions(frame.camera);
   const Vec3 eye = frame.T_base_camera.translation();
@@ -26,13 +46,19 @@ MaskImage mask_planes(const DepthFrame& frame, const std::vector<Plane>& planes,
     const Vec3 normal_camera = frame.T_base_camera.linear().transpose() * normal;
     for (Eigen::Index row = 0; row < mask.rows(); ++row)
       for (Eigen::Index column = 0; column < mask.cols(); ++column) {
-        const double z = frame.depth_m(row, column);
+        double z = frame.depth_m(row, column);
         if (!(z > 0) || mask(row, column)) continue;
         const double fall = -normal_camera.dot(Vec3(directions.row(row * mask.cols() + column)));  // per metre of depth
-        const double above = height - z * fall;
         const double cosine = std::abs(fall) / directions.row(row * mask.cols() + column).norm();
         const double sigma = axial_sigma_m(frame.noise, {z, std::acos(std::min(1.0, cosine)), frame.camera.fx_px});
-        mask(row, column) = above < options.margin_m + options.sigmas * sigma * std::abs(fall);
+        const double margin_m = options.margin_m + options.sigmas * sigma * std::abs(fall);
+        // Only where the noise might decide, and not across a depth edge, where the neighbours show something else.
+        if (options.window_px > 0 && std::abs(height - z * fall - margin_m) < 6 * sigma * std::abs(fall)) {
+          const double median = median_depth_m(frame.depth_m, row, column, options.window_px, scratch);
+          const double slope_m = 3 * options.window_px * z / std::min(frame.camera.fx_px, frame.camera.fy_px);
+          if (std::abs(median - z) < 5 * sigma + slope_m) z = median;
+        }
+        mask(row, column) = height - z * fall < margin_m;
       }
   }
   return mask;

@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <random>
+
 #include "palpate/core/error.hpp"
 
 namespace palpate::sensing {
@@ -35,7 +38,49 @@ TEST(PlaneMask, TableGoesAndWhatStandsOnItStays) {
   EXPECT_EQ(mask(2, 30), 1);
   EXPECT_EQ(mask(0, 0), 0);
   EXPECT_EQ(mask(0, 1), 1);
-  EXPECT_EQ(mask.cast<int>().sum(), 30 * 40 - 100 - 1);
+  // The corners of what is hardly higher than the margin have more table than object around them.
+  EXPECT_EQ(mask.cast<int>().sum(), 30 * 40 - 100 - 1 + 4 * 3);
+}
+
+// A steep plane that stands on the table, seen with noise: what the mask leaves of it must not be what noise pulled forward.
+TEST(PlaneMask, LeavesNoBiasAboveTheTable) {
+  DepthFrame frame = from_above(0.8F);
+  frame.camera.width_px = 320;
+  frame.camera.height_px = 240;
+  frame.camera.fx_px = frame.camera.fy_px = 600;
+  frame.camera.cx_px = 159.5;
+  frame.camera.cy_px = 119.5;
+  frame.noise = {"constant", 0.003, 0};
+  const double sigma = 0.003, slope = 2.0;  // height gained per metre across the image
+  const auto mean_error = [&](int window_px) {
+    std::mt19937 engine(7);
+    std::normal_distribution<double> noise(0, sigma);
+    double sum = 0;
+    int count = 0;
+    for (int draw = 0; draw < 4; ++draw) {
+      frame.depth_m.resize(240, 320);
+      DepthImage error(240, 320);
+      for (int row = 0; row < 240; ++row)
+        for (int column = 0; column < 320; ++column) {
+          const double across_m = (column - 100.0) / 600 * 0.8;
+          const double height_m = std::max(0.0, slope * across_m);
+          error(row, column) = float(noise(engine));
+          frame.depth_m(row, column) = float(0.8 - height_m) + error(row, column);
+        }
+      const MaskImage mask = mask_planes(frame, {Plane{}}, {0.003, 3.0, window_px});
+      // The strip about the margin, 3 mm + 3 sigma high.
+      for (int row = 0; row < 240; ++row)
+        for (int column = 100; column < 110; ++column)
+          if (!mask(row, column)) {
+            sum += error(row, column);
+            ++count;
+          }
+    }
+    EXPECT_GT(count, 1000);
+    return sum / count;
+  };
+  EXPECT_LT(mean_error(0), -0.2 * sigma) << "deciding by the pixel's own depth is what this guards against";
+  EXPECT_GT(mean_error(2), -0.07 * sigma);
 }
 
 TEST(PlaneMask, MergesAndRefuses) {
@@ -50,6 +95,7 @@ TEST(PlaneMask, MergesAndRefuses) {
   EXPECT_THROW(mask_planes(frame, {Plane{Vec3::Zero(), -Vec3::UnitZ()}}), Error);
   EXPECT_THROW(mask_planes(frame, {}, {-1, 3}), Error);
   EXPECT_THROW(mask_planes(frame, {}, {0, -3}), Error);
+  EXPECT_THROW(mask_planes(frame, {}, {0.003, 3, -1}), Error);
   EXPECT_EQ(mask_planes(frame, {}).cast<int>().sum(), 0);
 }
 
