@@ -7,10 +7,10 @@
 #include <map>
 #include <memory>
 
+#include "cli/bag_recording.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/identify.hpp"
-#include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
 #include "palpate/report/report.hpp"
 
@@ -18,7 +18,7 @@ namespace palpate::cli {
 namespace {
 
 struct Options {
-  std::filesystem::path recording, out;
+  std::filesystem::path recording, mapping, out;
   std::string method = "palpate", material, element, refine;
   std::vector<double> poisson_range;
   double poisson_ratio = -2, young_start_pa = 0;
@@ -98,7 +98,7 @@ int estimate(Session& session, const Options& given) {
     return show ? show(stage, share) : true;
   };
   progress("read", 0);
-  const Recording recording = io::read_recording(given.recording);
+  const Recording recording = load_recording(session, given.recording, given.mapping);
   for (const auto& warning : recording.warnings) session.warn(warning);
   Identified found = identify(recording, identify_options(given, session), progress);
   Identification& answer = found.answer;
@@ -122,7 +122,9 @@ int estimate(Session& session, const Options& given) {
 
 Run verbs::estimate(CLI::App& app) {
   auto given = std::make_shared<Options>();
-  app.add_option("recording", given->recording, "folder of the recording")->required();
+  app.add_option("recording", given->recording, "folder of the recording, or a bag: MCAP, rosbag2 (a folder or .db3), ROS 1")
+      ->required();
+  app.add_option("--mapping", given->mapping, "what a bag's topics mean (default: mapping.yaml beside it)");
   app.add_option("-o,--out", given->out, "folder for result.json, model/ and report.html")->required();
   app.add_option("--method", given->method, "palpate, or paper: the algorithm of Frank et al. 2010 as a baseline")
       ->check(CLI::IsMember({"palpate", "paper"}));

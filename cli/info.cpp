@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 
+#include "cli/bag_recording.hpp"
 #include "cli/info_bag.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -234,10 +235,24 @@ void tell(Session& session, const Recording& recording, const json& all) {
   for (const json& push : all["pushes"]) tell_push(session, push);
 }
 
-int look(Session& session, const std::filesystem::path& folder) {
-  const Recording recording = io::read_recording_unchecked(folder);
+struct Arguments {
+  std::filesystem::path recording, mapping;
+};
+
+int look(Session& session, const Arguments& given) {
+  json all;
+  if (io::is_bag(given.recording)) {
+    const bool has_mapping = !given.mapping.empty() || !mapping_of(given.recording).empty();
+    const json bag = look_into_bag(session, given.recording, !has_mapping);
+    if (!has_mapping) {
+      session.result(bag);
+      return exit_done;
+    }
+    all["bag"] = bag;
+  }
+  const Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
   const std::vector<io::Problem> problems = io::check_recording(recording);
-  const json all = described(recording, problems);
+  all.update(described(recording, problems));
   tell(session, recording, all);
   for (const std::string& warning : recording.warnings) session.warn("warning    " + warning);
   for (const io::Problem& problem : problems) session.warn(fmt::format("wrong      {}: {}", problem.where, problem.what));
@@ -249,11 +264,10 @@ int look(Session& session, const std::filesystem::path& folder) {
 }  // namespace
 
 Run verbs::info(CLI::App& app) {
-  auto folder = std::make_shared<std::filesystem::path>();
-  app.add_option("recording", *folder, "folder of the recording, or a bag: MCAP, rosbag2 (a folder or .db3), ROS 1")->required();
-  return [folder](Session& session) {
-    return io::is_bag(*folder) ? look_into_bag(session, *folder) : look(session, *folder);
-  };
+  auto given = std::make_shared<Arguments>();
+  app.add_option("recording", given->recording, "folder of the recording, or a bag: MCAP, rosbag2 (a folder or .db3), ROS 1")->required();
+  app.add_option("--mapping", given->mapping, "what a bag's topics mean (default: mapping.yaml beside it)");
+  return [given](Session& session) { return look(session, *given); };
 }
 
 }  // namespace palpate::cli

@@ -3,65 +3,47 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <map>
+#include <sstream>
 
+#include "palpate/io/bag_survey.hpp"
 #include "palpate/io/message_source.hpp"
-#include "palpate/io/ros_messages.hpp"
 
 namespace palpate::cli {
-namespace {
 
-struct Topic {
-  std::string type;
-  std::size_t count = 0;
-  std::int64_t first_ns = 0, last_ns = 0;
-  double rate_hz() const {
-    return count > 1 && last_ns > first_ns ? static_cast<double>(count - 1) * 1e9 / static_cast<double>(last_ns - first_ns)
-                                           : 0.0;
-  }
-};
-
-bool is_understood(const std::string& type) {
-  const auto types = io::ros_types();
-  return std::any_of(types.begin(), types.end(), [&](const io::RosType& one) { return type == one.name; });
-}
-
-}  // namespace
-
-int look_into_bag(Session& session, const std::filesystem::path& path) {
-  const io::MessageSource file = io::read_bag(path);
-  std::map<std::string, Topic> topics;
-  for (const io::MessageTopic& one : file.topics) topics[one.name].type = one.type;
-  for (const io::Message& message : file.messages) {
-    Topic& topic = topics[file.topics[message.topic].name];
-    if (topic.count++ == 0) topic.first_ns = message.log_time_ns;
-    topic.last_ns = message.log_time_ns;
-  }
-  const double seconds =
-      file.messages.empty()
-          ? 0
-          : static_cast<double>(file.messages.back().log_time_ns - file.messages.front().log_time_ns) * 1e-9;
-  session.say(fmt::format("bag        {}: {} messages on {} topics in {:.3g} s", path.filename().string(),
-                          file.messages.size(), topics.size(), seconds));
+nlohmann::json look_into_bag(Session& session, const std::filesystem::path& path, bool suggest) {
+  const io::MessageSource bag = io::read_bag(path);
+  const io::BagSurvey survey = io::survey(bag);
+  std::filesystem::path name = path.lexically_normal();
+  if (name.filename().empty()) name = name.parent_path();
+  session.say(fmt::format("bag        {} ({}): {} messages on {} topics in {:.3g} s", name.filename().string(), bag.format,
+                          bag.messages.size(), bag.topics.size(), survey.duration_s));
   nlohmann::json listed = nlohmann::json::array();
-  for (const auto& [name, topic] : topics) {
-    const bool understood = is_understood(topic.type);
-    session.say(fmt::format("  {:<32} {:<32} {:>7} messages, {:.3g} Hz{}", name, topic.type, topic.count, topic.rate_hz(),
-                            understood ? "" : "   (of no use here)"));
-    listed.push_back({{"topic", name},
+  for (const io::SurveyedTopic& topic : survey.topics) {
+    session.say(fmt::format("  {:<32} {:<32} {:>7} messages, {:.3g} Hz, {:.1f} to {:.1f} s   {}{}", topic.name, topic.type,
+                            topic.messages, topic.rate_hz, topic.from_s, topic.to_s,
+                            topic.use.empty() ? "(of no use here)" : topic.use,
+                            topic.frame.empty() ? "" : " in frame " + topic.frame));
+    listed.push_back({{"topic", topic.name},
                       {"type", topic.type},
-                      {"messages", topic.count},
-                      {"rate_hz", topic.rate_hz()},
-                      {"understood", understood}});
+                      {"messages", topic.messages},
+                      {"rate_hz", topic.rate_hz},
+                      {"from_s", topic.from_s},
+                      {"to_s", topic.to_s},
+                      {"frame", topic.frame},
+                      {"use", topic.use},
+                      {"understood", !topic.use.empty()}});
   }
-  for (const std::string& warning : file.warnings) session.warn("warning    " + warning);
-  session.result({{"format", "palpate-info/1"},
-                  {"bag", path.string()},
-                  {"duration_s", seconds},
-                  {"topics", listed},
-                  {"warnings", file.warnings}});
-  return exit_done;
+  if (!survey.frames.empty()) session.say(fmt::format("frames     {}", fmt::join(survey.frames, ", ")));
+  for (const std::string& warning : bag.warnings) session.warn("warning    " + warning);
+  for (const std::string& lack : survey.missing) session.warn("missing    " + lack);
+  if (suggest) {
+    session.say("mapping    none is given (--mapping FILE, or mapping.yaml beside the bag); one to start from:");
+    std::istringstream lines(survey.mapping);
+    for (std::string line; std::getline(lines, line);) session.say("    " + line);
+  }
+  return {{"format", "palpate-info/1"},      {"bag", path.string()},      {"container", bag.format},
+          {"duration_s", survey.duration_s}, {"topics", listed},          {"frames", survey.frames},
+          {"missing", survey.missing},       {"mapping", survey.mapping}, {"warnings", bag.warnings}};
 }
 
 }  // namespace palpate::cli

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "cli/session.hpp"
 
 namespace palpate::cli {
 
-/// `palpate info FILE.mcap`: the topics of a bag, their types, counts and rates, and which of them palpate understands.
-int look_into_bag(Session& session, const std::filesystem::path& file);
+/// The topics of a bag with types, counts, rates and durations, what they are good for, and what a recording would still
+/// need; with `suggest`, a mapping to start from.
+nlohmann::json look_into_bag(Session& session, const std::filesystem::path& path, bool suggest);
 
 }  // namespace palpate::cli

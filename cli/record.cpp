@@ -11,6 +11,7 @@
 #include "cli/verbs.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/io/bag_write.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/lab/built_in.hpp"
 #include "palpate/lab/robot.hpp"
@@ -25,6 +26,7 @@ struct RecordArguments {
   double young_modulus_pa = 0;
   double poisson_ratio = -1;
   bool resume = false;
+  std::string bag;
   acquisition::PushOptions push;
 };
 
@@ -133,9 +135,18 @@ Run verbs::record(CLI::App& app) {
   app.add_option("--force-limit", arguments->push.force_limit_n, "stop at this force, N")->check(CLI::PositiveNumber);
   app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m")->check(CLI::PositiveNumber);
   app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N")->check(CLI::PositiveNumber);
+  app.add_option("--bag", arguments->bag, "also write a bag (rosbag2: MCAP) with its mapping into this folder");
   app.add_flag("--resume", arguments->resume, "go on with a recording that was cut off");
   return [arguments](Session& session) {
-    return arguments->demo ? record_demo(session, *arguments) : record_push(session, *arguments);
+    std::error_code code;
+    if (!arguments->bag.empty() && std::filesystem::exists(arguments->bag, code) && !std::filesystem::is_empty(arguments->bag, code))
+      throw Error("is there already; choose another folder or remove it", arguments->bag);
+    const int outcome = arguments->demo ? record_demo(session, *arguments) : record_push(session, *arguments);
+    if (!arguments->bag.empty()) {
+      io::write_bag(io::read_recording_unchecked(arguments->output), arguments->bag);
+      session.say(fmt::format("{}: the same as a bag of ROS 2", arguments->bag));
+    }
+    return outcome;
   };
 }
 

@@ -22,16 +22,18 @@ struct Change {
 };
 
 struct ClockOffset {
-  std::string sensor;     ///< for messages
-  double offset_s = 0;    ///< added to the sensor's times
-  double std_s = 0;       ///< from the width of the likelihood's peak
-  double correlation = 0; ///< at the peak
-  bool usable = false;    ///< a clear peak inside the range that was searched
+  std::string sensor;      ///< for messages
+  double offset_s = 0;     ///< added to the sensor's times
+  double std_s = 0;        ///< from the width of the likelihood's peak
+  double correlation = 0;  ///< at the peak
+  bool usable = false;     ///< a clear peak inside the range that was searched
 };
 
 /// The offset at which the changes go best with those of `motion`: largest correlation over offsets up to
 /// `largest_s` on both sides, on a grid of `step_s`, refined by a parabola. The standard deviation takes the changes for a
 /// line in the motion with normal noise: log-likelihood -n/2 log(1 - r^2).
-ClockOffset find_offset(const RunningSum& motion, std::span<const Change> changes, double largest_s, double step_s = 0.002);
+/// @param overlap  changes that share a time: n is that many times fewer
+ClockOffset find_offset(const RunningSum& motion, std::span<const Change> changes, double largest_s, double overlap = 1,
+                        double step_s = 0.002);
 
 }  // namespace palpate::acquisition

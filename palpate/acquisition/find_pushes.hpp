@@ -26,7 +26,8 @@ struct ContactSpan {
 };
 
 /// Contact begins where the force along the push exceeds the plan's threshold and five standard deviations of the free air
-/// before it, three samples in a row, and ends below half of that. Spans that are closer than `hold_s` are one.
+/// before it, three samples in a row, while the tip comes nearer, and ends below half of that. Spans that are closer than
+/// `hold_s` are one.
 std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& plan);
 
 struct StillTime {

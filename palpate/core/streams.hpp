@@ -47,9 +47,9 @@ struct DepthStream {
   std::string frame;  ///< optical frame of the camera
   DepthFrame like;    ///< camera, noise and pose priors of every image
   bool mask_robot = false;
-  std::vector<double> times_s;                    ///< rise
-  std::function<DepthImage(std::size_t)> image;   ///< @throws Error when the message is damaged
-  std::function<MaskImage(std::size_t)> mask;     ///< absent, or of the image of that number; an empty mask is none
+  std::vector<double> times_s;                   ///< rise
+  std::function<DepthImage(std::size_t)> image;  ///< @throws Error when the message is damaged
+  std::function<MaskImage(std::size_t)> mask;    ///< absent, or of the image of that number; an empty mask is none
 };
 
 struct CloudStream {
@@ -81,8 +81,8 @@ struct ClockPlan {
 
 struct PlannedPush {
   std::string name, site, tool;
-  std::optional<Vec3> contact_m;      ///< not given: the tip where the force first rose
-  std::optional<Vec3> direction;      ///< not given: z of the tip's frame
+  std::optional<Vec3> contact_m;  ///< not given: the tip where the force first rose
+  std::optional<Vec3> direction;  ///< not given: z of the tip's frame
   double force_tare_std_n = 0, travel_offset_std_m = 0, contact_std_m = 0;
   std::vector<double> travel_sigma_m;  ///< empty: the travel is no observation; one number, or one a loaded step
   std::optional<double> force_std_n;   ///< not given: standard error of the mean over the window

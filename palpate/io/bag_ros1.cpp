@@ -120,8 +120,7 @@ MessageSource parse_ros1_bag(std::string bytes, const std::string& name) {
   const auto storage = std::make_shared<std::deque<std::string>>();  // addresses stay
   storage->push_back(std::move(bytes));
   const std::string_view all = storage->front();
-  if (!all.starts_with(magic))
-    throw Error("is not of version 2.0; convert it with `rosbag fix` or `rosbag reindex`", name);
+  if (!all.starts_with(magic)) throw Error("is not of version 2.0; convert it with `rosbag fix` or `rosbag reindex`", name);
   Ros1Parser parser(*storage);
   try {
     if (!parser.records(all.substr(magic.size()), false))

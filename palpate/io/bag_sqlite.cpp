@@ -36,7 +36,8 @@ bool mend(std::string& bytes) {
   const auto stored = load<std::uint16_t>(bytes.data() + 16, std::endian::big);
   const std::size_t page = stored == 1 ? 65536 : stored, pages = load<std::uint32_t>(bytes.data() + 28, std::endian::big);
   constexpr std::size_t largest_mended = std::size_t{1} << 33;
-  if (page < 512 || pages > largest_mended / page || bytes.size() >= page * pages) return bytes.size() % std::max<std::size_t>(page, 1) != 0;
+  if (page < 512 || pages > largest_mended / page || bytes.size() >= page * pages)
+    return bytes.size() % std::max<std::size_t>(page, 1) != 0;
   bytes.resize(page * pages, '\0');
   return true;
 }
@@ -66,8 +67,11 @@ MessageSource parse_sqlite_bag(std::string bytes, const std::string& name) {
   {
     Statement tables(database, "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')");
     if (!tables.next())
-      throw Error(is_cut ? "is cut off before its tables; record it again" : "is damaged: " + std::string(sqlite3_errmsg(database)), name);
-    if (sqlite3_column_int(tables.handle, 0) != 2) throw Error("is a database, but not a bag: it has no tables 'topics' and 'messages'", name);
+      throw Error(
+          is_cut ? "is cut off before its tables; record it again" : "is damaged: " + std::string(sqlite3_errmsg(database)),
+          name);
+    if (sqlite3_column_int(tables.handle, 0) != 2)
+      throw Error("is a database, but not a bag: it has no tables 'topics' and 'messages'", name);
   }
   MessageCollector collector;
   std::map<sqlite3_int64, std::size_t> place;

@@ -36,7 +36,8 @@ bool has_bag_extension(const fs::path& path) {
   return false;
 }
 
-/// What metadata.yaml says of the files; it is written by many versions of rosbag2, so that only what is needed is looked at.
+/// What metadata.yaml says of the files; it is written by many versions of rosbag2, so that only what is needed is looked
+/// at.
 struct Metadata {
   std::vector<std::string> files;
   bool packed_messages = false;
@@ -193,7 +194,8 @@ MessageSource MessageCollector::finish(std::shared_ptr<const void> memory, const
   source.memory = std::move(memory);
   std::vector<std::size_t> order(topics_.size()), place(topics_.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return topics_[a].name < topics_[b].name; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return topics_[a].name < topics_[b].name; });
   for (std::size_t i = 0; i < order.size(); ++i) {
     place[order[i]] = i;
     source.topics.push_back(topics_[order[i]]);

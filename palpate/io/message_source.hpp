@@ -24,9 +24,9 @@ struct MessageTopic {
 };
 
 struct Message {
-  std::size_t topic = 0;          ///< in MessageSource::topics
-  std::int64_t log_time_ns = 0;   ///< when it was recorded
-  std::string_view data;          ///< valid as long as the MessageSource, or a copy of it, lives
+  std::size_t topic = 0;         ///< in MessageSource::topics
+  std::int64_t log_time_ns = 0;  ///< when it was recorded
+  std::string_view data;         ///< valid as long as the MessageSource, or a copy of it, lives
 };
 
 /// A bag is read as a whole: it has to fit into memory.

@@ -42,8 +42,9 @@ class RecordingWriter {
   void begin_push(const Push& push);
   void add_step(const Step& step);
 
+  struct Pages;  ///< of the writer alone
+
  private:
-  struct Pages;
   std::unique_ptr<Pages> pages_;
 };
 

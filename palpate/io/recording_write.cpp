@@ -8,6 +8,7 @@
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_names.hpp"
+#include "palpate/io/recording_writer.hpp"
 #include "palpate/io/urdf.hpp"
 #include "palpate/io/yaml_text.hpp"
 
@@ -38,14 +39,15 @@ struct RecordingWriter::Pages {
   }
 
   void put_index() const {
-    std::string text = head;
-    if (!cameras.empty()) {
-      text += "cameras:\n";
-      for (std::size_t i = 0; i < cameras.size(); ++i) text += camera_text(i);
-    }
-    text += markers;
+    std::string text = "format: palpate-recording/1\n" + head + cameras_text() + markers;
     text += pushes.empty() ? "pushes: []\n" : "pushes:\n" + pushes;
     write_file(folder / "recording.yaml", text);
+  }
+
+  std::string cameras_text() const {
+    std::string text = cameras.empty() ? "" : "cameras:\n";
+    for (std::size_t i = 0; i < cameras.size(); ++i) text += camera_text(i);
+    return text;
   }
 
   static std::string camera_name(std::size_t index) { return fmt::format("camera_{}", index + 1); }
@@ -248,7 +250,7 @@ std::string RecordingWriter::Pages::tool_text(const Tool& tool, std::size_t numb
 }
 
 void RecordingWriter::Pages::set_head(const Recording& recording) {
-  head = "format: palpate-recording/1\nname: " + yaml_word(recording.name) + "\n";
+  head = "name: " + yaml_word(recording.name) + "\n";
   if (!recording.description.empty()) head += "description: " + yaml_word(recording.description) + "\n";
   if (recording.accept_size) head += "accept_size: true\n";
   head += rest_text(recording.rest);
@@ -368,6 +370,13 @@ void RecordingWriter::Pages::add_step(const Step& step) {
   pending.clear();
   step_count += 1;
   pushes += text;
+}
+
+std::string object_text(const Recording& recording, const fs::path& folder) {
+  RecordingWriter::Pages pages;
+  pages.folder = folder;
+  pages.set_head(recording);
+  return pages.head + pages.cameras_text();
 }
 
 RecordingWriter::RecordingWriter(fs::path folder, const Recording& start) : pages_(std::make_unique<Pages>()) {

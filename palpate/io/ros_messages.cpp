@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "palpate/io/message_bytes.hpp"
 #include "palpate/io/depth_file.hpp"
+#include "palpate/io/message_bytes.hpp"
 #include "palpate/io/png_image.hpp"
 
 namespace palpate::io {
@@ -245,7 +245,8 @@ MaskImage decode_mask(std::string_view message, const std::string& where, Messag
   in.number<std::uint8_t>();  // byte order
   const std::size_t step = in.number<std::uint32_t>();
   const std::string_view data = in.octets();
-  if (pixels != "mono8" && pixels != "8UC1") in.fail("holds an image of encoding '" + pixels.substr(0, 20) + "'; a mask is mono8");
+  if (pixels != "mono8" && pixels != "8UC1")
+    in.fail("holds an image of encoding '" + pixels.substr(0, 20) + "'; a mask is mono8");
   if (rows == 0 || columns == 0 || rows > 20000 || columns > 20000 || step < columns || data.size() < step * rows)
     in.fail("holds less than its image");
   MaskImage mask(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));

@@ -54,15 +54,21 @@ std::span<const RosType> ros_types();
 /// Throws Error for a name that is not in the table.
 const RosType& ros_type(const std::string& name);
 
-RosPointCloud decode_point_cloud(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+RosPointCloud decode_point_cloud(std::string_view message, const std::string& where,
+                                 MessageEncoding encoding = MessageEncoding::cdr);
 RosImage decode_image(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
 /// The compressedDepth transport: PNG of 16UC1, or of quantised inverse depth for 32FC1.
-RosImage decode_compressed_depth(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
-RosCameraInfo decode_camera_info(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
-RosJointState decode_joint_state(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+RosImage decode_compressed_depth(std::string_view message, const std::string& where,
+                                 MessageEncoding encoding = MessageEncoding::cdr);
+RosCameraInfo decode_camera_info(std::string_view message, const std::string& where,
+                                 MessageEncoding encoding = MessageEncoding::cdr);
+RosJointState decode_joint_state(std::string_view message, const std::string& where,
+                                 MessageEncoding encoding = MessageEncoding::cdr);
 RosWrench decode_wrench(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
-std::vector<RosTransform> decode_transforms(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
-std::string decode_string(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+std::vector<RosTransform> decode_transforms(std::string_view message, const std::string& where,
+                                            MessageEncoding encoding = MessageEncoding::cdr);
+std::string decode_string(std::string_view message, const std::string& where,
+                          MessageEncoding encoding = MessageEncoding::cdr);
 
 /// Time and frame of any message that begins with a header, without the rest.
 RosHeader decode_header(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);

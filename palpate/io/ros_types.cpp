@@ -35,12 +35,14 @@ constexpr Part parts[] = {
      "uint32 row_step\nuint8[] data\nbool is_dense\n",
      true},
     {"sensor_msgs/Image",
-     "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n", true},
+     "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n",
+     true},
     {"sensor_msgs/CompressedImage", "std_msgs/Header header\nstring format\nuint8[] data\n", true},
-    {"sensor_msgs/RegionOfInterest",
-     "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n", false},
+    {"sensor_msgs/RegionOfInterest", "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n",
+     false},
     {"sensor_msgs/CameraInfo",
-     "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\n"
+     "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] "
+     "r\n"
      "float64[12] p\nuint32 binning_x\nuint32 binning_y\nRegionOfInterest roi\n",
      true},
     {"sensor_msgs/JointState",

@@ -30,8 +30,8 @@ bool unpack_lz4(std::string_view packed, std::string& out) {
 bool unpack_bz2(std::string_view packed, std::string& out) {
   auto size = static_cast<unsigned>(out.size());
   // The library does not change its input; its interface is older than const.
-  return BZ2_bzBuffToBuffDecompress(out.data(), &size, const_cast<char*>(packed.data()), static_cast<unsigned>(packed.size()),
-                                    0, 0) == BZ_OK &&
+  return BZ2_bzBuffToBuffDecompress(out.data(), &size, const_cast<char*>(packed.data()),
+                                    static_cast<unsigned>(packed.size()), 0, 0) == BZ_OK &&
          size == out.size();
 }
 

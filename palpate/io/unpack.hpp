@@ -8,8 +8,8 @@
 
 namespace palpate::io {
 
-/// A packed block whose size is known beforehand. Compression is "" or "none", "zstd", "lz4" (frame format), "bz2". Nothing when it
-/// is of another kind, damaged, or not of that size.
+/// A packed block whose size is known beforehand. Compression is "" or "none", "zstd", "lz4" (frame format), "bz2". Nothing
+/// when it is of another kind, damaged, or not of that size.
 std::optional<std::string> unpack(std::string_view packed, const std::string& compression, std::uint64_t size);
 
 /// A zstd frame, or several, of unknown size; nothing when damaged.

@@ -132,8 +132,9 @@ INSTANTIATE_TEST_SUITE_P(Bags, EveryContainer, testing::ValuesIn(containers),
 
 TEST(Bags, EveryFormatIsInTheContract) {
   for (const BagFormat& format : bag_formats()) {
-    EXPECT_TRUE(std::any_of(std::begin(containers), std::end(containers), [&](const Container& one) { return format.name == one.format; }))
-        << format.name;
+    EXPECT_TRUE(std::any_of(std::begin(containers), std::end(containers), [&](const Container& one) {
+      return format.name == one.format;
+    })) << format.name;
   }
 }
 
@@ -147,7 +148,8 @@ TEST(Bags, WhatIsNoBagIsRefused) {
   sqlite3_exec(database, "CREATE TABLE topics(id INTEGER)", nullptr, nullptr, nullptr);
   sqlite3_int64 size = 0;
   unsigned char* raw = sqlite3_serialize(database, "main", &size, 0);
-  EXPECT_TRUE(refuses(read, std::string(reinterpret_cast<const char*>(raw), static_cast<std::size_t>(size)))) << "another database";
+  EXPECT_TRUE(refuses(read, std::string(reinterpret_cast<const char*>(raw), static_cast<std::size_t>(size))))
+      << "another database";
   sqlite3_free(raw);
   sqlite3_close(database);
 }
@@ -162,9 +164,10 @@ TEST(Bags, AFolderOfRosbag2IsReadByItsMetadata) {
   EXPECT_EQ(without.messages.size(), 25u);
   ASSERT_EQ(without.warnings.size(), 1u);
   EXPECT_THAT(without.warnings[0], HasSubstr("metadata.yaml"));
-  folder.put("metadata.yaml",
-             "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: sqlite3\n  duration: {nanoseconds: 5}\n"
-             "  relative_file_paths: [part_0.db3, part_1.db3, part_2.db3]\n  compression_format: \"\"\n  compression_mode: \"\"\n");
+  folder.put(
+      "metadata.yaml",
+      "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: sqlite3\n  duration: {nanoseconds: 5}\n"
+      "  relative_file_paths: [part_0.db3, part_1.db3, part_2.db3]\n  compression_format: \"\"\n  compression_mode: \"\"\n");
   const MessageSource bag = read_bag(folder.path());
   EXPECT_EQ(bag.topics.size(), 3u);
   EXPECT_EQ(bag.messages.size(), 25u);
@@ -191,7 +194,9 @@ TEST(Bags, PackedFilesAndPackedMessagesAreUnpacked) {
   messages.put("a.db3", sqlite_bytes(each));
   messages.put("metadata.yaml", head + "  compression_mode: MESSAGE\n  relative_file_paths: [a.db3]\n");
   EXPECT_EQ(read_bag(messages.path()).messages[0].data, all[0].data);
-  messages.put("metadata.yaml", "rosbag2_bagfile_information:\n  compression_format: fake\n  compression_mode: FILE\n  relative_file_paths: [a.db3]\n");
+  messages.put("metadata.yaml",
+               "rosbag2_bagfile_information:\n  compression_format: fake\n  compression_mode: FILE\n  relative_file_paths: "
+               "[a.db3]\n");
   EXPECT_THROW(read_bag(messages.path()), Error);
 }
 

@@ -71,7 +71,8 @@ inline std::string bare_mcap_bytes(const std::vector<TestMessage>& messages) {
       store(channel, std::uint32_t{0});
       record(4, channel);
     }
-    record(5, bytes_of(channels[one.topic]) + bytes_of(std::uint32_t{0}) + bytes_of(one.time_ns) + bytes_of(one.time_ns) + one.data);
+    record(5, bytes_of(channels[one.topic]) + bytes_of(std::uint32_t{0}) + bytes_of(one.time_ns) + bytes_of(one.time_ns) +
+                  one.data);
   }
   record(15, bytes_of(std::uint32_t{0}));
   record(2, bytes_of(std::uint64_t{0}) + bytes_of(std::uint64_t{0}) + bytes_of(std::uint32_t{0}));
@@ -80,20 +81,24 @@ inline std::string bare_mcap_bytes(const std::vector<TestMessage>& messages) {
 
 // ROS 1 ------------------------------------------------------------------------------------------------------------------
 /// CDR starts with four bytes of its own; the contract only compares bytes, so that the payload may be anything.
-inline std::string ros1_bytes(const std::vector<TestMessage>& messages, const std::string& compression, std::size_t in_chunk = 4) {
+inline std::string ros1_bytes(const std::vector<TestMessage>& messages, const std::string& compression,
+                              std::size_t in_chunk = 4) {
   const auto fields = [](const std::vector<std::pair<std::string, std::string>>& list) {
     std::string out;
     for (const auto& [name, value] : list) put_text(out, name + "=" + value);
     return out;
   };
-  const auto record = [&](std::string& out, const std::vector<std::pair<std::string, std::string>>& list, const std::string& data) {
+  const auto record = [&](std::string& out, const std::vector<std::pair<std::string, std::string>>& list,
+                          const std::string& data) {
     put_text(out, fields(list));
     put_text(out, data);
   };
   const auto ros1_type = [](std::string type) { return type.erase(type.find("/msg"), 4); };
   std::string out = "#ROSBAG V2.0\n", chunk;
-  record(out, {{"op", "\x03"}, {"index_pos", bytes_of(std::uint64_t{0})}, {"conn_count", bytes_of(0)}, {"chunk_count", bytes_of(0)}},
-         std::string(64, ' '));
+  record(
+      out,
+      {{"op", "\x03"}, {"index_pos", bytes_of(std::uint64_t{0})}, {"conn_count", bytes_of(0)}, {"chunk_count", bytes_of(0)}},
+      std::string(64, ' '));
   const auto close = [&] {
     if (chunk.empty()) return;
     std::string packed = chunk;
@@ -106,7 +111,8 @@ inline std::string ros1_bytes(const std::vector<TestMessage>& messages, const st
       packed.resize(LZ4F_compressFrameBound(chunk.size(), nullptr));
       packed.resize(LZ4F_compressFrame(packed.data(), packed.size(), chunk.data(), chunk.size(), nullptr));
     }
-    record(out, {{"op", "\x05"}, {"compression", compression}, {"size", bytes_of(static_cast<std::uint32_t>(chunk.size()))}}, packed);
+    record(out, {{"op", "\x05"}, {"compression", compression}, {"size", bytes_of(static_cast<std::uint32_t>(chunk.size()))}},
+           packed);
     chunk.clear();
   };
   std::map<std::string, std::uint32_t> connections;
@@ -135,13 +141,15 @@ inline std::string sqlite_bytes(const std::vector<TestMessage>& messages, const 
   run(std::string("PRAGMA journal_mode=") + journal);
   run("CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT NOT NULL,"
       "offered_qos_profiles TEXT NOT NULL);"
-      "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
+      "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT "
+      "NULL);"
       "CREATE INDEX timestamp_idx ON messages (timestamp ASC)");
   std::map<std::string, int> ids;
   for (const TestMessage& one : messages) {
     if (!ids.count(one.topic)) {
       ids[one.topic] = static_cast<int>(ids.size()) + 1;
-      run("INSERT INTO topics VALUES(" + std::to_string(ids[one.topic]) + ",'" + one.topic + "','" + one.type + "','cdr','')");
+      run("INSERT INTO topics VALUES(" + std::to_string(ids[one.topic]) + ",'" + one.topic + "','" + one.type +
+          "','cdr','')");
     }
     sqlite3_stmt* row = nullptr;
     sqlite3_prepare_v2(database, "INSERT INTO messages(topic_id,timestamp,data) VALUES(?,?,?)", -1, &row, nullptr);

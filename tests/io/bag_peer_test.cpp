@@ -1,6 +1,7 @@
 // label: contract
 // SPDX-License-Identifier: Apache-2.0
-// Bags that ROS 1 itself wrote (tests/io/peer/write_ros1.py): two kept as files, and fresh ones where python3-rosbag is there.
+// Bags that ROS 1 itself wrote (tests/io/peer/write_ros1.py): two kept as files, and fresh ones where python3-rosbag is
+// there.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -78,7 +79,10 @@ TEST(BagPeers, WhatRosWritesNowIsRead) {
   for (const std::string compression : {"none", "bz2", "lz4"}) {
     SCOPED_TRACE(compression);
     const std::string file = (folder.path() / (compression + ".bag")).string();
-    ASSERT_EQ(std::system(("/usr/bin/python3 '" PALPATE_SOURCE_DIR "/tests/io/peer/write_ros1.py' '" + file + "' " + compression).c_str()), 0);
+    ASSERT_EQ(
+        std::system(
+            ("/usr/bin/python3 '" PALPATE_SOURCE_DIR "/tests/io/peer/write_ros1.py' '" + file + "' " + compression).c_str()),
+        0);
     expect_what_the_script_wrote(read_bag(file));
   }
 }

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "cli/session.hpp"
+#include "palpate/core/recording.hpp"
+
+namespace palpate::cli {
+
+/// What a verb is given as its recording: a folder with recording.yaml, or a bag with a mapping (given, or mapping.yaml in
+/// the bag's folder). Says what was found in a bag: offsets of clocks, steps that were left out. @throws Error; also for
+/// what check_recording finds.
+Recording load_recording(Session& session, const std::filesystem::path& path, const std::filesystem::path& mapping);
+
+/// The same, unchecked.
+Recording load_recording_unchecked(Session& session, const std::filesystem::path& path,
+                                   const std::filesystem::path& mapping);
+
+/// The mapping that belongs to a bag when none is given: mapping.yaml in its folder, or beside the file. Empty = none.
+std::filesystem::path mapping_of(const std::filesystem::path& bag);
+
+}  // namespace palpate::cli

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/acquisition/find_pushes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::acquisition {
+namespace {
+
+constexpr int confirm_samples = 3;
+constexpr double noise_factor = 5;
+constexpr double guard_s = 0.1;  // before the contact is noticed, the force may have risen already
+
+/// Mean and spread of the force over any stretch in one step.
+class ForceSums {
+ public:
+  explicit ForceSums(const Track& track) : sum_(track.samples.size() + 1, Vec3::Zero()), square_(sum_) {
+    for (std::size_t i = 0; i < track.samples.size(); ++i) {
+      sum_[i + 1] = sum_[i] + track.samples[i].force_n;
+      square_[i + 1] = square_[i] + track.samples[i].force_n.cwiseAbs2();
+    }
+  }
+  Vec3 mean(std::size_t begin, std::size_t end) const { return (sum_[end] - sum_[begin]) / double(end - begin); }
+  double std_of(std::size_t begin, std::size_t end) const {
+    if (end - begin < 2) return 0;
+    const Vec3 variance = (square_[end] - square_[begin]) / double(end - begin) - mean(begin, end).cwiseAbs2();
+    return std::sqrt(std::max(0.0, variance.maxCoeff()) * double(end - begin) / double(end - begin - 1));
+  }
+
+ private:
+  std::vector<Vec3> sum_, square_;
+};
+
+std::size_t first_after(const Track& track, double time_s) {
+  return std::size_t(std::lower_bound(track.samples.begin(), track.samples.end(), time_s,
+                                      [](const sensing::ContactSample& s, double t) { return s.time_s < t; }) -
+                     track.samples.begin());
+}
+
+/// A contact begins while the tool comes nearer; a force that rises while it stands or goes back is something else (the
+/// weight of a tool that turns, a sensor whose sign is the other way round).
+bool approaches(const Track& track, std::size_t i) {
+  constexpr double over_s = 0.2, least_m_s = 1e-4;
+  const std::size_t before = first_after(track, track.samples[i].time_s - over_s);
+  const double duration = track.samples[i].time_s - track.samples[before].time_s;
+  const double moved = (track.samples[i].tip_m - track.samples[before].tip_m).dot(track.direction[i]);
+  return before == i || moved > least_m_s * duration;
+}
+
+struct FreeAir {
+  Vec3 tare_n = Vec3::Zero();
+  double std_n = 0;
+  std::size_t samples = 0;
+};
+
+}  // namespace
+
+std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& plan) {
+  std::vector<ContactSpan> spans;
+  const auto& samples = track.samples;
+  if (samples.size() < 2 * confirm_samples) return spans;
+  const ForceSums sums(track);
+  FreeAir fixed;
+  if (plan.tare == Tare::between) {
+    const std::size_t a = first_after(track, plan.tare_from_s), b = first_after(track, plan.tare_to_s);
+    if (b > a) fixed = {sums.mean(a, b), sums.std_of(a, b), b - a};
+  }
+  std::size_t free_since = 0, window_begin = 0, window_end = 0;
+  int run = 0;
+  bool touching = false;
+  FreeAir air = fixed;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!touching && plan.tare != Tare::between) {
+      // Free air: the last `tare_s` before now, with a guard; at the very beginning, what there is.
+      const double now = samples[i].time_s;
+      while (window_end < i && samples[window_end].time_s < now - guard_s) ++window_end;
+      while (window_begin < window_end && samples[window_begin].time_s < now - guard_s - plan.tare_s) ++window_begin;
+      window_begin = std::max(window_begin, free_since);
+      const bool enough =
+          window_end > window_begin && samples[window_end - 1].time_s - samples[window_begin].time_s > 0.5 * plan.tare_s;
+      if (run == 0 && enough)
+        air = {plan.tare == Tare::none ? Vec3(Vec3::Zero()) : sums.mean(window_begin, window_end),
+               sums.std_of(window_begin, window_end), window_end - window_begin};
+      if (air.samples == 0) {
+        if (plan.tare == Tare::before_contact) continue;  // nothing to compare with yet
+      }
+    }
+    const double threshold = std::max(plan.contact_threshold_n, noise_factor * air.std_n);
+    const Vec3& along = touching ? spans.back().direction : track.direction[i];
+    const double force = (samples[i].force_n - air.tare_n).dot(along);
+    const bool counts = touching ? force < 0.5 * threshold : force > threshold && approaches(track, i);
+    run = counts ? run + 1 : 0;
+    if (run < confirm_samples) continue;
+    run = 0;
+    touching = !touching;
+    const std::size_t first = i + 1 - confirm_samples;
+    if (touching) {
+      ContactSpan span;
+      span.begin = first;
+      span.end = samples.size();
+      span.tare_n = air.tare_n;
+      span.free_air_std_n = air.std_n;
+      span.free_air_samples = air.samples;
+      span.contact_m = samples[first].tip_m;
+      span.direction = track.direction[first];
+      spans.push_back(span);
+    } else {
+      spans.back().end = first;
+      free_since = window_begin = window_end = i + 1;
+      if (plan.tare == Tare::before_contact) air.samples = 0;  // drift: the next push has its own
+    }
+  }
+  // A touch that is lost for a moment is the same push.
+  std::vector<ContactSpan> joined;
+  for (const ContactSpan& span : spans) {
+    const bool close = !joined.empty() && samples[span.begin].time_s - samples[joined.back().end - 1].time_s < plan.hold_s;
+    close ? void(joined.back().end = span.end) : joined.push_back(span);
+  }
+  std::erase_if(joined, [&](const ContactSpan& span) {
+    return samples[span.end - 1].time_s - samples[span.begin].time_s < plan.hold_s;
+  });
+  return joined;
+}
+
+std::vector<StillTime> find_still_times(const Track& track, const ContactSpan& span, const StreamPlan& plan) {
+  constexpr double speed_window_s = 0.2;
+  std::vector<StillTime> found;
+  const auto& samples = track.samples;
+  const auto close = [&](std::size_t begin, std::size_t end) {
+    if (end <= begin || samples[end - 1].time_s - samples[begin].time_s < plan.hold_s) return;
+    std::vector<sensing::ContactSample> stretch(samples.begin() + std::ptrdiff_t(begin),
+                                                samples.begin() + std::ptrdiff_t(end));
+    for (sensing::ContactSample& one : stretch) one.force_n -= span.tare_n;
+    sensing::SettlingOptions options;
+    options.window_s = plan.hold_s;
+    found.push_back({stretch.back().time_s, sensing::settling(stretch, span.direction, options).settled});
+  };
+  std::size_t left = span.begin, right = span.begin, begin = span.begin;
+  bool still = false;
+  for (std::size_t i = span.begin; i < span.end; ++i) {
+    while (left < i && samples[left].time_s < samples[i].time_s - 0.5 * speed_window_s) ++left;
+    while (right + 1 < span.end && samples[right].time_s < samples[i].time_s + 0.5 * speed_window_s) ++right;
+    const double duration = samples[right].time_s - samples[left].time_s;
+    const bool now = duration > 0 && (samples[right].tip_m - samples[left].tip_m).norm() / duration < plan.still_m_s;
+    if (now && !still) begin = i;
+    if (!now && still) close(begin, i);
+    still = now;
+  }
+  if (still) close(begin, span.end);
+  return found;
+}
+
+}  // namespace palpate::acquisition

@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/acquisition/from_streams.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+
+#include "palpate/acquisition/force_track.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/sensing/plane_mask.hpp"
+#include "palpate/sensing/robot_mask.hpp"
+
+namespace palpate::acquisition {
+namespace {
+
+/// A step before its sensors are looked up.
+struct StepTime {
+  double time_s = 0;
+  std::optional<bool> loaded;     ///< not given: told by the force
+  std::optional<bool> unloading;  ///< not given: told by force and travel
+};
+struct PushTimes {
+  PlannedPush plan;
+  std::vector<StepTime> steps;
+  const ContactSpan* span = nullptr;
+};
+
+std::string seconds(double value) {
+  std::string text = std::to_string(value);
+  return text.substr(0, text.find('.') + 4) + " s";
+}
+
+class Assembly {
+ public:
+  Assembly(const StreamPlan& plan, const SensorStreams& streams)
+      : plan_(plan), streams_(streams), tree_(tree_of(plan, streams)) {
+    out_.recording = plan.recording;
+    out_.recording.source = plan.source;
+    out_.recording.warnings.insert(out_.recording.warnings.end(), streams.warnings.begin(), streams.warnings.end());
+    if (out_.recording.joint_names.empty() && out_.recording.robot) out_.recording.joint_names = streams.joint_names;
+    used_images_.resize(streams.cameras.size());
+    used_clouds_.resize(streams.clouds.size());
+  }
+
+  FromStreams run() {
+    align_clocks();
+    track_ = track_of(plan_, streams_, tree_, wrench_offset_s_);
+    spans_ = find_contacts(track_, plan_);
+    for (const PushTimes& push : pushes()) add_push(push);
+    if (out_.recording.pushes.empty())
+      throw Error("no step could be made; check times, topics and clocks with `palpate info`", plan_.source + ": steps");
+    return std::move(out_);
+  }
+
+ private:
+  double clock_of(const ClockPlan& clock, const std::function<ClockOffset()>& estimate) {
+    if (!clock.estimate) return clock.offset_s;
+    const ClockOffset found = estimate();
+    out_.clocks.push_back(found);
+    if (found.usable) return found.offset_s;
+    out_.notes.push_back("the clock of " + found.sensor +
+                         " could not be aligned with the arm's (too little that both saw): taken as it is");
+    return 0;
+  }
+
+  void align_clocks() {
+    wrench_offset_s_ = clock_of(plan_.wrench_clock, [&] { return wrench_offset(plan_, streams_, tree_); });
+    for (const DepthStream& camera : streams_.cameras)
+      camera_offset_s_.push_back(
+          clock_of(plan_.camera_clock, [&] { return camera_offset(plan_, streams_, tree_, camera); }));
+    // Clouds come from the same device as the depth images, where there are any.
+    cloud_offset_s_ = !camera_offset_s_.empty() ? camera_offset_s_.front() : plan_.camera_clock.offset_s;
+  }
+
+  std::vector<PushTimes> pushes() {
+    std::vector<PushTimes> all;
+    if (plan_.steps_by == StepsBy::detection) return detected();
+    if (plan_.steps_by == StepsBy::marks) {
+      for (const MarkSample& mark : streams_.marks) marked(mark, all);
+      if (all.empty()) throw Error("there is no mark in the bag", plan_.source + ": topics.marks");
+    } else {
+      for (const PlannedPush& push : plan_.pushes) {
+        PushTimes& one = all.emplace_back(PushTimes{push, {}, nullptr});
+        for (const double time : push.at_s) one.steps.push_back({time, {}, {}});
+      }
+    }
+    for (PushTimes& push : all) push.span = span_of(push);
+    return all;
+  }
+
+  /// "NAME", "NAME; unloading", "NAME; unloaded", or both; without a name, one push.
+  void marked(const MarkSample& mark, std::vector<PushTimes>& all) const {
+    StepTime step{mark.time_s, {}, {}};
+    std::string name = mark.text.substr(0, mark.text.find(';'));
+    while (!name.empty() && name.back() == ' ') name.pop_back();
+    if (name.empty()) name = "push 1";
+    if (mark.text.find("; unloading") != std::string::npos) step.unloading = true;
+    if (mark.text.find("; unloaded") != std::string::npos) step.loaded = false;
+    if (mark.text.find("; loaded") != std::string::npos) step.loaded = true, step.unloading = step.unloading.value_or(false);
+    auto found = std::find_if(all.begin(), all.end(), [&](const PushTimes& one) { return one.plan.name == name; });
+    if (found == all.end()) {
+      const auto planned =
+          std::find_if(plan_.pushes.begin(), plan_.pushes.end(), [&](const PlannedPush& one) { return one.name == name; });
+      all.push_back({planned == plan_.pushes.end() ? plan_.any_push : *planned, {}, nullptr});
+      found = all.end() - 1;
+      found->plan.name = name;
+    }
+    found->steps.push_back(step);
+  }
+
+  /// The contact that most of the push's steps fall into.
+  const ContactSpan* span_of(const PushTimes& push) const {
+    const ContactSpan* best = nullptr;
+    std::size_t most = 0;
+    for (const ContactSpan& span : spans_) {
+      const double from = track_.samples[span.begin].time_s, to = track_.samples[span.end - 1].time_s;
+      const auto inside =
+          static_cast<std::size_t>(std::count_if(push.steps.begin(), push.steps.end(), [&](const StepTime& step) {
+            return step.time_s >= from && step.time_s <= to;
+          }));
+      if (inside > most) most = inside, best = &span;
+    }
+    return best;
+  }
+
+  std::vector<PushTimes> detected() {
+    std::vector<PushTimes> all;
+    for (std::size_t k = 0; k < spans_.size(); ++k) {
+      const ContactSpan& span = spans_[k];
+      PushTimes push;
+      push.span = &span;
+      push.plan = k < plan_.pushes.size() ? plan_.pushes[k] : plan_.any_push;
+      if (push.plan.name.empty()) push.plan.name = "push " + std::to_string(k + 1);
+      const double begin = track_.samples[span.begin].time_s, end = track_.samples[span.end - 1].time_s;
+      const auto still = find_still_times(track_, span, plan_);
+      if (still.empty()) {
+        out_.notes.push_back("contact at " + seconds(begin) + " to " + seconds(end) + ": the tool never stood still for " +
+                             seconds(plan_.hold_s) + ", so that no step was taken there (steps.hold_s, steps.still_m_s)");
+        continue;
+      }
+      const double before = begin - 0.5 * plan_.tare_s, after = end + plan_.tare_s;
+      const double next = k + 1 < spans_.size() ? track_.samples[spans_[k + 1].begin].time_s : track_.samples.back().time_s;
+      if (before > track_.samples.front().time_s) push.steps.push_back({before, false, false});
+      for (const StillTime& one : still) {
+        push.steps.push_back({one.time_s, true, {}});
+        if (!one.settled)
+          out_.notes.push_back(push.plan.name + ": the force still crept in the step at " + seconds(one.time_s));
+      }
+      if (after < next) push.steps.push_back({after, false, true});
+      all.push_back(std::move(push));
+    }
+    if (all.empty())
+      throw Error(
+          spans_.empty()
+              ? "no contact was found in the force: is the sign right (wrench.reports), is z of the tip along the push, "
+                "is the threshold right (steps.contact_threshold_n)?"
+              : "the tool never stood still while it touched; give the times of the steps (steps: {by: times})",
+          plan_.source + ": steps");
+    return all;
+  }
+
+  struct MeanForce {
+    Vec3 force_n = Vec3::Zero();
+    double std_n = 0;  ///< of the mean, per axis
+  };
+  std::optional<MeanForce> force_at(double time_s) const {
+    const auto& samples = track_.samples;
+    MeanForce mean;
+    Vec3 square = Vec3::Zero();
+    double count = 0;
+    // Times have come through integers: the sample at the step's own time belongs to it.
+    const auto last = std::upper_bound(samples.begin(), samples.end(), time_s + 1e-6,
+                                       [](double t, const sensing::ContactSample& s) { return t < s.time_s; });
+    for (auto s = std::make_reverse_iterator(last); s != samples.rend() && s->time_s >= time_s - plan_.window_s; ++s) {
+      mean.force_n += s->force_n;
+      ++count;
+    }
+    if (count == 0) return std::nullopt;
+    mean.force_n /= count;
+    auto s = std::make_reverse_iterator(last);
+    for (double k = 0; k < count; ++k, ++s) square += (s->force_n - mean.force_n).cwiseAbs2();
+    if (count > 1) mean.std_n = std::sqrt(square.mean() / (count - 1) / count);
+    return mean;
+  }
+
+  void add_push(const PushTimes& times) {
+    const PlannedPush& plan = times.plan;
+    Push push;
+    push.name = plan.name;
+    push.site = plan.site;
+    push.travel_offset_std_m = plan.travel_offset_std_m;
+    push.force_tare_std_n = plan.force_tare_std_n;
+    Vec3 tare = Vec3::Zero();
+    if (plan_.tare != Tare::none) {
+      if (times.span == nullptr)
+        throw Error("push '" + push.name +
+                        "': no contact was found in the force, so that it cannot be tared before it; give wrench.tare",
+                    plan_.source + ": wrench");
+      tare = times.span->tare_n;
+      if (push.force_tare_std_n == 0)
+        push.force_tare_std_n =
+            times.span->free_air_std_n / std::sqrt(double(std::max<std::size_t>(1, times.span->free_air_samples)));
+    }
+    if (!plan.contact_m && times.span == nullptr)
+      throw Error("push '" + push.name + "': no contact was found in the force; give its contact_m",
+                  plan_.source + ": steps.pushes");
+    const Vec3 contact = plan.contact_m ? *plan.contact_m : times.span->contact_m;
+    Vec3 direction = plan.direction ? *plan.direction : Vec3::Zero();
+    double highest_n = 0, deepest_m = 0;
+    std::size_t loaded_steps = 0;
+    for (const StepTime& at : times.steps) {
+      const auto force = force_at(at.time_s);
+      const auto tip = tree_.lookup(plan_.base_frame, plan_.tip_frame, at.time_s);
+      if (!force && at.loaded.value_or(true)) {
+        out_.notes.push_back(push.name + ": no force within " + seconds(plan_.window_s) + " before " + seconds(at.time_s) +
+                             ": step left out");
+        continue;
+      }
+      if (direction.norm() == 0) {
+        if (times.span != nullptr)
+          direction = times.span->direction;
+        else if (tip)
+          direction = tip->linear().col(2).normalized();
+        else
+          throw Error("push '" + push.name + "': give its direction", plan_.source + ": steps.pushes");
+      }
+      Step step;
+      step.time_s = at.time_s;
+      step.source = plan_.source + ": " + push.name + " at " + seconds(at.time_s);
+      step.T_base_tip = tip;
+      if (const auto joints = joints_at(streams_, at.time_s); joints && out_.recording.joint_names == streams_.joint_names)
+        step.joints_rad = *joints;
+      const Vec3 pressing = force ? Vec3(force->force_n - tare) : Vec3(Vec3::Zero());
+      const double along = pressing.dot(direction), travel = tip ? direction.dot(tip->translation() - contact) : 0;
+      const double noise = times.span != nullptr ? 5 * times.span->free_air_std_n : 0;
+      const bool loaded = at.loaded.value_or(along > std::max(plan_.contact_threshold_n, noise));
+      step.unloading = at.unloading.value_or(loaded ? along < highest_n && travel < deepest_m - 1e-4 : highest_n > 0);
+      highest_n = std::max(highest_n, along);
+      deepest_m = std::max(deepest_m, travel);
+      if (loaded) {
+        Load load;
+        load.tool = plan.tool;
+        load.force_n = pressing;
+        load.force_std_n = plan.force_std_n ? *plan.force_std_n : force->std_n;
+        load.force_relative_std = plan.force_relative_std;
+        load.contact_m = contact;
+        load.direction = direction;
+        load.contact_std_m = plan.contact_std_m;
+        step.loads.push_back(load);
+        if (!plan.travel_sigma_m.empty() && tip)
+          step.observations.emplace_back(
+              ToolTravel{plan.tool, travel, plan.travel_sigma_m[std::min(loaded_steps, plan.travel_sigma_m.size() - 1)]});
+        ++loaded_steps;
+      }
+      look(step);
+      push.steps.push_back(std::move(step));
+    }
+    if (!push.steps.empty()) out_.recording.pushes.push_back(std::move(push));
+  }
+
+  /// Index of the sample nearest to a time, if near enough and not used by another step.
+  std::optional<std::size_t> nearest(const std::vector<double>& times, double offset_s, double time_s,
+                                     std::set<std::size_t>& used) const {
+    const auto after = std::lower_bound(times.begin(), times.end(), time_s - offset_s);
+    std::optional<std::size_t> best;
+    for (const auto one : {after, after == times.begin() ? after : after - 1}) {
+      if (one == times.end()) continue;
+      const auto i = static_cast<std::size_t>(one - times.begin());
+      const double gap = std::abs(*one + offset_s - time_s);
+      if (gap < plan_.image_gap_s && (!best || gap < std::abs(times[*best] + offset_s - time_s))) best = i;
+    }
+    if (best && !used.insert(*best).second) return std::nullopt;
+    return best;
+  }
+
+  void look(Step& step) {
+    for (std::size_t c = 0; c < streams_.cameras.size(); ++c) {
+      const DepthStream& camera = streams_.cameras[c];
+      const auto image = nearest(camera.times_s, camera_offset_s_[c], step.time_s, used_images_[c]);
+      if (!image) {
+        out_.notes.push_back(camera.name + ": no image within " + seconds(plan_.image_gap_s) + " of the step at " +
+                             seconds(step.time_s));
+        continue;
+      }
+      DepthFrame frame = camera.like;
+      frame.time_s = camera.times_s[*image] + camera_offset_s_[c];
+      const auto pose = pose_of(camera.frame, frame.time_s);
+      if (!pose) {
+        out_.notes.push_back(camera.name + ": its pose is not known at " + seconds(frame.time_s));
+        continue;
+      }
+      frame.T_base_camera = *pose;
+      try {
+        frame.depth_m = camera.image(*image);
+        if (camera.mask) frame.mask = camera.mask(*image);
+      } catch (const Error& error) {
+        out_.notes.push_back(camera.name + ": the image of the step at " + seconds(step.time_s) +
+                             " cannot be used: " + error.message());
+        continue;
+      }
+      if (camera.mask_robot) frame = without_robot(std::move(frame));
+      step.observations.emplace_back(std::move(frame));
+    }
+    for (std::size_t c = 0; c < streams_.clouds.size(); ++c) {
+      const CloudStream& stream = streams_.clouds[c];
+      const auto number = nearest(stream.times_s, cloud_offset_s_, step.time_s, used_clouds_[c]);
+      const auto pose = number ? pose_of(stream.frame, stream.times_s[*number] + cloud_offset_s_) : std::nullopt;
+      if (!pose) {
+        out_.notes.push_back(stream.name + ": no cloud with a known pose near the step at " + seconds(step.time_s));
+        continue;
+      }
+      try {
+        PointCloud cloud = stream.cloud(*number);
+        cloud.points_m = (cloud.points_m * pose->linear().transpose()).rowwise() + pose->translation().transpose();
+        cloud.sigma_m = VectorX::Constant(1, stream.sigma_m);
+        cloud.pose_std_m = stream.pose_std_m;
+        cloud.pose_std_rad = stream.pose_std_rad;
+        step.observations.emplace_back(std::move(cloud));
+      } catch (const Error& error) {
+        out_.notes.push_back(stream.name + ": the cloud of the step at " + seconds(step.time_s) +
+                             " cannot be used: " + error.message());
+      }
+    }
+  }
+
+  std::optional<Pose> pose_of(const std::string& frame, double time_s) const {
+    if (frame == plan_.base_frame) return Pose(Pose::Identity());
+    return tree_.lookup(plan_.base_frame, frame, time_s);
+  }
+
+  DepthFrame without_robot(DepthFrame frame) {
+    if (!plan_.recording.robot)
+      throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description",
+                  plan_.source + ": topics.depth");
+    if (!mask_) mask_ = std::make_unique<sensing::RobotMask>(*plan_.recording.robot);
+    const auto joints = joints_at(streams_, frame.time_s);
+    const sensing::Kinematics& kinematics = mask_->kinematics();
+    const std::string root = kinematics.robot().links[std::size_t(kinematics.root_link())].name;
+    const auto base = pose_of(root, frame.time_s);
+    if (!joints || !base) {
+      out_.notes.push_back("the robot is not masked at " + seconds(frame.time_s) + ": its joints or the pose of '" + root +
+                           "' are not known");
+      return frame;
+    }
+    return sensing::with_mask(frame, mask_->mask(frame, streams_.joint_names, *joints, *base));
+  }
+
+  const StreamPlan& plan_;
+  const SensorStreams& streams_;
+  FrameTree tree_;
+  Track track_;
+  std::vector<ContactSpan> spans_;
+  double wrench_offset_s_ = 0, cloud_offset_s_ = 0;
+  std::vector<double> camera_offset_s_;
+  std::vector<std::set<std::size_t>> used_images_, used_clouds_;
+  std::unique_ptr<sensing::RobotMask> mask_;
+  FromStreams out_;
+};
+
+}  // namespace
+
+FromStreams recording_from(const StreamPlan& plan, const SensorStreams& streams) { return Assembly(plan, streams).run(); }
+
+}  // namespace palpate::acquisition

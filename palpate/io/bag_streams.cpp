@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "palpate/core/error.hpp"
+#include "palpate/io/bag_mapping.hpp"
+#include "palpate/io/ros_messages.hpp"
+#include "palpate/io/urdf.hpp"
+#include "palpate/io/yaml_field.hpp"
+
+namespace palpate::io {
+namespace {
+
+constexpr double foreign_clock_s = 60;  // recorders are not that late: the headers then count from another zero
+
+class StreamReader {
+ public:
+  StreamReader(const MessageSource& bag, const BagMapping& mapping) : bag_(bag), mapping_(mapping) {
+    if (bag.messages.empty()) throw Error("holds no message", bag.name);
+    start_ns_ = bag.messages.front().log_time_ns;
+  }
+
+  /// The messages of a topic. @throws Error when there is no such topic, or none of these types.
+  struct Topic {
+    const MessageTopic* about = nullptr;
+    std::vector<const Message*> messages;
+  };
+  Topic topic(const MappedTopic& mapped, const std::vector<std::string>& types) const {
+    Topic found;
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < bag_.topics.size(); ++i) {
+      const MessageTopic& one = bag_.topics[i];
+      names.push_back(one.name);
+      if (one.name != mapped.name) continue;
+      if (!types.empty() && std::find(types.begin(), types.end(), one.type) == types.end()) {
+        if (found.about == nullptr) mismatch_ = one.type;
+        continue;
+      }
+      found.about = &one;
+      for (const Message& message : bag_.messages)
+        if (message.topic == i) found.messages.push_back(&message);
+      return found;
+    }
+    if (std::find(names.begin(), names.end(), mapped.name) != names.end())
+      throw Error("the topic '" + mapped.name + "' is of type " + mismatch_ + "; " + types.front() + " is expected",
+                  mapped.where);
+    const auto near = nearest_word(mapped.name, names);
+    throw Error("the bag has no topic '" + mapped.name + "'" + (near ? "; did you mean '" + *near + "'?" : "") +
+                    " (`palpate info` lists them)",
+                mapped.where);
+  }
+
+  double seconds(const RosHeader& header, const Message& message) const {
+    const bool by_log = mapping_.use_log_time || header.stamp_ns == 0;
+    return static_cast<double>((by_log ? message.log_time_ns : header.stamp_ns) - (by_log ? log_start_ns() : start_ns_)) *
+           1e-9;
+  }
+  double log_seconds(const Message& message) const {
+    return static_cast<double>(message.log_time_ns - log_start_ns()) * 1e-9;
+  }
+
+  /// Headers of a simulation count from another zero than the recorder's clock does: the first force tells by how much.
+  void settle_start(const Topic& wrench, std::vector<std::string>& warnings) {
+    if (mapping_.use_log_time) return;
+    std::int64_t shift_ns = 0;
+    for (const Message* message : wrench.messages) {
+      try {
+        const std::int64_t stamp = decode_header(message->data, where(wrench), wrench.about->encoding).stamp_ns;
+        if (stamp != 0) shift_ns = stamp - message->log_time_ns;
+        break;
+      } catch (const Error&) {  // damaged: it is counted when the forces are read
+      }
+    }
+    const double shift_s = static_cast<double>(shift_ns) * 1e-9;
+    if (std::abs(shift_s) < foreign_clock_s) return;
+    start_ns_ += shift_ns;
+    warnings.push_back("the stamps in the messages' headers and the recorder's clock differ by " + std::to_string(shift_s) +
+                       " s; times count from the bag's start by the headers");
+  }
+
+  std::string where(const Topic& topic) const { return bag_.name + ": " + topic.about->name; }
+
+  /// Runs `decode` on every message; those that are damaged are counted.
+  template <typename Decode>
+  void each(const Topic& topic, std::vector<std::string>& warnings, Decode decode) const {
+    std::size_t lost = 0;
+    std::string first;
+    for (const Message* message : topic.messages) {
+      try {
+        decode(*message);
+      } catch (const Error& error) {
+        if (lost++ == 0) first = error.message();
+      }
+    }
+    if (lost > 0)
+      warnings.push_back(std::to_string(lost) + " of " + std::to_string(topic.messages.size()) + " messages of " +
+                         topic.about->name + " were left out (" + first + ")");
+  }
+
+ private:
+  std::int64_t log_start_ns() const { return bag_.messages.front().log_time_ns; }
+  const MessageSource& bag_;
+  const BagMapping& mapping_;
+  std::int64_t start_ns_ = 0;
+  mutable std::string mismatch_;
+};
+
+template <typename Sample>
+void sort_by_time(std::vector<Sample>& samples) {
+  std::stable_sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.time_s < b.time_s; });
+}
+
+void read_wrenches(const StreamReader& reader, const StreamReader::Topic& topic, SensorStreams& streams) {
+  reader.each(topic, streams.warnings, [&](const Message& message) {
+    const RosWrench one = decode_wrench(message.data, reader.where(topic), topic.about->encoding);
+    if (!one.force_n.allFinite() || !one.torque_nm.allFinite()) throw Error("holds NaN", reader.where(topic));
+    streams.wrenches.push_back({reader.seconds(one.header, message), one.force_n, one.torque_nm});
+    if (streams.wrench_frame.empty()) streams.wrench_frame = one.header.frame;
+  });
+  sort_by_time(streams.wrenches);
+}
+
+/// Messages may name the joints in any order, and several senders may share the topic: a sample is given when the joints of
+/// the first are all there.
+void read_joints(const StreamReader& reader, const StreamReader::Topic& topic, SensorStreams& streams) {
+  reader.each(topic, streams.warnings, [&](const Message& message) {
+    const RosJointState one = decode_joint_state(message.data, reader.where(topic), topic.about->encoding);
+    if (streams.joint_names.empty()) streams.joint_names = one.names;
+    JointSample sample{reader.seconds(one.header, message), {}};
+    for (const std::string& name : streams.joint_names) {
+      const auto place = std::find(one.names.begin(), one.names.end(), name);
+      if (place == one.names.end()) return;
+      sample.positions.push_back(one.position[static_cast<std::size_t>(place - one.names.begin())]);
+    }
+    streams.joints.push_back(std::move(sample));
+  });
+  sort_by_time(streams.joints);
+}
+
+void read_transforms(const StreamReader& reader, const StreamReader::Topic& topic,
+                     std::map<std::pair<std::string, std::string>, FrameLink>& links, SensorStreams& streams) {
+  const bool fixed = topic.about->name.ends_with("tf_static");
+  const auto plain = [](const std::string& frame) { return frame.starts_with("/") ? frame.substr(1) : frame; };
+  reader.each(topic, streams.warnings, [&](const Message& message) {
+    for (const RosTransform& one : decode_transforms(message.data, reader.where(topic), topic.about->encoding)) {
+      FrameLink& link = links[{plain(one.header.frame), plain(one.child)}];
+      link.parent = plain(one.header.frame);
+      link.child = plain(one.child);
+      link.is_fixed |= fixed;
+      link.samples.push_back({reader.seconds(one.header, message), one.T_parent_child});
+    }
+  });
+}
+
+void read_camera(const StreamReader& reader, const MappedCamera& mapped, const MessageSource& bag, SensorStreams& streams) {
+  const auto images = reader.topic(mapped.image, {"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"});
+  const auto infos = reader.topic(mapped.info, {"sensor_msgs/msg/CameraInfo"});
+  DepthStream camera;
+  camera.name = mapped.image.name;
+  camera.frame = mapped.frame;
+  camera.like = mapped.like;
+  camera.mask_robot = mapped.mask_robot;
+  if (infos.messages.empty()) throw Error("the topic holds no message: the camera is not known", mapped.info.where);
+  camera.like.camera = decode_camera_info(infos.messages.front()->data, reader.where(infos), infos.about->encoding).camera;
+
+  struct Kept {
+    std::shared_ptr<const void> memory;
+    MessageEncoding encoding = MessageEncoding::cdr;
+    bool is_compressed = false;
+    std::string where;
+    std::vector<std::string_view> data;
+    std::vector<std::optional<std::string_view>> masks;
+    MessageEncoding mask_encoding = MessageEncoding::cdr;
+  };
+  const auto kept = std::make_shared<Kept>();
+  kept->memory = bag.memory;
+  kept->encoding = images.about->encoding;
+  kept->is_compressed = images.about->type == "sensor_msgs/msg/CompressedImage";
+  kept->where = reader.where(images);
+  std::vector<std::pair<double, std::string_view>> found;
+  reader.each(images, streams.warnings, [&](const Message& message) {
+    const RosHeader header = decode_header(message.data, kept->where, kept->encoding);
+    if (camera.frame.empty()) camera.frame = header.frame;
+    found.emplace_back(reader.seconds(header, message), message.data);
+  });
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [time_s, data] : found) {
+    if (!camera.times_s.empty() && camera.times_s.back() == time_s) continue;  // sent twice
+    camera.times_s.push_back(time_s);
+    kept->data.push_back(data);
+  }
+  const Camera about = camera.like.camera;
+  camera.image = [kept, about](std::size_t i) {
+    const DepthImage depth = kept->is_compressed
+                                 ? decode_compressed_depth(kept->data[i], kept->where, kept->encoding).depth_m
+                                 : decode_image(kept->data[i], kept->where, kept->encoding).depth_m;
+    if (depth.rows() != about.height_px || depth.cols() != about.width_px)
+      throw Error("the image is of another size than its CameraInfo says", kept->where);
+    return depth;
+  };
+  if (mapped.mask) {
+    const auto masks = reader.topic(*mapped.mask, {"sensor_msgs/msg/Image"});
+    kept->mask_encoding = masks.about->encoding;
+    std::map<double, std::string_view> by_time;
+    reader.each(masks, streams.warnings, [&](const Message& message) {
+      by_time[reader.seconds(decode_header(message.data, kept->where, kept->mask_encoding), message)] = message.data;
+    });
+    for (const double time_s : camera.times_s) {
+      const auto one = by_time.find(time_s);
+      kept->masks.push_back(one == by_time.end() ? std::nullopt : std::optional(one->second));
+    }
+    camera.mask = [kept](std::size_t i) {
+      return kept->masks[i] ? decode_mask(*kept->masks[i], kept->where, kept->mask_encoding) : MaskImage();
+    };
+  }
+  streams.cameras.push_back(std::move(camera));
+}
+
+void read_cloud(const StreamReader& reader, const MappedCloud& mapped, const MessageSource& bag, SensorStreams& streams) {
+  const auto topic = reader.topic(mapped.topic, {"sensor_msgs/msg/PointCloud2"});
+  CloudStream stream;
+  stream.name = mapped.topic.name;
+  stream.frame = mapped.frame;
+  stream.sigma_m = mapped.sigma_m;
+  stream.pose_std_m = mapped.pose_std_m;
+  stream.pose_std_rad = mapped.pose_std_rad;
+  const auto data = std::make_shared<std::vector<std::string_view>>();
+  std::vector<std::pair<double, std::string_view>> found;
+  const std::string where = reader.where(topic);
+  const MessageEncoding encoding = topic.about->encoding;
+  reader.each(topic, streams.warnings, [&](const Message& message) {
+    const RosHeader header = decode_header(message.data, where, encoding);
+    if (stream.frame.empty()) stream.frame = header.frame;
+    found.emplace_back(reader.seconds(header, message), message.data);
+  });
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [time_s, bytes] : found) {
+    stream.times_s.push_back(time_s);
+    data->push_back(bytes);
+  }
+  stream.cloud = [data, where, encoding, memory = bag.memory](std::size_t i) {
+    return decode_point_cloud((*data)[i], where, encoding).cloud;
+  };
+  streams.clouds.push_back(std::move(stream));
+}
+
+}  // namespace
+
+SensorStreams read_streams(const MessageSource& bag, BagMapping& mapping) {
+  SensorStreams streams;
+  streams.warnings = bag.warnings;
+  StreamReader reader(bag, mapping);
+  const auto wrench = reader.topic(*mapping.wrench, {"geometry_msgs/msg/WrenchStamped"});
+  if (wrench.messages.empty()) throw Error("the topic holds no message", mapping.wrench->where);
+  reader.settle_start(wrench, streams.warnings);
+  read_wrenches(reader, wrench, streams);
+  if (mapping.joints) read_joints(reader, reader.topic(*mapping.joints, {"sensor_msgs/msg/JointState"}), streams);
+
+  std::map<std::pair<std::string, std::string>, FrameLink> links;
+  std::vector<MappedTopic> transforms = mapping.transforms;
+  if (transforms.empty()) {
+    for (const MessageTopic& one : bag.topics)
+      if (one.type == "tf2_msgs/msg/TFMessage" || one.type == "tf/msg/tfMessage")
+        transforms.push_back({one.name, mapping.plan.source});
+  }
+  for (const MappedTopic& one : transforms)
+    read_transforms(reader, reader.topic(one, {"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"}), links, streams);
+  for (auto& [name, link] : links) {
+    sort_by_time(link.samples);
+    streams.frames.push_back(std::move(link));
+  }
+  for (const MappedCamera& camera : mapping.cameras) read_camera(reader, camera, bag, streams);
+  for (const MappedCloud& cloud : mapping.clouds) read_cloud(reader, cloud, bag, streams);
+  if (mapping.marks) {
+    const auto marks = reader.topic(*mapping.marks, {});
+    const bool is_text = marks.about->type == "std_msgs/msg/String";
+    reader.each(marks, streams.warnings, [&](const Message& message) {
+      streams.marks.push_back({reader.log_seconds(message),
+                               is_text ? decode_string(message.data, reader.where(marks), marks.about->encoding) : ""});
+    });
+  }
+  if (mapping.robot_description && !mapping.plan.recording.robot) {
+    const auto description = reader.topic(*mapping.robot_description, {"std_msgs/msg/String"});
+    if (description.messages.empty()) throw Error("the topic holds no message", mapping.robot_description->where);
+    const std::string urdf =
+        decode_string(description.messages.front()->data, reader.where(description), description.about->encoding);
+    mapping.plan.recording.robot = parse_urdf(urdf, reader.where(description), mapping.root);
+  }
+  streams.end_s = static_cast<double>(bag.messages.back().log_time_ns - bag.messages.front().log_time_ns) * 1e-9;
+  return streams;
+}
+
+}  // namespace palpate::io

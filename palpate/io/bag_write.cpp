@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/io/bag_write.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "palpate/core/error.hpp"
+#include "palpate/io/file.hpp"
+#include "palpate/io/mcap.hpp"
+#include "palpate/io/recording_writer.hpp"
+#include "palpate/io/ros_messages.hpp"
+#include "palpate/io/urdf.hpp"
+#include "palpate/io/yaml_text.hpp"
+
+namespace palpate::io {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::int64_t second_ns = 1'000'000'000;
+constexpr std::int64_t sample_gap_ns = second_ns / 50;  // between the two samples of a force
+
+struct BagCamera {
+  DepthFrame like;
+  std::string name;
+  bool has_mask = false;
+};
+
+bool same_camera(const DepthFrame& a, const DepthFrame& b) {
+  const auto same = [](double x, double y) { return x == y || (std::isnan(x) && std::isnan(y)); };
+  return a.camera.width_px == b.camera.width_px && a.camera.height_px == b.camera.height_px &&
+         a.camera.fx_px == b.camera.fx_px && a.camera.fy_px == b.camera.fy_px && a.camera.cx_px == b.camera.cx_px &&
+         a.camera.cy_px == b.camera.cy_px && a.camera.distortion == b.camera.distortion &&
+         a.camera.distortion_coefficients == b.camera.distortion_coefficients && a.noise.model == b.noise.model &&
+         same(a.noise.sigma_m, b.noise.sigma_m) && a.noise.bias_std_m == b.noise.bias_std_m &&
+         a.pose_std_m == b.pose_std_m && a.pose_std_rad == b.pose_std_rad;
+}
+
+[[noreturn]] void refuse(const std::string& what, const Step& step) {
+  throw Error(what + "; write a folder instead", "write_bag: step at " + std::to_string(step.time_s) + " s");
+}
+
+class BagWriter {
+ public:
+  explicit BagWriter(const Recording& recording) : recording_(recording) {}
+
+  void write(const fs::path& folder) {
+    if (recording_.robot) {
+      const auto files = urdf_files(*recording_.robot, "robot");
+      put("/robot_description", "std_msgs/msg/String", time_ns_, encode(files.at("robot.urdf")));
+    }
+    for (const Push& push : recording_.pushes) add_push(push);
+    const std::string stem = folder.filename().string(), file = stem + "_0.mcap";
+    const std::string head = "format: palpate-mapping/1\n" + object_text(recording_, folder);
+    write_file(folder / "mapping.yaml", head + mapping_text());
+    write_file(folder / file, mcap_.finish());
+    write_file(folder / "metadata.yaml", metadata_text(file));
+  }
+
+ private:
+  void put(const std::string& topic, const std::string& type, std::int64_t time_ns, const std::string& data) {
+    auto channel = channels_.find(topic);
+    if (channel == channels_.end()) {
+      const std::uint16_t id = mcap_.add_channel(topic, type, ros_type(type).definition);
+      channel = channels_.emplace(topic, Channel{id, type, 0}).first;
+    }
+    mcap_.add_message(channel->second.id, static_cast<std::uint64_t>(time_ns), data);
+    ++channel->second.messages;
+    first_ns_ = std::min(first_ns_, time_ns);
+    last_ns_ = std::max(last_ns_, time_ns);
+  }
+
+  void add_push(const Push& push) {
+    if (push.steps.empty()) return;
+    const std::int64_t start_ns = time_ns_ + second_ns;
+    const double first_s = push.steps.front().time_s;
+    const Load* first = nullptr;
+    for (const Step& step : push.steps)
+      if (first == nullptr && !step.loads.empty()) first = &step.loads.front();
+    std::vector<double> travel_sigma_m;
+    std::size_t loaded = 0;
+    for (const Step& step : push.steps) {
+      time_ns_ = start_ns + static_cast<std::int64_t>(std::llround((step.time_s - first_s) * 1e9));
+      std::string mark = push.name;
+      if (mark.find(';') != std::string::npos) refuse("the name of push '" + push.name + "' holds a semicolon", step);
+      mark += step.loads.empty() ? "; unloaded" : "; loaded";
+      if (step.unloading) mark += "; unloading";
+      put("/palpate/marks", "std_msgs/msg/String", time_ns_, encode(mark));
+      if (!step.joints_rad.empty())
+        put("/joint_states", "sensor_msgs/msg/JointState", time_ns_,
+            encode(RosJointState{header(""), recording_.joint_names, step.joints_rad}));
+      std::optional<Pose> T_base_tip = step.T_base_tip;
+      const ToolTravel* travel = nullptr;
+      std::vector<std::size_t> seen;
+      for (const Observation& observation : step.observations) {
+        if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
+          const std::size_t camera = put_image(*frame);
+          if (std::find(seen.begin(), seen.end(), camera) != seen.end()) refuse("a camera has two images in one step", step);
+          seen.push_back(camera);
+        } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
+          put_cloud(*cloud, step);
+        } else if (const auto* one = std::get_if<ToolTravel>(&observation)) {
+          travel = one;
+        } else {
+          refuse("markers and wrench observations have no topic", step);
+        }
+      }
+      if (!step.loads.empty()) {
+        put_force(step, *first);
+        ++loaded;
+      }
+      if (travel != nullptr) {
+        if (first == nullptr || step.loads.empty()) refuse("a travel without a load has no direction", step);
+        travel_sigma_m.push_back(travel->sigma_m);
+        T_base_tip = tip_at(*first, travel->travel_m, T_base_tip);
+      }
+      if (T_base_tip)
+        put("/tf", "tf2_msgs/msg/TFMessage", time_ns_,
+            encode(std::vector<RosTransform>{{header("base"), "tip", *T_base_tip}}));
+    }
+    if (!travel_sigma_m.empty() && travel_sigma_m.size() != loaded)
+      refuse("some loaded steps have a travel and others have none", push.steps.front());
+    YamlLine line;
+    line.word("name", push.name);
+    if (!push.site.empty()) line.word("site", push.site);
+    if (first != nullptr) {
+      line.word("tool", first->tool).vector("contact_m", first->contact_m).vector("direction", first->direction);
+      line.number_unless(0, "force_relative_std", first->force_relative_std)
+          .number_unless(0, "contact_std_m", first->contact_std_m);
+    }
+    line.number_unless(0, "force_tare_std_n", push.force_tare_std_n)
+        .number_unless(0, "travel_offset_std_m", push.travel_offset_std_m);
+    if (!travel_sigma_m.empty()) line.put("travel_sigma_m", yaml_list(travel_sigma_m.data(), travel_sigma_m.size()));
+    pushes_ += "    - " + line.str() + "\n";
+  }
+
+  RosHeader header(const std::string& frame) const { return {time_ns_, frame}; }
+
+  void put_force(const Step& step, const Load& first) {
+    const Load& load = step.loads.front();
+    if (step.loads.size() != 1) refuse("has several loads", step);
+    if (!load.force_n) refuse("the travel is imposed, not the force", step);
+    if (load.tool != first.tool || load.contact_m != first.contact_m || load.direction != first.direction ||
+        load.force_relative_std != first.force_relative_std || load.contact_std_m != first.contact_std_m)
+      refuse("tool, contact, direction or priors of the load differ from those of the push's first load", step);
+    const Vec3 aside = Vec3::Constant(load.force_std_n);
+    for (const double side : {1.0, -1.0}) {
+      if (load.force_std_n == 0 && side > 0) continue;
+      const std::int64_t at = time_ns_ - (side > 0 ? sample_gap_ns : 0);
+      put("/wrench", "geometry_msgs/msg/WrenchStamped", at,
+          encode(RosWrench{{at, "base"}, *load.force_n + side * aside, Vec3::Zero()}));
+    }
+  }
+
+  /// The tip that has gone that far: the recorded one where it says the same.
+  static Pose tip_at(const Load& load, double travel_m, const std::optional<Pose>& recorded) {
+    Pose pose = Pose::Identity();
+    if (recorded)
+      pose = *recorded;
+    else
+      pose.linear() = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), load.direction).toRotationMatrix();
+    if (!recorded) pose.translation() = load.contact_m;
+    const double short_m = travel_m - load.direction.dot(pose.translation() - load.contact_m);
+    if (std::abs(short_m) > 1e-12) pose.translation() += short_m * load.direction;
+    return pose;
+  }
+
+  std::size_t put_image(const DepthFrame& frame) {
+    std::size_t camera = 0;
+    while (camera < cameras_.size() && !same_camera(cameras_[camera].like, frame)) ++camera;
+    if (camera == cameras_.size()) {
+      cameras_.push_back({frame, fmt::format("camera_{}", camera + 1), false});
+      cameras_.back().like.depth_m.resize(0, 0);
+      cameras_.back().like.mask.resize(0, 0);
+    }
+    BagCamera& known = cameras_[camera];
+    const std::string root = "/" + known.name;
+    put("/tf", "tf2_msgs/msg/TFMessage", time_ns_,
+        encode(std::vector<RosTransform>{{header("base"), known.name, frame.T_base_camera}}));
+    put(root + "/depth/camera_info", "sensor_msgs/msg/CameraInfo", time_ns_,
+        encode(RosCameraInfo{header(known.name), frame.camera}));
+    put(root + "/depth/image", "sensor_msgs/msg/Image", time_ns_, encode(RosImage{header(known.name), frame.depth_m}));
+    if (frame.mask.size() > 0) {
+      known.has_mask = true;
+      put(root + "/mask", "sensor_msgs/msg/Image", time_ns_, encode(header(known.name), frame.mask));
+    }
+    return camera;
+  }
+
+  void put_cloud(const PointCloud& cloud, const Step& step) {
+    const bool first = channels_.count("/points") == 0;
+    if (cloud.sigma_m.size() != 1) refuse("the points of a cloud differ in their standard deviation", step);
+    if (first) cloud_ = cloud;
+    if (cloud.sigma_m[0] != cloud_.sigma_m[0] || cloud.pose_std_m != cloud_.pose_std_m ||
+        cloud.pose_std_rad != cloud_.pose_std_rad)
+      refuse("clouds differ in their standard deviations", step);
+    put("/points", "sensor_msgs/msg/PointCloud2", time_ns_, encode(RosPointCloud{header("base"), cloud}));
+  }
+
+  std::string mapping_text() const {
+    std::string text = "topics:\n  wrench: /wrench\n  marks: /palpate/marks\n";
+    if (channels_.count("/joint_states")) text += "  joints: /joint_states\n";
+    if (!cameras_.empty()) text += "  depth:\n";
+    for (const BagCamera& camera : cameras_) {
+      YamlLine noise, line;
+      noise.word("model", camera.like.noise.model);
+      if (camera.like.noise.model == "constant") noise.number("sigma_m", camera.like.noise.sigma_m);
+      noise.number_unless(0, "bias_std_m", camera.like.noise.bias_std_m);
+      line.put("image", "/" + camera.name + "/depth/image").put("info", "/" + camera.name + "/depth/camera_info");
+      if (camera.has_mask) line.put("mask", "/" + camera.name + "/mask");
+      line.put("noise", noise.str());
+      line.number_unless(0, "pose_std_m", camera.like.pose_std_m).number_unless(0, "pose_std_rad", camera.like.pose_std_rad);
+      text += "    - " + line.str() + "\n";
+    }
+    if (channels_.count("/points")) {
+      YamlLine line;
+      line.put("topic", "/points").number("sigma_m", cloud_.sigma_m[0]);
+      line.number_unless(0, "pose_std_m", cloud_.pose_std_m).number_unless(0, "pose_std_rad", cloud_.pose_std_rad);
+      text += "  clouds:\n    - " + line.str() + "\n";
+    }
+    text += "frames: {base: base, tip: tip}\nwrench: {reports: force_on_object, tare: none}\n";
+    // Every step has its own samples and image, at its own time.
+    text += "steps:\n  by: marks\n  window_s: 0.03\n  image_gap_s: 0.01\n";
+    if (recording_.tools.size() > 1) text += "  tool: " + yaml_word(recording_.tools.front().name) + "\n";
+    return text + "  pushes:\n" + pushes_;
+  }
+
+  std::string metadata_text(const std::string& file) const {
+    std::uint64_t total = 0;
+    std::string topics;
+    for (const auto& [name, channel] : channels_) {
+      total += channel.messages;
+      topics += fmt::format(
+          "    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: cdr\n"
+          "        offered_qos_profiles: \"\"\n      message_count: {}\n",
+          name, channel.type, channel.messages);
+    }
+    return fmt::format(
+        "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {}\n"
+        "  starting_time:\n    nanoseconds_since_epoch: {}\n  message_count: {}\n  topics_with_message_count:\n{}"
+        "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - {}\n",
+        std::max<std::int64_t>(0, last_ns_ - first_ns_), first_ns_, total, topics, file);
+  }
+
+  struct Channel {
+    std::uint16_t id;
+    std::string type;
+    std::uint64_t messages;
+  };
+  const Recording& recording_;
+  McapWriter mcap_;
+  std::map<std::string, Channel> channels_;
+  std::vector<BagCamera> cameras_;
+  PointCloud cloud_;
+  std::string pushes_;
+  std::int64_t time_ns_ = second_ns, first_ns_ = std::numeric_limits<std::int64_t>::max(), last_ns_ = 0;
+};
+
+}  // namespace
+
+void write_bag(const Recording& recording, const fs::path& given) {
+  std::error_code code;
+  fs::path folder = given.lexically_normal();
+  if (folder.filename().empty()) folder = folder.parent_path();
+  if (fs::exists(folder, code) && !(fs::is_directory(folder, code) && fs::is_empty(folder, code)))
+    throw Error("is there already; choose another folder or remove it", folder.string());
+  fs::create_directories(folder, code);
+  if (!fs::is_directory(folder, code)) throw Error("cannot be made; check the name and the permissions", folder.string());
+  BagWriter(recording).write(folder);
+}
+
+}  // namespace palpate::io

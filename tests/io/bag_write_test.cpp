@@ -1,0 +1,133 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// A recording written as a bag comes back as it was, and other people's readers can read it.
+#include "palpate/io/bag_write.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "io/made_up_recording.hpp"
+#include "io/recording_folder.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/io/message_source.hpp"
+#include "palpate/io/recording.hpp"
+
+namespace palpate::io {
+namespace {
+
+using namespace palpate::io::test;
+
+template <typename T>
+const T* observation(const Step& step) {
+  for (const Observation& one : step.observations)
+    if (const T* found = std::get_if<T>(&one)) return found;
+  return nullptr;
+}
+
+TEST(BagWrite, ComesBackAsItWas) {
+  const TemporaryFolder folder("bag_write");
+  const Recording recording = made_up();
+  write_bag(recording, folder.path() / "bag");
+  EXPECT_TRUE(is_bag(folder.path() / "bag"));
+  const Recording back = read_back(folder.path() / "bag");
+  EXPECT_EQ(back.rest.volume->nodes_m, recording.rest.volume->nodes_m);
+  EXPECT_EQ(back.supports.size(), 1u);
+  EXPECT_EQ(back.tools[0].radius_m, 0.02);
+  EXPECT_EQ(back.force_scale_std, 0.01);
+  ASSERT_EQ(back.pushes.size(), 2u);
+  for (std::size_t p = 0; p < 2; ++p) {
+    const Push &was = recording.pushes[p], &is = back.pushes[p];
+    EXPECT_EQ(is.name, was.name);
+    EXPECT_EQ(is.site, was.site);
+    EXPECT_EQ(is.force_tare_std_n, was.force_tare_std_n);
+    EXPECT_EQ(is.travel_offset_std_m, was.travel_offset_std_m);
+    ASSERT_EQ(is.steps.size(), was.steps.size());
+    for (std::size_t i = 0; i < is.steps.size(); ++i) {
+      const Step &a = was.steps[i], &b = is.steps[i];
+      EXPECT_EQ(b.unloading, a.unloading);
+      EXPECT_NEAR(b.time_s - is.steps[0].time_s, a.time_s - was.steps[0].time_s, 1e-9);
+      ASSERT_EQ(b.loads.size(), a.loads.size()) << p << " " << i;
+      if (!a.loads.empty()) {
+        EXPECT_LT((*b.loads[0].force_n - *a.loads[0].force_n).norm(), 1e-14);
+        EXPECT_NEAR(b.loads[0].force_std_n, a.loads[0].force_std_n, 1e-14);
+        EXPECT_EQ(b.loads[0].contact_m, a.loads[0].contact_m);
+        EXPECT_EQ(b.loads[0].direction, a.loads[0].direction);
+        EXPECT_EQ(b.loads[0].contact_std_m, a.loads[0].contact_std_m);
+        EXPECT_NEAR(observation<ToolTravel>(b)->travel_m, observation<ToolTravel>(a)->travel_m, 1e-14);
+        EXPECT_EQ(observation<ToolTravel>(b)->sigma_m, observation<ToolTravel>(a)->sigma_m);
+      }
+      const DepthFrame &seen = *observation<DepthFrame>(a), &read = *observation<DepthFrame>(b);
+      EXPECT_EQ(read.depth_m, seen.depth_m);
+      EXPECT_EQ(read.mask, seen.mask);
+      EXPECT_LT((read.T_base_camera.matrix() - seen.T_base_camera.matrix()).norm(), 1e-12);
+      EXPECT_EQ(read.camera.fy_px, seen.camera.fy_px);
+      EXPECT_EQ(read.noise.sigma_m, seen.noise.sigma_m);
+      EXPECT_EQ(read.noise.bias_std_m, seen.noise.bias_std_m);
+      EXPECT_EQ(read.pose_std_m, seen.pose_std_m);
+    }
+  }
+}
+
+TEST(BagWrite, WhatATopicCannotSayIsRefused) {
+  const TemporaryFolder folder("bag_refused");
+  Recording imposed = made_up();
+  imposed.pushes[0].steps[1].loads[0].force_n.reset();
+  imposed.pushes[0].steps[1].loads[0].travel_m = 0.01;
+  EXPECT_THROW(write_bag(imposed, folder.path() / "a"), Error);
+  Recording wrench = made_up();
+  wrench.pushes[0].steps[1].observations.emplace_back(Wrench{});
+  EXPECT_THROW(write_bag(wrench, folder.path() / "b"), Error);
+  folder.put("c/something", "x");
+  EXPECT_THROW(write_bag(made_up(), folder.path() / "c"), Error);
+}
+
+/// @mcap/core reads it by its index (and checks every check sum), @foxglove/rosmsg2-serialization decodes by the schemas in
+/// it.
+TEST(BagWrite, OtherPeoplesReadersReadIt) {
+  const std::filesystem::path peer = std::string(PALPATE_SOURCE_DIR) + "/tests/io/peer";
+  if (std::system("node --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "no node";
+  if (!std::filesystem::exists(peer / "node_modules/@mcap/core")) GTEST_SKIP() << "run `npm install` in tests/io/peer";
+  const TemporaryFolder folder("bag_peer");
+  const Recording recording = made_up();
+  write_bag(recording, folder.path() / "bag");
+  const std::string out = (folder.path() / "out.json").string();
+  ASSERT_EQ(std::system(("node '" + (peer / "read_mcap.mjs").string() + "' '" + (folder.path() / "bag/bag_0.mcap").string() +
+                         "' > '" + out + "'")
+                            .c_str()),
+            0);
+  const nlohmann::json all = nlohmann::json::parse(folder.get("out.json"));
+  const MessageSource ours = read_bag(folder.path() / "bag");
+  EXPECT_EQ(all["messages"].size(), ours.messages.size());
+  EXPECT_EQ(all["statistics"]["messageCount"].get<std::size_t>(), ours.messages.size());
+  EXPECT_EQ(all["profile"], "ros2");
+  std::size_t wrenches = 0, images = 0, infos = 0;
+  for (const auto& one : all["messages"]) {
+    const auto& data = one["data"];
+    if (one["topic"] == "/wrench") {
+      const auto& force = data["wrench"]["force"];
+      const Vec3 mean = *recording.pushes[wrenches / 6].steps[1 + wrenches % 6 / 2].loads[0].force_n;
+      const double std_n = recording.pushes[wrenches / 6].steps[1 + wrenches % 6 / 2].loads[0].force_std_n;
+      const double side = wrenches % 2 == 0 ? 1 : -1;
+      EXPECT_NEAR(force["z"].get<double>(), mean.z() + side * std_n, 1e-12);
+      EXPECT_EQ(data["header"]["frame_id"], "base");
+      ++wrenches;
+    } else if (one["topic"] == "/camera_1/depth/image") {
+      EXPECT_EQ(data["encoding"], "32FC1");
+      EXPECT_EQ(data["bytes"], 6 * 8 * 4);
+      ++images;
+    } else if (one["topic"] == "/camera_1/depth/camera_info") {
+      EXPECT_EQ(data["k"][4], 11);
+      EXPECT_EQ(data["distortion_model"], "plumb_bob");
+      ++infos;
+    }
+  }
+  EXPECT_EQ(wrenches, 12u);
+  EXPECT_EQ(images, 8u);
+  EXPECT_EQ(infos, 8u);
+}
+
+}  // namespace
+}  // namespace palpate::io
