@@ -9,6 +9,8 @@
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/estimation/load_columns.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/linear_response.hpp"
+#include "palpate/fem/materials.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -47,12 +49,13 @@ struct ForwardModel::Body {
   MatrixX free_motions;
   Eigen::SparseMatrix<double> forces;
   std::unique_ptr<fem::Statics> statics;
+  std::unique_ptr<fem::LinearResponse> response;  // linear materials only: surface rows, then the forces' own (3 a load)
 };
 
 struct ForwardModel::Coefficients {
   VectorX force, motion;
-  std::vector<int> columns;        // unknowns other than log E and nu that force or motion depend on
-  MatrixX d_force, d_motion;       // coefficients x columns
+  std::vector<int> columns;   // unknowns other than log E and nu that force or motion depend on
+  MatrixX d_force, d_motion;  // coefficients x columns
 };
 
 struct ForwardModel::Memory {
@@ -60,12 +63,20 @@ struct ForwardModel::Memory {
   VectorX unknowns;
   VectorX displacement_m;
   std::vector<int> columns;
-  MatrixX derivative;              // 3n x columns, object frame
+  MatrixX derivative;  // 3n x columns, object frame
+};
+
+/// Surface displacements, mean motions under the forces' columns (work-conjugate) and platens' reactions, with derivatives
+/// to log E, nu and the unknowns of Coefficients.
+struct ForwardModel::Watched {
+  VectorX moved_m, conjugate_m, reaction_n;
+  MatrixX d_moved, d_conjugate, d_reaction;
 };
 
 ForwardModel::~ForwardModel() = default;
 
-ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options)
+ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns,
+                           fem::StaticsOptions options)
     : recording_(&recording), object_(std::move(object)), options_(options) {
   // From a hundredth of a pascal to diamond: beyond that the fit has lost its way.
   unknowns.add({"young_modulus", "log Pa", 0, std::numeric_limits<double>::infinity(), std::log(1e-2), std::log(1.2e12)});
@@ -89,7 +100,8 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   }
   const auto add_clamp = [&](const std::string& suffix) {
     const int first = unknowns.size();
-    for (const auto& axis : xyz) unknowns.add({"clamp" + axis + suffix, "m", 0, clamp->pose_std_m, -1, 1, clamp->pose_std_m <= 0});
+    for (const auto& axis : xyz)
+      unknowns.add({"clamp" + axis + suffix, "m", 0, clamp->pose_std_m, -1, 1, clamp->pose_std_m <= 0});
     for (const auto& axis : xyz) {
       unknowns.add({"clamp_rotation" + axis + suffix, "rad", 0, clamp->pose_std_rad, -1, 1, clamp->pose_std_rad <= 0});
     }
@@ -115,7 +127,8 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     tare_axis_.push_back(axis);
     tare_.push_back(unknowns.add_block("force_tare" + in_push, "N", push.force_tare_std_n,
                                        axis.norm() > 0 ? std::vector<std::string>{""} : xyz));
-    const double offset_std_m = driven_tools(push).empty() ? 0 : push.travel_offset_std_m;  // else it belongs to the readings
+    const double offset_std_m =
+        driven_tools(push).empty() ? 0 : push.travel_offset_std_m;  // else it belongs to the readings
     travel_offset_.push_back(unknowns.add_block("travel_offset" + in_push, "m", offset_std_m, {""}));
     for (std::size_t s = 0; s < push.steps.size(); ++s) {
       steps_.push_back({p, s});
@@ -131,8 +144,12 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   }
   memory_.resize(steps_.size());
   workers_ = std::clamp<std::size_t>(static_cast<std::size_t>(std::max(options_.threads, 1)), 1, steps_.size());
-  options_.threads = 1;  // steps share the threads, not the solves in them
-  bodies_.resize(workers_);
+  linear_ = fem::material_law(object_.material).is_linear();
+  poisson_lower_ = unknowns[poisson].lower;
+  poisson_upper_ =
+      recording.model.poisson_fixed ? poisson_lower_ : unknowns[poisson].upper;  // one ratio needs no polynomial
+  if (!linear_) options_.threads = 1;  // steps share the threads, not the solves in them
+  bodies_.resize(linear_ ? 1 : workers_);
   solves_.assign(workers_, 0);
   for (std::size_t s = 0; s < steps_.size(); ++s) body_of(push(s), worker_of(s));
 }
@@ -157,8 +174,10 @@ void ForwardModel::forget() {
 }
 
 ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) {
-  auto& body = bodies_[worker][body_key(push)];
-  if (body) return *body;
+  auto& bodies = bodies_[linear_ ? 0 : worker];
+  const auto known = bodies.find(body_key(push));
+  if (known != bodies.end()) return *known->second;
+  auto& body = bodies[body_key(push)];
   body = std::make_unique<Body>();
 
   const auto tool_of = [&](const Load& load) -> const Tool& {
@@ -218,6 +237,17 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
   }
   body->forces = boundary.forces;
   body->statics = std::make_unique<fem::Statics>(object_.mesh, object_.material, std::move(boundary), options_);
+  if (linear_) {
+    Eigen::SparseMatrix<double, Eigen::RowMajor> watched =
+        object_.surface.rows(static_cast<Index>(object_.mesh.nodes_m.rows()));
+    const Index vertices = static_cast<Index>(watched.rows());
+    watched.conservativeResize(vertices + body->forces.cols(), watched.cols());
+    watched.bottomRows(body->forces.cols()) = Eigen::SparseMatrix<double, Eigen::RowMajor>(body->forces.transpose());
+    fem::LinearResponse::Options options;
+    options.poisson_lower = poisson_lower_;
+    options.poisson_upper = poisson_upper_;
+    body->response = std::make_unique<fem::LinearResponse>(*body->statics, watched, options);
+  }
   return *body;
 }
 
@@ -235,6 +265,8 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
   Coefficients c;
   c.force = VectorX::Zero(body.forces.cols());
   c.motion = VectorX::Zero(static_cast<Index>(body.motion_column.size()));
+  c.d_force.resize(c.force.size(), 0);
+  c.d_motion.resize(c.motion.size(), 0);
   std::map<int, int> column_of;
   const auto column = [&](int unknown) {
     const auto [it, fresh] = column_of.emplace(unknown, static_cast<int>(c.columns.size()));
@@ -281,7 +313,8 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     if (error >= 0) measured += unknowns.segment<3>(error);
     const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
     Vec3 tare = Vec3::Zero();
-    if (tare_[p] >= 0) tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
+    if (tare_[p] >= 0)
+      tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
     add_vector(first, scale * measured + tare);
     if (error >= 0) {
       for (int k = 0; k < 3; ++k) {
@@ -316,19 +349,47 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
   return c;
 }
 
-StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
-  const std::size_t worker = worker_of(s);
-  Body& body = body_of(push(s), worker);
-  const Coefficients c = coefficients(s, body, unknowns);
-  if (body.free_motions.cols() > 0 && c.force.size() > 0) {
-    const VectorX load = body.forces * c.force;
-    if ((body.free_motions.transpose() * load).cwiseAbs().maxCoeff() > 1e-6 * (load.lpNorm<1>() + 1e-12)) {
-      throw Error("the supports leave the object free to slide where a load acts on it; add the support that holds it, or give "
-                  "the load's normal component alone",
-                  step(s).source.empty() ? "supports" : step(s).source);
-    }
-  }
+ForwardModel::Watched ForwardModel::superpose(const Body& body, const Coefficients& c, const VectorX& unknowns,
+                                              StepPrediction& out) const {
+  const auto unit = body.response->at(unknowns(poisson));
+  const double young_pa = std::exp(unknowns(log_young));
+  const Index others = static_cast<Index>(c.columns.size()), rows = static_cast<Index>(unit->force.rows());
+  const Index seen = rows - static_cast<Index>(body.forces.cols());
+  const VectorX loaded = unit->force * (c.force / young_pa);
+  const VectorX all = loaded + unit->motion * c.motion;
+  MatrixX d(rows, 2 + others);
+  d.col(0) = -loaded;
+  d.col(1) = unit->force_d_poisson * (c.force / young_pa) + unit->motion_d_poisson * c.motion;
+  d.rightCols(others) = unit->force * (c.d_force / young_pa) + unit->motion * c.d_motion;
+  Watched watched;
+  watched.moved_m = all.head(seen);
+  watched.conjugate_m = all.tail(rows - seen);
+  watched.d_moved = d.topRows(seen);
+  watched.d_conjugate = d.bottomRows(rows - seen);
+  watched.reaction_n = unit->reaction_force * c.force + young_pa * (unit->reaction_motion * c.motion);
+  watched.d_reaction.resize(c.motion.size(), 2 + others);
+  watched.d_reaction.col(0) = young_pa * (unit->reaction_motion * c.motion);
+  watched.d_reaction.col(1) =
+      unit->reaction_force_d_poisson * c.force + young_pa * (unit->reaction_motion_d_poisson * c.motion);
+  watched.d_reaction.rightCols(others) = unit->reaction_force * c.d_force + young_pa * (unit->reaction_motion * c.d_motion);
+  // Gradients add up at most; the polynomial knows them at its nodes only, hence the margin.
+  const double gradient = c.force.cwiseAbs().dot(unit->largest_gradient_force) / young_pa +
+                          c.motion.cwiseAbs().dot(unit->largest_gradient_motion);
+  out.converged = true;
+  out.inverted_elements = gradient < 0.7 ? 0 : -1;
+  return watched;
+}
 
+int ForwardModel::inverted_elements(std::size_t s, const VectorX& unknowns) {
+  Body& body = body_of(push(s), worker_of(s));
+  const Coefficients c = coefficients(s, body, unknowns);
+  const auto at = body.statics->solve(std::exp(unknowns(log_young)), unknowns(poisson), c.force, c.motion);
+  return at.inverted_elements;
+}
+
+bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
+                              Watched& watched, StepPrediction& out) {
+  const std::size_t worker = worker_of(s);
   // Start from the last solution of this step, or else of the step before, moved along its derivatives.
   Memory& memory = memory_[s];
   const Memory* from = memory.valid ? &memory : nullptr;
@@ -351,48 +412,74 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
   };
   fem::Equilibrium at = solve(start.size() > 0 ? &start : nullptr);
   if (!at.converged && start.size() > 0) at = solve(nullptr);
-
-  StepPrediction out;
   out.converged = at.converged;
   out.reason = at.reason;
   out.inverted_elements = at.inverted_elements;
-  if (!at.converged) return out;
+  if (!at.converged) return false;
 
+  watched.moved_m = object_.surface.restrict(at.displacement_m);
   if (!derivatives) {
     memory = {true, unknowns, at.displacement_m, {}, MatrixX(at.displacement_m.size(), 0)};
-    const VectorX moved = object_.surface.restrict(at.displacement_m);
-    const RigidOffset clamp = clamp_offset(s, unknowns);
-    out.surface_m = object_.surface.rest().vertices_m;
+    return true;
+  }
+  const fem::SensitivityAlong d = body.statics->sensitivity_along(at, c.d_force, c.d_motion);
+  const Index others = static_cast<Index>(c.columns.size());
+  MatrixX field(at.displacement_m.size(), 2 + others);
+  field << d.d_log_young, d.d_poisson, d.d_along;
+  watched.d_moved = object_.surface.restrict(field);
+  watched.conjugate_m = body.forces.transpose() * at.displacement_m;
+  watched.d_conjugate = body.forces.transpose() * field;
+  watched.reaction_n = at.motion_reaction;
+  watched.d_reaction.resize(c.motion.size(), 2 + others);
+  watched.d_reaction << d.reaction_d_log_young, d.reaction_d_poisson, d.reaction_d_along;
+  memory = {true, unknowns, at.displacement_m, {log_young, poisson}, std::move(field)};
+  memory.columns.insert(memory.columns.end(), c.columns.begin(), c.columns.end());
+  return true;
+}
+
+StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
+  const std::size_t worker = worker_of(s);
+  Body& body = body_of(push(s), worker);
+  const Coefficients c = coefficients(s, body, unknowns);
+  if (body.free_motions.cols() > 0 && c.force.size() > 0) {
+    const VectorX load = body.forces * c.force;
+    if ((body.free_motions.transpose() * load).cwiseAbs().maxCoeff() > 1e-6 * (load.lpNorm<1>() + 1e-12)) {
+      throw Error(
+          "the supports leave the object free to slide where a load acts on it; add the support that holds it, or give "
+          "the load's normal component alone",
+          step(s).source.empty() ? "supports" : step(s).source);
+    }
+  }
+
+  StepPrediction out;
+  Watched at;
+  if (linear_) {
+    at = superpose(body, c, unknowns, out);
+    ++solves_[worker];
+  } else if (!solve_step(s, body, c, unknowns, derivatives, at, out)) {
+    return out;
+  }
+
+  const RigidOffset clamp = clamp_offset(s, unknowns);
+  const TriMesh& rest = object_.surface.rest();
+  if (!derivatives) {
+    out.surface_m = rest.vertices_m;
     for (Index v = 0; v < out.surface_m.rows(); ++v) {
-      out.surface_m.row(v) = clamp.apply(out.surface_m.row(v).transpose() + moved.segment<3>(3 * v));
+      out.surface_m.row(v) = clamp.apply(out.surface_m.row(v).transpose() + at.moved_m.segment<3>(3 * v));
     }
     return out;
   }
 
-  const fem::Sensitivity d = body.statics->sensitivity(at);
   out.columns = {log_young, poisson};
   out.columns.insert(out.columns.end(), c.columns.begin(), c.columns.end());
   const Index count = static_cast<Index>(out.columns.size());
-  const Index nodal = at.displacement_m.size();
-  MatrixX field(nodal, count);
-  field.col(0) = d.d_log_young;
-  field.col(1) = d.d_poisson;
-  for (Index k = 2; k < count; ++k) {
-    field.col(k).setZero();
-    if (c.force.size() > 0) field.col(k) += d.d_force * c.d_force.col(k - 2);
-    if (c.motion.size() > 0) field.col(k) += d.d_motion * c.d_motion.col(k - 2);
-  }
-  memory = {true, unknowns, at.displacement_m, out.columns, field};
 
   // Into the base frame: x = T(X + u).
-  const RigidOffset clamp = clamp_offset(s, unknowns);
   const Mat3 rotation = clamp.rotation();
-  const TriMesh& rest = object_.surface.rest();
-  const VectorX moved = object_.surface.restrict(at.displacement_m);
-  out.d_surface = object_.surface.restrict(field);
+  out.d_surface = std::move(at.d_moved);
   out.surface_m.resize(rest.vertices_m.rows(), 3);
   for (Index v = 0; v < rest.vertices_m.rows(); ++v) {
-    const Vec3 in_object = rest.vertices_m.row(v).transpose() + moved.segment<3>(3 * v);
+    const Vec3 in_object = rest.vertices_m.row(v).transpose() + at.moved_m.segment<3>(3 * v);
     out.surface_m.row(v) = clamp.apply(in_object);
     if (clamp_[s] < 0) continue;
     out.d_surface.middleRows<3>(3 * v) = (rotation * out.d_surface.middleRows<3>(3 * v)).eval();
@@ -418,14 +505,8 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
     if (load.travel_m) {
       const Vec3 direction = load.direction.normalized();
       const int m = body.motion_column.at(load.tool);
-      const double reaction = at.motion_reaction(m);
-      Eigen::RowVectorXd d_reaction(count);
-      d_reaction(0) = d.reaction_d_log_young(m);
-      d_reaction(1) = d.reaction_d_poisson(m);
-      for (Index k = 2; k < count; ++k) {
-        d_reaction(k) = (c.force.size() > 0 ? d.reaction_d_force.row(m).dot(c.d_force.col(k - 2)) : 0.0) +
-                        d.reaction_d_motion.row(m).dot(c.d_motion.col(k - 2));
-      }
+      const double reaction = at.reaction_n(m);
+      const Eigen::RowVectorXd d_reaction = at.d_reaction.row(m);
       out.force_n[at_load] = scale * reaction * direction;
       out.d_force[at_load] = scale * direction * d_reaction;
       for (Index k = 2; k < count; ++k) {
@@ -437,14 +518,12 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
       out.force_n[at_load] = load.force_n.value_or(Vec3::Zero());
       const auto found = body.force_column.find(key_of(load));
       if (found == body.force_column.end()) continue;
-      const MatrixX columns = MatrixX(body.forces.middleCols(found->second, 3));
       const Vec3 direction = rotation.transpose() * load.direction.normalized();
-      const VectorX weights = columns * direction;
-      out.travel_m(l) = weights.dot(at.displacement_m);
-      out.d_travel.row(l) = weights.transpose() * field;
+      const Vec3 mean_motion_m = at.conjugate_m.segment<3>(found->second);
+      out.travel_m(l) = direction.dot(mean_motion_m);
+      out.d_travel.row(l) = direction.transpose() * at.d_conjugate.middleRows<3>(found->second);
       if (clamp_[s] < 0) continue;
       // A turned clamp turns the object under the tool's direction.
-      const Vec3 mean_motion_m = columns.transpose() * at.displacement_m;
       const Mat3 turn = clamp.inverse_rotation_derivative(load.direction.normalized());
       for (Index k = 2; k < count; ++k) {
         const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s] - 3;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the unknowns to what the sensors should see: one static equilibrium a step, its surface in the base frame, the platens'
-// reactions, and the exact derivatives of all of it to every unknown that the step depends on.
+// From the unknowns to what the sensors should see: one static equilibrium a step, its surface in the base frame, the
+// platens' reactions, and the exact derivatives of all of it to every unknown that the step depends on.
 #pragma once
 
 #include <map>
@@ -24,14 +24,14 @@ struct StepIndex {
 struct StepPrediction {
   bool converged = false;
   std::string reason;
-  Points surface_m;             ///< simulated surface vertices, base frame
-  std::vector<int> columns;     ///< unknowns that the step depends on
-  MatrixX d_surface;            ///< 3v x columns
-  VectorX travel_m;             ///< a load: mean motion of its patch along the load's direction (work-conjugate)
-  MatrixX d_travel;             ///< loads x columns
-  std::vector<Vec3> force_n;    ///< a load: resultant on the object, base frame
+  Points surface_m;           ///< simulated surface vertices, base frame
+  std::vector<int> columns;   ///< unknowns that the step depends on
+  MatrixX d_surface;          ///< 3v x columns
+  VectorX travel_m;           ///< a load: mean motion of its patch along the load's direction (work-conjugate)
+  MatrixX d_travel;           ///< loads x columns
+  std::vector<Vec3> force_n;  ///< a load: resultant on the object, base frame
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> d_force;  ///< a load: 3 x columns
-  int inverted_elements = 0;
+  int inverted_elements = 0;                                      ///< -1: not counted, ask ForwardModel::inverted_elements
 };
 
 /// The object as the solver sees it.
@@ -59,6 +59,9 @@ class ForwardModel {
   /// @param derivatives  false: surface and converged only (the paper's method differentiates numerically)
   StepPrediction predict(std::size_t s, const VectorX& unknowns, bool derivatives = true);
 
+  /// Elements whose volume is gone at these unknowns; solves the step in full where the prediction cannot rule them out.
+  int inverted_elements(std::size_t s, const VectorX& unknowns);
+
   /// Several workers may predict at the same time, each on its own contiguous range of steps: first step of worker w (w ==
   /// workers(): one past the last). Answers depend on the number of workers only through where solves start from.
   std::size_t first_step_of(std::size_t worker) const { return worker * steps_.size() / workers_; }
@@ -70,9 +73,15 @@ class ForwardModel {
   int solves() const;
 
  private:
-  struct Body;         // one Statics: a set of platens and its columns of loads
+  struct Body;          // one Statics: a set of platens and its columns of loads
   struct Coefficients;  // of a step: a, b and their derivatives
-  struct Memory;       // of a step: where it was last solved
+  struct Memory;        // of a step: where it was last solved
+  struct Watched;       // what is seen of the body in one step, in the object's frame
+
+  /// False: no equilibrium, and `out` says why.
+  bool solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
+                  Watched& watched, StepPrediction& out);
+  Watched superpose(const Body& body, const Coefficients& c, const VectorX& unknowns, StepPrediction& out) const;
 
   std::size_t worker_of(std::size_t s) const;
   Body& body_of(const Push& push, std::size_t worker);
@@ -82,16 +91,18 @@ class ForwardModel {
   const Recording* recording_;
   SimulatedObject object_;
   fem::StaticsOptions options_;
+  double poisson_lower_ = 0, poisson_upper_ = 0;
   std::vector<StepIndex> steps_;
   std::size_t workers_ = 1;
-  std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies_;  // a worker: its own solver for each set of platens
+  bool linear_ = false;  // workers share one solver for each set of platens, else each has its own
+  std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies_;
   std::vector<Memory> memory_;
 
   Vec3 clamp_pivot_m_ = Vec3::Zero();
-  std::vector<int> clamp_;                        // a step: first of six unknowns, or -1
-  std::vector<std::vector<int>> force_error_;     // a step and load: first of three unknowns, or -1
-  std::vector<int> tare_, travel_offset_;         // a push: first of three, the one; or -1
-  std::vector<Vec3> tare_axis_;                   // a push: zero = three unknowns, else one along this axis
+  std::vector<int> clamp_;                     // a step: first of six unknowns, or -1
+  std::vector<std::vector<int>> force_error_;  // a step and load: first of three unknowns, or -1
+  std::vector<int> tare_, travel_offset_;      // a push: first of three, the one; or -1
+  std::vector<Vec3> tare_axis_;                // a push: zero = three unknowns, else one along this axis
   int force_scale_ = -1, density_ = -1;
   std::vector<int> solves_;  // a worker
 };

@@ -116,4 +116,17 @@ MatrixX SimulatedSurface::restrict(const MatrixX& nodal) const {
   return values;
 }
 
+Eigen::SparseMatrix<double> SimulatedSurface::rows(Index node_count) const {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Index v = 0; v < vertex_count(); ++v) {
+    for (int e = start_[static_cast<std::size_t>(v)]; e < start_[static_cast<std::size_t>(v) + 1]; ++e) {
+      const auto at = static_cast<std::size_t>(e);
+      for (int d = 0; d < 3; ++d) entries.emplace_back(3 * v + d, 3 * nodes_[at] + d, weights_[at]);
+    }
+  }
+  Eigen::SparseMatrix<double> matrix(3 * vertex_count(), 3 * node_count);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
 }  // namespace palpate::estimation

@@ -2,6 +2,7 @@
 // The surface that sensors see, as weights on the nodes of the simulated mesh.
 #pragma once
 
+#include <Eigen/SparseCore>
 #include <vector>
 
 #include "palpate/core/mesh.hpp"
@@ -23,6 +24,8 @@ class SimulatedSurface {
 
   /// Values at the surface vertices (rows) of a nodal vector field given as 3n x m (node-major): 3v x m.
   MatrixX restrict(const MatrixX& nodal) const;
+  /// The same as a matrix, 3v x 3 node_count.
+  Eigen::SparseMatrix<double> rows(Index node_count) const;
   Index vertex_count() const { return static_cast<Index>(rest_.vertices_m.rows()); }
 
  private:

@@ -92,7 +92,11 @@ void judge_nuisances(const VerdictInput& in, std::vector<Verdict>& out) {
 
 void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
   int inverted = 0;
-  for (const auto& prediction : in.objective.last_predictions()) inverted += prediction.inverted_elements;
+  const auto& predictions = in.objective.last_predictions();
+  for (std::size_t s = 0; s < predictions.size(); ++s) {
+    const int known = predictions[s].inverted_elements;
+    inverted += known >= 0 ? known : in.objective.model().inverted_elements(s, in.optimum.unknowns);
+  }
   if (inverted > 0 && in.answer.material == "linear") {
     out.push_back({"beyond_small_strain",
                    "In the largest steps " + std::to_string(inverted) +

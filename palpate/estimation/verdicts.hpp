@@ -11,7 +11,7 @@ namespace palpate::estimation {
 
 struct VerdictInput {
   const Recording& recording;
-  const Objective& objective;
+  Objective& objective;
   const Optimum& optimum;
   const ResidualSummary& residuals;
   const Identification& answer;  ///< parameters, nuisances and fit are filled

@@ -340,6 +340,19 @@ double Assembly::energy_and_forces(const MaterialLaw& law, const Moduli& m, cons
                                    : energy_and_forces_of<10, 4>(law, m, u, forces, inverted);
 }
 
+double Assembly::largest_gradient(const VectorX& u) const {
+  double largest = 0;
+  const auto look = [&](Index, int, const auto&, double, const Mat3& h) {
+    largest = std::max(largest, h.squaredNorm());
+    return true;
+  };
+  if (connectivity_.cols() == 4)
+    for_each_point<4, 1>(u, look);
+  else
+    for_each_point<10, 4>(u, look);
+  return std::sqrt(largest);
+}
+
 void Assembly::tangent(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const {
   if (connectivity_.cols() == 4)
     tangent_of<4, 1>(law, m, u, blocks);

@@ -45,6 +45,9 @@ class Assembly {
   double energy_and_forces(const MaterialLaw& law, const Moduli& m, const VectorX& u, VectorX& forces,
                            int* inverted = nullptr) const;
 
+  /// Largest Frobenius norm of the displacement gradient in a quadrature point. Below 1 no element is inside out.
+  double largest_gradient(const VectorX& u) const;
+
   /// Tangent stiffness in the pattern's blocks.
   void tangent(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
 

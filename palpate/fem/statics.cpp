@@ -314,7 +314,61 @@ struct Statics::Impl {
     return all;
   }
 
-  Sensitivity sensitivity(const Equilibrium& at) {
+  UnitResponses unit_responses(double poisson, const Eigen::SparseMatrix<double>& watched) {
+    const Index n = 3 * assembly.node_count();
+    if (watched.cols() != n) throw Error("needs " + std::to_string(n) + " columns", "watched");
+    const Index k = static_cast<Index>(boundary.forces.cols()), m = static_cast<Index>(motions.cols());
+    const Moduli unit = moduli(1.0, poisson);
+    factorise_linear(poisson, nullptr);
+    MatrixX values(watched.rows(), k + m), slopes(watched.rows(), k + m), reactions(m, k + m), reaction_slopes(m, k + m);
+    VectorX gradients(k + m);
+    UnitResponses out;
+    out.poisson_ratio = poisson;
+    constexpr Index bundle = 32;  // fills the factor's bundles; more would only take memory
+    for (Index first = 0; first < k + m; first += bundle) {
+      const Index count = std::min(bundle, k + m - first);
+      MatrixX rhs(n, count), imposed = MatrixX::Zero(n, count), external = MatrixX::Zero(n, count);
+      for (Index c = 0; c < count; ++c) {
+        const Index column = first + c;
+        if (column < k) {
+          external.col(c) = boundary.forces.col(column);
+          rhs.col(c) = external.col(c);
+        } else {
+          imposed.col(c) = motions.col(column - k);
+          rhs.col(c) = -assembly.multiply(blocks, imposed.col(c));
+        }
+      }
+      const MatrixX u = system.solve(rhs) + imposed;
+      values.middleCols(first, count) = watched * u;
+      for (Index c = 0; c < count; ++c) {
+        // K' u at E = 1; K u - F a is what supports carry, the rest of it what the solve left over.
+        const VectorX internal = assembly.multiply(blocks, u.col(c));
+        const VectorX left_over = system.free_part(internal - external.col(c));
+        const double scale = std::max(internal.norm(), external.col(c).norm());
+        if (scale > 0) out.residual = std::max(out.residual, left_over.norm() / scale);
+        gradients(first + c) = assembly.largest_gradient(u.col(c));
+        rhs.col(c) = -assembly.forces_d_poisson(law, unit, u.col(c));
+        reactions.col(first + c) = motions.transpose() * (internal - external.col(c));
+      }
+      const MatrixX du = system.solve(rhs);
+      slopes.middleCols(first, count) = watched * du;
+      for (Index c = 0; m > 0 && c < count; ++c)
+        reaction_slopes.col(first + c) = motions.transpose() * (assembly.multiply(blocks, du.col(c)) - rhs.col(c));
+    }
+    out.force = values.leftCols(k);
+    out.motion = values.rightCols(m);
+    out.force_d_poisson = slopes.leftCols(k);
+    out.motion_d_poisson = slopes.rightCols(m);
+    out.reaction_force = reactions.leftCols(k);
+    out.reaction_motion = reactions.rightCols(m);
+    out.reaction_force_d_poisson = reaction_slopes.leftCols(k);
+    out.reaction_motion_d_poisson = reaction_slopes.rightCols(m);
+    out.largest_gradient_force = gradients.head(k);
+    out.largest_gradient_motion = gradients.tail(m);
+    return out;
+  }
+
+  SensitivityAlong sensitivity(const Equilibrium& at, const MatrixX& along_force, const MatrixX& along_motion) {
     const Problem p =
         problem(at.young_modulus_pa, at.poisson_ratio, at.force_coefficients, at.motion_coefficients, at.extra);
     const VectorX& u = at.displacement_m;
@@ -337,34 +391,36 @@ struct Statics::Impl {
         }
       }
     }
-    const Index k = static_cast<Index>(boundary.forces.cols()), m = static_cast<Index>(motions.cols());
-    const Index x = static_cast<Index>(p.m.extra.size());
-    // K du = -df/dtheta (material), F (forces), -K M (motions)
-    MatrixX rhs(3 * assembly.node_count(), 2 + x + k + m);
+    const Index m = static_cast<Index>(motions.cols()), x = static_cast<Index>(p.m.extra.size());
+    const Index along = static_cast<Index>(along_force.cols());
+    if (along_force.rows() != boundary.forces.cols() || along_motion.rows() != m || along_motion.cols() != along)
+      throw Error("needs one row a coefficient, and as many columns for forces as for motions", "sensitivity_along");
+    // K du = -df/dtheta (material), F a' - K M b' (a direction a', b')
+    MatrixX rhs(3 * assembly.node_count(), 2 + x + along);
     VectorX internal;
     assembly.energy_and_forces(law, p.m, u, internal);
     rhs.col(0) = -internal;
     rhs.col(1) = -assembly.forces_d_poisson(law, p.m, u);
     for (Index i = 0; i < x; ++i) rhs.col(2 + i) = -assembly.forces_d_extra(law, p.m, u, static_cast<int>(i));
-    rhs.middleCols(2 + x, k) = MatrixX(boundary.forces);
-    for (Index j = 0; j < m; ++j) rhs.col(2 + x + k + j) = -scale * assembly.multiply(blocks, motions.col(j));
+    rhs.rightCols(along) = boundary.forces * along_force;
+    const MatrixX imposed = motions * along_motion;
+    for (Index j = 0; j < along; ++j)
+      if (!imposed.col(j).isZero(0)) rhs.col(2 + x + j) -= scale * assembly.multiply(blocks, imposed.col(j));
     MatrixX du = system.solve(rhs) / scale;
     // Reactions: M' (K du - rhs), with K du of the whole displacement.
     MatrixX reaction(m, du.cols());
     for (Index j = 0; m > 0 && j < du.cols(); ++j)
       reaction.col(j) = motions.transpose() * (scale * assembly.multiply(blocks, du.col(j)) - rhs.col(j));
-    du.rightCols(m) += motions;
-    Sensitivity out;
+    du.rightCols(along) += imposed;
+    SensitivityAlong out;
     out.d_log_young = du.col(0);
     out.d_poisson = du.col(1);
     out.d_extra = du.middleCols(2, x);
-    out.d_force = du.middleCols(2 + x, k);
-    out.d_motion = du.rightCols(m);
+    out.d_along = du.rightCols(along);
     out.reaction_d_log_young = reaction.col(0);
     out.reaction_d_poisson = reaction.col(1);
     out.reaction_d_extra = reaction.middleCols(2, x);
-    out.reaction_d_force = reaction.middleCols(2 + x, k);
-    out.reaction_d_motion = reaction.rightCols(m);
+    out.reaction_d_along = reaction.rightCols(along);
     return out;
   }
 
@@ -405,7 +461,33 @@ std::vector<Equilibrium> Statics::solve_many(double young_modulus_pa, double poi
   return impl_->solve_linear(young_modulus_pa, poisson_ratio, force_coefficients, motion_coefficients);
 }
 
-Sensitivity Statics::sensitivity(const Equilibrium& at) const { return impl_->sensitivity(at); }
+SensitivityAlong Statics::sensitivity_along(const Equilibrium& at, const MatrixX& force_directions,
+                                            const MatrixX& motion_directions) const {
+  return impl_->sensitivity(at, force_directions, motion_directions);
+}
+
+Sensitivity Statics::sensitivity(const Equilibrium& at) const {
+  const Index k = static_cast<Index>(impl_->boundary.forces.cols()), m = static_cast<Index>(impl_->motions.cols());
+  const MatrixX identity = MatrixX::Identity(k + m, k + m);
+  SensitivityAlong along = impl_->sensitivity(at, identity.topRows(k), identity.bottomRows(m));
+  Sensitivity out;
+  out.d_log_young = std::move(along.d_log_young);
+  out.d_poisson = std::move(along.d_poisson);
+  out.d_extra = std::move(along.d_extra);
+  out.d_force = along.d_along.leftCols(k);
+  out.d_motion = along.d_along.rightCols(m);
+  out.reaction_d_log_young = std::move(along.reaction_d_log_young);
+  out.reaction_d_poisson = std::move(along.reaction_d_poisson);
+  out.reaction_d_extra = std::move(along.reaction_d_extra);
+  out.reaction_d_force = along.reaction_d_along.leftCols(k);
+  out.reaction_d_motion = along.reaction_d_along.rightCols(m);
+  return out;
+}
+UnitResponses Statics::unit_responses(double poisson_ratio, const Eigen::SparseMatrix<double>& watched) const {
+  if (!is_linear()) throw Error("superposes loads only for a linear material", "Statics::unit_responses");
+  return impl_->unit_responses(poisson_ratio, watched);
+}
+
 bool Statics::is_linear() const { return impl_->law.is_linear(); }
 const TetMesh& Statics::mesh() const { return impl_->mesh; }
 const Boundary& Statics::boundary() const { return impl_->boundary; }

@@ -38,7 +38,7 @@ struct Boundary {
 enum class Dilatation {
   pointwise,  ///< as the law says: plain linear or quadratic tetrahedra
   averaged,   ///< the volume change is projected on continuous linear functions (quadratic tetrahedra: Taylor-Hood, right up
-             ///< to nu = 0.4999) or averaged over patches around nodes (linear ones)
+              ///< to nu = 0.4999) or averaged over patches around nodes (linear ones)
 };
 
 struct StaticsOptions {
@@ -78,6 +78,27 @@ struct Sensitivity {
   MatrixX reaction_d_motion;     ///< m x m
 };
 
+/// The same along a few directions of the coefficients: (a, b) moves by column c of (force_directions, motion_directions).
+struct SensitivityAlong {
+  VectorX d_log_young, d_poisson;                    ///< 3n
+  MatrixX d_extra, d_along;                          ///< 3n x e, 3n x c
+  VectorX reaction_d_log_young, reaction_d_poisson;  ///< m
+  MatrixX reaction_d_extra, reaction_d_along;        ///< m x e, m x c
+};
+
+/// What watched rows W u and the motions' reactions of a linear material are for unit coefficients, at E = 1 Pa:
+///   W u = (force a) / E + motion b,   reaction = (reaction_force a) + E (reaction_motion b).
+struct UnitResponses {
+  double poisson_ratio = 0;
+  MatrixX force, force_d_poisson;                      ///< r x k: per newton (or what a means), at E = 1
+  MatrixX motion, motion_d_poisson;                    ///< r x m
+  MatrixX reaction_force, reaction_force_d_poisson;    ///< m x k
+  MatrixX reaction_motion, reaction_motion_d_poisson;  ///< m x m
+  VectorX largest_gradient_force;   ///< k: largest Frobenius norm of the displacement gradient in any quadrature point
+  VectorX largest_gradient_motion;  ///< m
+  double residual = 0;              ///< largest of any column, relative
+};
+
 /// Immutable description (mesh, element, material, boundary) plus the symbolic analysis that all solves share. Calls are
 /// const but share scratch memory and the last factor: use one Statics a thread.
 class Statics {
@@ -101,9 +122,19 @@ class Statics {
   /// Re-factorises the tangent at `at` only if it is not the last one solved (linear material: once per nu).
   Sensitivity sensitivity(const Equilibrium& at) const;
 
+  /// One back-substitution a direction instead of one a coefficient. @param force_directions k x c  @param motion_directions
+  /// m x c
+  SensitivityAlong sensitivity_along(const Equilibrium& at, const MatrixX& force_directions,
+                                     const MatrixX& motion_directions) const;
+
   /// Many load cases of a linear material with one factor: columns of `force_coefficients` (k x cases).
   std::vector<Equilibrium> solve_many(double young_modulus_pa, double poisson_ratio, const MatrixX& force_coefficients,
                                       const MatrixX& motion_coefficients) const;
+
+  /// A linear material's answers to every unit coefficient at one nu, with their derivatives to nu: one factorisation and
+  /// 2 (k + m) back-substitutions in bundles. Every load case, E and derivative is then a sum of a few columns.
+  /// @param watched  r x 3n
+  UnitResponses unit_responses(double poisson_ratio, const Eigen::SparseMatrix<double>& watched) const;
 
   bool is_linear() const;
   const TetMesh& mesh() const;

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/linear_response.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::fem {
+namespace {
+
+// The compliance has poles where K(nu) is singular: nu = -1, and none with 1 - 2 nu > 0 else. In z the far half plane 1 - 2
+// nu < 0 starts at Im z = pi.
+double to_z(double nu) { return -std::log1p(-2 * nu); }
+double to_poisson(double z) { return -0.5 * std::expm1(-z); }
+double poisson_d_z(double z) { return 0.5 * std::exp(-z); }
+
+struct Range {
+  double middle, half;
+  double to_unit(double z) const { return (z - middle) / half; }
+};
+
+// Semi-axes of the largest Bernstein ellipse without a pole: the error of degree d falls like this to the power -d.
+double convergence_rate(const Range& range) {
+  const auto rho = [&](std::complex<double> pole) {
+    const std::complex<double> x = (pole - range.middle) / range.half;
+    const std::complex<double> root = std::sqrt(x * x - 1.0);
+    return std::max(std::abs(x + root), std::abs(x - root));
+  };
+  return std::min(rho({range.middle, EIGEN_PI}), rho({to_z(-1), 0}));
+}
+
+// Chebyshev polynomials T_0 .. T_{count-1} and their derivatives at x.
+void chebyshev(double x, VectorX& value, VectorX& slope) {
+  const Index count = value.size();
+  slope.resize(count);
+  double u_before = 0, u = 1;  // of the second kind: T_i' = i U_{i-1}
+  for (Index i = 0; i < count; ++i) {
+    value(i) = i == 0 ? 1 : i == 1 ? x : 2 * x * value(i - 1) - value(i - 2);
+    slope(i) = 0;
+    if (i == 0) continue;
+    slope(i) = static_cast<double>(i) * u;
+    const double next = 2 * x * u - u_before;
+    u_before = u;
+    u = next;
+  }
+}
+
+MatrixX stacked(const UnitResponses& r, bool slopes) {
+  const Index k = static_cast<Index>(r.force.cols()), m = static_cast<Index>(r.motion.cols()),
+              rows = static_cast<Index>(r.force.rows());
+  MatrixX all(rows + m + 1, k + m);
+  all.topLeftCorner(rows, k) = slopes ? r.force_d_poisson : r.force;
+  all.topRightCorner(rows, m) = slopes ? r.motion_d_poisson : r.motion;
+  all.block(rows, 0, m, k) = slopes ? r.reaction_force_d_poisson : r.reaction_force;
+  all.block(rows, k, m, m) = slopes ? r.reaction_motion_d_poisson : r.reaction_motion;
+  all.bottomRows<1>().setZero();
+  return all;
+}
+
+// The largest of the last two coefficients over the largest value at the nodes (the first half of `data`): of a column's
+// watched rows, and of reactions to forces and to motions, each kind on its own.
+double last_coefficients(const std::vector<MatrixX>& data, const std::vector<MatrixX>& coefficients, Index rows) {
+  const Index m = static_cast<Index>(data[0].rows()) - rows - 1, k = static_cast<Index>(data[0].cols()) - m;
+  double error = 0;
+  const auto compare = [&](Index row, Index column, Index height, Index width) {
+    if (height == 0 || width == 0) return;
+    double size = 0, tail = 0;
+    for (std::size_t j = 0; j < data.size() / 2; ++j)
+      size = std::max(size, data[j].block(row, column, height, width).cwiseAbs().maxCoeff());
+    for (std::size_t i = coefficients.size() - 2; i < coefficients.size(); ++i)
+      tail = std::max(tail, coefficients[i].block(row, column, height, width).cwiseAbs().maxCoeff());
+    if (size > 0) error = std::max(error, tail / size);
+  };
+  for (Index c = 0; c < k + m; ++c) compare(0, c, rows, 1);
+  compare(rows, 0, m, k);
+  compare(rows, k, m, m);
+  return error;
+}
+
+}  // namespace
+
+LinearResponse::LinearResponse(const Statics& statics, Eigen::SparseMatrix<double> watched, Options options)
+    : statics_(statics), watched_(std::move(watched)), options_(options) {
+  if (!statics.is_linear()) throw Error("superposes loads only for a linear material", "LinearResponse");
+  if (!(options_.tolerance > 0)) throw Error("must be positive", "LinearResponse::Options::tolerance");
+}
+
+double LinearResponse::interpolation_error() const {
+  const std::lock_guard lock(mutex_);
+  return std::max(error_, residual_);
+}
+
+int LinearResponse::factorisations() const {
+  const std::lock_guard lock(mutex_);
+  return factorisations_;
+}
+
+std::shared_ptr<const UnitResponses> LinearResponse::at(double poisson_ratio) const {
+  const std::lock_guard lock(mutex_);
+  for (auto& known : recent_)
+    if (known->poisson_ratio == poisson_ratio) return known;
+  const bool inside = poisson_ratio >= options_.poisson_lower && poisson_ratio <= options_.poisson_upper;
+  if (inside && usable_ && coefficients_.empty() && options_.poisson_upper > options_.poisson_lower) make_polynomial();
+  std::shared_ptr<const UnitResponses> answer;
+  if (inside && !coefficients_.empty()) {
+    answer = std::make_shared<UnitResponses>(interpolate(poisson_ratio));
+  } else {
+    answer = std::make_shared<UnitResponses>(statics_.unit_responses(poisson_ratio, watched_));
+    ++factorisations_;
+  }
+  // A search that is refused a step comes back to where it was.
+  recent_.push_back(answer);
+  if (recent_.size() > 4) recent_.erase(recent_.begin());
+  return answer;
+}
+
+void LinearResponse::make_polynomial() const {
+  const double low = to_z(options_.poisson_lower), high = to_z(options_.poisson_upper);
+  const Range range{0.5 * (low + high), 0.5 * (high - low)};
+  const double rate = convergence_rate(range);
+  // A margin of a hundred, since the error has a constant in front; then more, should the last coefficients say so.
+  double wanted = std::log(100 / options_.tolerance) / (2 * std::log(rate));
+  usable_ = false;
+  while (wanted <= options_.max_factorisations) {
+    const int nodes = std::max(3, static_cast<int>(std::ceil(wanted)));
+    const Index terms = 2 * nodes;
+    std::vector<MatrixX> data(static_cast<std::size_t>(terms));
+    MatrixX system(terms, terms);
+    VectorX value(terms), slope(terms);
+    VectorX gradients;
+    double residual = 0;
+    for (int j = 0; j < nodes; ++j) {
+      const double x = std::cos(EIGEN_PI * (2 * j + 1) / (2 * nodes));
+      const double z = range.middle + range.half * x;
+      const UnitResponses solved = statics_.unit_responses(to_poisson(z), watched_);
+      ++factorisations_;
+      residual = std::max(residual, solved.residual);
+      const auto at = static_cast<std::size_t>(j);
+      data[at] = stacked(solved, false);
+      if (16.0 * static_cast<double>(data[at].size()) * nodes > options_.memory_limit_bytes) return;
+      VectorX largest(data[at].cols());
+      largest << solved.largest_gradient_force, solved.largest_gradient_motion;
+      gradients = j == 0 ? largest : VectorX(gradients.cwiseMax(largest));
+      data[at + static_cast<std::size_t>(nodes)] = poisson_d_z(z) * range.half * stacked(solved, true);
+      chebyshev(x, value, slope);
+      system.row(j) = value.transpose();
+      system.row(nodes + j) = slope.transpose();
+    }
+    const MatrixX inverse = system.partialPivLu().inverse();
+    std::vector<MatrixX> coefficients(data.size());
+    for (std::size_t i = 0; i < data.size(); ++i) {
+      coefficients[i] = inverse(static_cast<Index>(i), 0) * data[0];
+      for (std::size_t j = 1; j < data.size(); ++j)
+        coefficients[i] += inverse(static_cast<Index>(i), static_cast<Index>(j)) * data[j];
+    }
+    const double error = last_coefficients(data, coefficients, static_cast<Index>(watched_.rows()));
+    if (error <= options_.tolerance) {
+      coefficients_ = std::move(coefficients);
+      coefficients_[0].bottomRows<1>() = gradients.transpose();
+      error_ = error;
+      residual_ = residual;
+      usable_ = true;
+      return;
+    }
+    wanted = nodes + 4;
+  }
+}
+
+UnitResponses LinearResponse::interpolate(double poisson_ratio) const {
+  const double low = to_z(options_.poisson_lower), high = to_z(options_.poisson_upper);
+  const Range range{0.5 * (low + high), 0.5 * (high - low)};
+  const double z = to_z(poisson_ratio);
+  VectorX value(static_cast<Index>(coefficients_.size())), slope;
+  chebyshev(range.to_unit(z), value, slope);
+  const double chain = 1 / (range.half * poisson_d_z(z));
+  MatrixX y = coefficients_[0];
+  MatrixX dy = MatrixX::Zero(y.rows(), y.cols());
+  for (std::size_t i = 1; i < coefficients_.size(); ++i) {
+    y += value(static_cast<Index>(i)) * coefficients_[i];
+    dy += chain * slope(static_cast<Index>(i)) * coefficients_[i];
+  }
+  const Index rows = static_cast<Index>(watched_.rows()), m = static_cast<Index>(y.rows()) - rows - 1;
+  const Index k = static_cast<Index>(y.cols()) - m;
+  UnitResponses out;
+  out.poisson_ratio = poisson_ratio;
+  out.force = y.topLeftCorner(rows, k);
+  out.motion = y.topRightCorner(rows, m);
+  out.force_d_poisson = dy.topLeftCorner(rows, k);
+  out.motion_d_poisson = dy.topRightCorner(rows, m);
+  out.reaction_force = y.block(rows, 0, m, k);
+  out.reaction_motion = y.block(rows, k, m, m);
+  out.reaction_force_d_poisson = dy.block(rows, 0, m, k);
+  out.reaction_motion_d_poisson = dy.block(rows, k, m, m);
+  out.largest_gradient_force = y.bottomRows<1>().head(k).transpose();
+  out.largest_gradient_motion = y.bottomRows<1>().tail(m).transpose();
+  out.residual = std::max(residual_, error_);
+  return out;
+}
+
+}  // namespace palpate::fem
