@@ -8,7 +8,9 @@
 namespace palpate::cli {
 
 std::span<const Verb> verb_table() {
-#define PALPATE_VERB_ROW(name, group, summary, example) Verb{#name, group, summary, example, &verbs::name},
+// A verb that is a word of C++ carries an underscore in the table.
+#define PALPATE_VERB_ROW(name, group, summary, example) \
+  Verb{std::string_view(#name) == "export_" ? "export" : #name, group, summary, example, &verbs::name},
   static constexpr std::array table{PALPATE_VERBS(PALPATE_VERB_ROW)};
 #undef PALPATE_VERB_ROW
   return table;

@@ -11,6 +11,7 @@
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/identify.hpp"
+#include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
 #include "palpate/report/report.hpp"
 
@@ -111,6 +112,7 @@ int estimate(Session& session, const Options& given) {
   answer.timing_s = clock.finish();
   io::write_result(answer, given.out);
   io::write_model(answer, found.volume, given.out / "model");
+  { const io::RecordingWriter object(given.out / "model", found.object); }
   report::write_report(answer, &recording, given.out / "report.html");
   if (!answer.parameters.empty()) tell(session, given, answer);
   session.say(fmt::format("written            {}", (given.out / "report.html").string()));

@@ -222,6 +222,13 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   out.answer.method = options.method;
   out.answer.provenance.merge(provenance(recording, options));
   out.volume = object.mesh;
+  out.object = std::move(recording);
+  out.object.rest = {};
+  out.object.rest.state = given.rest.state;
+  out.object.rest.volume = object.mesh;
+  out.object.pushes.clear();
+  out.object.robot.reset();
+  out.object.joint_names.clear();
   return out;
 }
 

@@ -25,6 +25,7 @@ struct IdentifyOptions {
 struct Identified {
   Identification answer;
   TetMesh volume;  ///< the simulated mesh at rest, for a simulation-ready model
+  Recording object;  ///< rest.volume = that mesh, with supports, tools, gravity and law as they were simulated; no pushes
 };
 
 /// @throws Error when no answer can exist: what() names the file or field and the cure.

@@ -21,7 +21,8 @@ struct Problem {
 /// Error naming file, line, field and cure.
 Recording read_recording(const std::filesystem::path& folder);
 
-/// The same without the checks that need the whole recording (`check_recording`); for `palpate info`.
+/// The same without the checks that need the whole recording (`check_recording`); for `palpate info`, and for an object
+/// without pushes.
 Recording read_recording_unchecked(const std::filesystem::path& folder);
 
 /// What is wrong with a recording, wherever it came from: sizes and units, orientation, fit of the clouds, depths and

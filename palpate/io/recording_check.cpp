@@ -63,7 +63,9 @@ class Checker {
       }
     }
     check_loads(loaded);
-    if (!observed)
+    if (recording_.pushes.empty())
+      add(recording_.source, "holds no push; list in 'pushes' what was done to the object");
+    else if (!observed)
       add(recording_.source,
           "no step holds an observation; add what the sensors saw (depth, cloud, markers, travel or wrench)");
     return std::move(problems_);

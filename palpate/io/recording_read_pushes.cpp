@@ -160,7 +160,6 @@ void read_pushes(const YamlField& field, RecordingContext& context) {
     }
     pushes.push_back(std::move(push));
   }
-  if (pushes.empty()) field.fail("holds no push");
 }
 
 }  // namespace palpate::io

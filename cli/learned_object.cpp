@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/learned_object.hpp"
+
+#include <set>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/io/recording.hpp"
+#include "palpate/io/result.hpp"
+
+namespace palpate::cli {
+
+namespace fs = std::filesystem;
+
+LearnedObject load_learned_object(const fs::path& given) {
+  std::error_code code;
+  const fs::path clean = given.lexically_normal();
+  fs::path out = clean.filename().empty() ? clean.parent_path() : clean;
+  if (!fs::exists(out / "result.json", code) && fs::exists(out.parent_path() / "result.json", code))
+    out = out.parent_path();  // OUT/model
+  LearnedObject learned;
+  learned.answer = io::read_result(out);
+  if (!fs::exists(out / "model" / "recording.yaml", code))
+    throw Error("holds no model/recording.yaml; run `palpate estimate` again", out.string());
+  learned.object = io::read_recording_unchecked(out / "model");
+  if (!learned.object.rest.volume) throw Error("holds no volume mesh", (out / "model").string());
+  return learned;
+}
+
+std::vector<Index> held_nodes(const Recording& object) {
+  std::set<Index> nodes;
+  for (const Support& support : object.supports) {
+    if (support.contact != ContactLaw::bonded) continue;
+    for (const Index node : fem::support_nodes(*object.rest.volume, support)) nodes.insert(node);
+  }
+  return {nodes.begin(), nodes.end()};
+}
+
+}  // namespace palpate::cli

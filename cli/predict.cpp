@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// `palpate predict OUT --contact X Y Z --force F`: what the learned object does under a new push, with bands.
+#include "palpate/prediction/predict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "cli/learned_object.hpp"
+#include "cli/verbs.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/load_columns.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/io/file.hpp"
+#include "palpate/io/mesh_file.hpp"
+#include "palpate/report/words.hpp"
+
+namespace palpate::cli {
+namespace {
+
+struct Options {
+  std::filesystem::path result, out;
+  std::vector<double> contact, direction;
+  double force_n = 0, travel_m = 0, radius_m = 0;
+  std::string tool;
+};
+
+Tool tool_of(const Options& given, const Recording& object) {
+  Tool tool;
+  const auto found =
+      std::find_if(object.tools.begin(), object.tools.end(), [&](const Tool& one) { return one.name == given.tool; });
+  if (!given.tool.empty()) {
+    if (found == object.tools.end()) throw Error("the recording had no tool of this name", "--tool " + given.tool);
+    tool = *found;
+  } else if (given.radius_m > 0) {
+    tool.name = "disc";
+    tool.shape = ToolShape::disc;
+  } else if (object.tools.size() == 1) {
+    tool = object.tools.front();
+  } else {
+    throw Error("say what pushes: --tool NAME (one of the recording's) or --radius METRES", "predict");
+  }
+  if (given.radius_m > 0) tool.radius_m = given.radius_m;
+  return tool;
+}
+
+fem::Boundary boundary_of(const Recording& object, const Tool& tool, const Load& load, VectorX& background) {
+  const TetMesh& mesh = *object.rest.volume;
+  fem::Boundary boundary;
+  const auto patch = estimation::load_columns(mesh, tool, load);
+  // Of a shape that was seen while it sagged, the weight is in the shape.
+  const bool heavy = object.rest.state == RestState::stress_free && object.environment.gravity_m_s2.norm() > 0;
+  std::vector<Eigen::Triplet<double>> entries;
+  const auto put = [&](const Eigen::SparseMatrix<double>& columns, int first) {
+    for (int c = 0; c < 3; ++c)
+      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, c); it; ++it)
+        entries.emplace_back(int(it.row()), first + c, it.value());
+  };
+  put(patch, 0);
+  if (heavy) {
+    if (!(object.density_kg_m3 > 0))
+      throw Error("gravity acts, so the density is needed", "model/recording.yaml: density_kg_m3");
+    put(fem::body_force(mesh), 3);
+    background = object.density_kg_m3 * object.environment.gravity_m_s2;
+  }
+  boundary.forces.resize(3 * mesh.nodes_m.rows(), heavy ? 6 : 3);
+  boundary.forces.setFromTriplets(entries.begin(), entries.end());
+  boundary.inertia_relief = object.free;
+  if (object.free) {
+    boundary.motions.resize(3 * mesh.nodes_m.rows(), 0);
+  } else {
+    estimation::HeldBody held = estimation::hold(mesh, object.supports, {});
+    boundary.constraints = std::move(held.constraints);
+    boundary.motions = std::move(held.motions);
+  }
+  return boundary;
+}
+
+nlohmann::json json_of(const prediction::Band& band) {
+  return {{"value", band.value}, {"std", band.std}, {"lower_95", band.lower_95}, {"upper_95", band.upper_95}};
+}
+
+MatrixX by_rows(const VectorX& field) { return Eigen::Map<const Points>(field.data(), field.size() / 3, 3); }
+
+int run(const Options& given, Session& session) {
+  const LearnedObject learned = load_learned_object(given.result);
+  const Recording& object = learned.object;
+  const TetMesh& mesh = *object.rest.volume;
+  const Tool tool = tool_of(given, object);
+  Load load;
+  load.tool = tool.name;
+  if (given.contact.size() == 3)
+    load.contact_m = Vec3(given.contact[0], given.contact[1], given.contact[2]);
+  else if (tool.shape != ToolShape::vertices)
+    throw Error("say where: --contact X Y Z, in metres", "predict");
+  if (given.direction.size() == 3) load.direction = Vec3(given.direction[0], given.direction[1], given.direction[2]);
+  if (!(load.direction.norm() > 0)) throw Error("must not be zero", "--direction");
+  load.direction.normalize();
+  prediction::NewPush push;
+  push.direction = load.direction;
+  if (given.force_n != 0) push.force_n = given.force_n;
+  if (given.travel_m != 0) push.travel_m = given.travel_m;
+  if (push.force_n.has_value() == push.travel_m.has_value()) throw Error("give either --force or --travel", "predict");
+  fem::Boundary boundary = boundary_of(object, tool, load, push.background);
+  const prediction::Elasticity elasticity = prediction::elasticity_of(learned.answer);
+  fem::StaticsOptions options;
+  options.threads = session.thread_count();
+  if (mesh.tetrahedra.cols() == 10 && elasticity.poisson_ratio > 0.45) options.dilatation = fem::Dilatation::averaged;
+  const prediction::Prediction found = prediction::predict(mesh, elasticity, std::move(boundary), push, options);
+  if (!found.converged) {
+    session.warn("no equilibrium was found: " + found.reason);
+    session.result({{"format", "palpate-prediction/1"}, {"converged", false}, {"reason", found.reason}});
+    return exit_numbers;
+  }
+  if (!found.reason.empty()) session.warn(found.reason);
+  const auto tell = [&](const char* what, const prediction::Band& band, const char* unit) {
+    session.say(
+        fmt::format("{:<20} {}{}", what, report::quantity(band.value, unit),
+                    band.std > 0 ? "   95 % band " + report::interval(band.lower_95, band.upper_95, unit) : "   (given)"));
+  };
+  tell("force", found.force_n, "N");
+  tell("travel", found.travel_m, "m");
+  tell("largest motion", found.largest_displacement_m, "m");
+  tell("largest stress", found.largest_von_mises_pa, "Pa");
+  session.say(fmt::format("stiffness            {:.4g} N/m (of the force to the travel there)", found.stiffness_n_m));
+  if (elasticity.covariance.norm() == 0) session.warn("the result holds no covariance: the bands have no width");
+  nlohmann::json json = {{"format", "palpate-prediction/1"},
+                         {"converged", true},
+                         {"material", elasticity.material},
+                         {"young_modulus_pa", elasticity.young_modulus_pa},
+                         {"poisson_ratio", elasticity.poisson_ratio},
+                         {"tool", tool.name},
+                         {"contact_m", {load.contact_m.x(), load.contact_m.y(), load.contact_m.z()}},
+                         {"direction", {load.direction.x(), load.direction.y(), load.direction.z()}},
+                         {"force_n", json_of(found.force_n)},
+                         {"travel_m", json_of(found.travel_m)},
+                         {"stiffness_n_m", found.stiffness_n_m},
+                         {"largest_displacement_m", json_of(found.largest_displacement_m)},
+                         {"largest_von_mises_pa", json_of(found.largest_von_mises_pa)},
+                         {"inverted_elements", found.inverted_elements}};
+  if (!given.out.empty()) {
+    std::error_code code;
+    std::filesystem::create_directories(given.out, code);
+    io::MeshData data;
+    data.points_m = mesh.nodes_m;
+    data.tetrahedra = mesh.tetrahedra;
+    data.point_fields["displacement_m"] = by_rows(found.displacement_m);
+    data.point_fields["displacement_std_m"] = by_rows(found.displacement_std_m);
+    data.point_fields["von_mises_pa"] = found.von_mises_pa;
+    data.point_fields["von_mises_std_pa"] = found.von_mises_std_pa;
+    io::write_mesh(given.out / "prediction.vtu", data);
+    io::write_file(given.out / "prediction.json", json.dump(1) + "\n");
+    session.say(fmt::format("written              {}", (given.out / "prediction.vtu").string()));
+  }
+  session.result(json);
+  return exit_done;
+}
+
+}  // namespace
+
+Run verbs::predict(CLI::App& app) {
+  auto given = std::make_shared<Options>();
+  app.add_option("result", given->result, "folder that `palpate estimate` wrote")->required();
+  app.add_option("--contact", given->contact, "where the push acts, X Y Z in metres, base frame")
+      ->expected(3)
+      ->type_name("");
+  app.add_option("--direction", given->direction, "of the push, into the object (0 0 -1)")->expected(3)->type_name("");
+  app.add_option("--force", given->force_n, "along the direction, N");
+  app.add_option("--travel", given->travel_m, "of the pressed patch along the direction, m, instead of a force");
+  app.add_option("--tool", given->tool, "tool of the recording (its only one)");
+  app.add_option("--radius", given->radius_m, "radius of the pressed patch, m (that of the tool)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("-o,--out", given->out,
+                 "folder for prediction.json and prediction.vtu (displacement and stress with bands)");
+  return [given](Session& session) { return run(*given, session); };
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Input decks of CalculiX and Abaqus: same keywords; each prints the displacements in its own way. Their ten-node tetrahedra
+// number the midpoints of edges 01, 12, 02, 03, 13, 23, as TetMesh does.
+#include <fmt/format.h>
+
+#include "palpate/io/export_formats.hpp"
+
+namespace palpate::io {
+namespace {
+
+// CalculiX reads 20 characters of a number and no more: 13 digits fit with sign and exponent.
+
+std::string deck(const ExportModel& model, const std::string& output) {
+  const auto& mesh = model.mesh;
+  std::string text = fmt::format("*HEADING\n{}: metres, newtons, pascals\n*NODE, NSET=NALL\n", model.name);
+  for (Eigen::Index i = 0; i < mesh.nodes_m.rows(); ++i)
+    text +=
+        fmt::format("{}, {:.13g}, {:.13g}, {:.13g}\n", i + 1, mesh.nodes_m(i, 0), mesh.nodes_m(i, 1), mesh.nodes_m(i, 2));
+  text += fmt::format("*ELEMENT, TYPE={}, ELSET=EALL\n", mesh.tetrahedra.cols() == 10 ? "C3D10" : "C3D4");
+  for (Eigen::Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
+    text += std::to_string(t + 1);
+    for (Eigen::Index k = 0; k < mesh.tetrahedra.cols(); ++k) text += ", " + std::to_string(mesh.tetrahedra(t, k) + 1);
+    text += "\n";
+  }
+  text += fmt::format("*MATERIAL, NAME=LEARNED\n*ELASTIC\n{:.13g}, {:.13g}\n", model.young_modulus_pa, model.poisson_ratio);
+  if (model.density_kg_m3 > 0) text += fmt::format("*DENSITY\n{:.13g}\n", model.density_kg_m3);
+  text += "*SOLID SECTION, ELSET=EALL, MATERIAL=LEARNED\n";
+  if (!model.fixed.empty()) {
+    text += "*NSET, NSET=FIXED\n" + joined_indices(model.fixed, ",\n", 1) + "\n*BOUNDARY\nFIXED, 1, 3\n";
+  }
+  text += "*STEP\n*STATIC\n";
+  const double g = model.gravity_m_s2.norm();
+  if (g > 0 && model.density_kg_m3 > 0) {
+    const Vec3 way = model.gravity_m_s2 / g;
+    text += fmt::format("*DLOAD\nEALL, GRAV, {:.13g}, {:.13g}, {:.13g}, {:.13g}\n", g, way.x(), way.y(), way.z());
+  }
+  if (!model.forces_n.empty()) {
+    text += "*CLOAD\n";
+    for (const auto& [node, force] : model.forces_n)
+      for (int d = 0; d < 3; ++d)
+        if (force(d) != 0) text += fmt::format("{}, {}, {:.13g}\n", node + 1, d + 1, force(d));
+  }
+  return text + output + "*END STEP\n";
+}
+
+}  // namespace
+
+ExportFiles export_calculix(const ExportModel& model) {
+  return {{"object.inp", deck(model, "*NODE PRINT, NSET=NALL\nU\n*NODE FILE\nU\n*EL FILE\nS\n")}};
+}
+
+ExportFiles export_abaqus(const ExportModel& model) {
+  return {{"object.inp", deck(model, "*OUTPUT, FIELD\n*NODE OUTPUT\nU\n*ELEMENT OUTPUT\nS\n")}};
+}
+
+}  // namespace palpate::io

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/io/exporters.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "palpate/core/error.hpp"
+#include "palpate/io/export_formats.hpp"
+#include "palpate/io/yaml_field.hpp"
+
+namespace palpate::io {
+
+std::span<const Exporter> exporters() {
+  static const std::array<Exporter, 8> table = {{
+      {"calculix", "object.inp", "CalculiX: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, export_calculix},
+      {"abaqus", "object.inp", "Abaqus: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, export_abaqus},
+      {"febio", "object.feb", "FEBio 4: tet4 or tet10, isotropic elastic; nothing to correct", true, false, export_febio},
+      {"sofa", "object.scn", "SOFA: TetrahedronFEMForceField, method large (corotational); nothing to correct", false, true,
+       export_sofa},
+      {"mujoco", "object.xml",
+       "MuJoCo 3.13 or later: flex; E and nu are changed so that its energy, which uses 2 lambda, becomes ours", false, true,
+       export_mujoco},
+      {"drake", "object.sdf", "Drake: SDF with deformable_properties, linear_corotated (its neohookean would act softer)",
+       false, true, export_drake},
+      {"bullet", "object.py",
+       "PyBullet: loadSoftBody with its Neo-Hookean law; its constants are changed so that small strains agree", false, true,
+       export_bullet},
+      {"usd", "object.usda", "USD: volume deformable body and material of UsdPhysics", false, true, export_usd},
+  }};
+  return table;
+}
+
+const Exporter& exporter_named(const std::string& name) {
+  std::vector<std::string> known;
+  for (const Exporter& one : exporters()) {
+    if (one.name == name) return one;
+    known.push_back(one.name);
+  }
+  const auto near = nearest_word(name, known);
+  throw Error("is no simulator that is known" + (near ? "; did you mean '" + *near + "'?" : std::string()) +
+                  " Known: " + fmt::format("{}", fmt::join(known, ", ")),
+              name);
+}
+
+ExportModel with_linear_elements(const ExportModel& model) {
+  if (model.mesh.tetrahedra.cols() == 4) return model;
+  ExportModel linear = model;
+  const Index nodes = static_cast<Index>(model.mesh.nodes_m.rows());
+  std::vector<Index> place(static_cast<std::size_t>(nodes), -1);
+  constexpr int edges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+  std::vector<std::pair<Index, Index>> ends(static_cast<std::size_t>(nodes), {-1, -1});
+  Index count = 0;
+  linear.mesh.tetrahedra.resize(model.mesh.tetrahedra.rows(), 4);
+  for (Eigen::Index t = 0; t < model.mesh.tetrahedra.rows(); ++t) {
+    for (int k = 0; k < 4; ++k) place[static_cast<std::size_t>(model.mesh.tetrahedra(t, k))] = 0;
+    for (int e = 0; e < 6; ++e)
+      ends[static_cast<std::size_t>(model.mesh.tetrahedra(t, 4 + e))] = {model.mesh.tetrahedra(t, edges[e][0]),
+                                                                         model.mesh.tetrahedra(t, edges[e][1])};
+  }
+  for (Index& one : place)
+    if (one == 0) one = count++;
+  linear.mesh.nodes_m.resize(count, 3);
+  for (Index i = 0; i < nodes; ++i)
+    if (place[static_cast<std::size_t>(i)] >= 0)
+      linear.mesh.nodes_m.row(place[static_cast<std::size_t>(i)]) = model.mesh.nodes_m.row(i);
+  for (Eigen::Index t = 0; t < model.mesh.tetrahedra.rows(); ++t)
+    for (int k = 0; k < 4; ++k) linear.mesh.tetrahedra(t, k) = place[static_cast<std::size_t>(model.mesh.tetrahedra(t, k))];
+  linear.fixed.clear();
+  for (const Index node : model.fixed)
+    if (place[static_cast<std::size_t>(node)] >= 0) linear.fixed.push_back(place[static_cast<std::size_t>(node)]);
+  std::map<Index, Vec3> forces;
+  const auto add = [&](Index node, const Vec3& force) {
+    auto [it, fresh] = forces.emplace(place[static_cast<std::size_t>(node)], force);
+    if (!fresh) it->second += force;
+  };
+  for (const auto& [node, force] : model.forces_n) {
+    const auto& [a, b] = ends[static_cast<std::size_t>(node)];
+    if (place[static_cast<std::size_t>(node)] >= 0) {
+      add(node, force);
+    } else if (a >= 0) {
+      add(a, 0.5 * force);
+      add(b, 0.5 * force);
+    }
+  }
+  linear.forces_n.assign(forces.begin(), forces.end());
+  return linear;
+}
+
+ExportFiles export_files(const Exporter& exporter, const ExportModel& model) {
+  const auto nodes = model.mesh.nodes_m.rows();
+  if (model.mesh.tetrahedra.rows() == 0) throw Error("has no tetrahedra", "export: mesh");
+  if (model.mesh.tetrahedra.minCoeff() < 0 || model.mesh.tetrahedra.maxCoeff() >= nodes)
+    throw Error("names nodes that are not there", "export: mesh");
+  if (!(model.young_modulus_pa > 0)) throw Error("must be positive", "export: young_modulus_pa");
+  if (!(model.poisson_ratio >= 0 && model.poisson_ratio < 0.5)) throw Error("must be in [0, 0.5)", "export: poisson_ratio");
+  if (exporter.needs_density && !(model.density_kg_m3 > 0))
+    throw Error(exporter.name + " simulates motion: give the object's density (--density, kg/m3)", "export: density_kg_m3");
+  const auto outside = [&](Index node) { return node < 0 || node >= nodes; };
+  if (std::any_of(model.fixed.begin(), model.fixed.end(), outside) ||
+      std::any_of(model.forces_n.begin(), model.forces_n.end(), [&](const auto& one) { return outside(one.first); }))
+    throw Error("names nodes that are not there", "export: fixed, forces_n");
+  return exporter.write(exporter.quadratic ? model : with_linear_elements(model));
+}
+
+LameConstants lame_constants(double young, double nu) {
+  return {young / (2 * (1 + nu)), young * nu / ((1 + nu) * (1 - 2 * nu))};
+}
+
+std::string joined_indices(const std::vector<Index>& indices, const char* separator, Index first) {
+  std::string text;
+  for (const Index index : indices) text += (text.empty() ? "" : separator) + std::to_string(index + first);
+  return text;
+}
+
+std::string ascii_vtk(const ExportModel& model) {
+  std::string text = fmt::format("# vtk DataFile Version 3.0\n{}\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n",
+                                 model.name, model.mesh.nodes_m.rows());
+  for (Eigen::Index i = 0; i < model.mesh.nodes_m.rows(); ++i)
+    text += fmt::format("{} {} {}\n", model.mesh.nodes_m(i, 0), model.mesh.nodes_m(i, 1), model.mesh.nodes_m(i, 2));
+  const Eigen::Index cells = model.mesh.tetrahedra.rows();
+  text += fmt::format("CELLS {} {}\n", cells, 5 * cells);
+  for (Eigen::Index t = 0; t < cells; ++t) {
+    const auto tet = model.mesh.tetrahedra.row(t);
+    text += fmt::format("4 {} {} {} {}\n", tet(0), tet(1), tet(2), tet(3));
+  }
+  text += fmt::format("CELL_TYPES {}\n", cells);
+  for (Eigen::Index t = 0; t < cells; ++t) text += "10\n";
+  return text;
+}
+
+Triangles export_surface(const ExportModel& model) {
+  constexpr int faces[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+  std::map<std::array<Index, 3>, std::pair<int, std::array<Index, 3>>> seen;
+  for (Eigen::Index t = 0; t < model.mesh.tetrahedra.rows(); ++t) {
+    for (const auto& face : faces) {
+      const std::array<Index, 3> as_is = {model.mesh.tetrahedra(t, face[0]), model.mesh.tetrahedra(t, face[1]),
+                                          model.mesh.tetrahedra(t, face[2])};
+      std::array<Index, 3> key = as_is;
+      std::sort(key.begin(), key.end());
+      auto& entry = seen[key];
+      ++entry.first;
+      entry.second = as_is;
+    }
+  }
+  std::vector<std::array<Index, 3>> boundary;
+  for (const auto& [key, entry] : seen)
+    if (entry.first == 1) boundary.push_back(entry.second);
+  Triangles triangles(static_cast<Eigen::Index>(boundary.size()), 3);
+  for (std::size_t i = 0; i < boundary.size(); ++i)
+    for (int k = 0; k < 3; ++k) triangles(static_cast<Eigen::Index>(i), k) = boundary[i][static_cast<std::size_t>(k)];
+  return triangles;
+}
+
+}  // namespace palpate::io

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// The learned object for other simulators. An exporter is one file export_NAME.cpp and one line in the table of
+// exporters.cpp; the contract test and the command line loop over the table.
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "palpate/core/mesh.hpp"
+
+namespace palpate::io {
+
+/// What a simulator needs of an object. E and nu are those of small strains.
+struct ExportModel {
+  std::string name = "object";
+  TetMesh mesh;  ///< linear or quadratic
+  double young_modulus_pa = 0, poisson_ratio = 0;
+  double density_kg_m3 = 0;  ///< 0 = unknown
+  std::vector<Index> fixed;  ///< nodes that supports hold
+  Vec3 gravity_m_s2 = Vec3::Zero();
+  std::vector<std::pair<Index, Vec3>> forces_n;  ///< at nodes: a load to try the model with; static solvers take it
+};
+
+using ExportFiles =
+    std::map<std::string, std::string>;  ///< file name -> bytes; the first to open stands in Exporter::main_file
+
+struct Exporter {
+  std::string name;            ///< "calculix"
+  std::string main_file;       ///< what to open, e.g. "object.inp"
+  std::string about;           ///< what is written, and what was done so that E and nu mean there what they mean here
+  bool quadratic = false;      ///< takes ten-node tetrahedra; others get the corners
+  bool needs_density = false;  ///< simulates motion
+  ExportFiles (*write)(const ExportModel& model) = nullptr;
+};
+
+std::span<const Exporter> exporters();
+/// @throws Error that lists the table's names.
+const Exporter& exporter_named(const std::string& name);
+
+/// Checks the model, gives the exporter what it takes and returns its files.
+/// @throws Error for E <= 0, nu outside [0, 0.5), a missing density where one is needed, no tetrahedra, indices out of
+/// range.
+ExportFiles export_files(const Exporter& exporter, const ExportModel& model);
+
+/// Corners of quadratic tetrahedra alone, nodes renumbered; `fixed` and loads that name midpoints go to the edge's ends.
+ExportModel with_linear_elements(const ExportModel& model);
+
+}  // namespace palpate::io

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/LU>
+#include <cmath>
+#include <vector>
+
+#include "palpate/fem/materials.hpp"
+#include "palpate/fem/tetrahedron.hpp"
+#include "palpate/prediction/predict.hpp"
+
+namespace palpate::prediction {
+namespace {
+
+/// Derivatives of the shape functions to the barycentric coordinates: nodes x 4.
+Eigen::Matrix<double, Eigen::Dynamic, 4> shape_derivatives(Index nodes, const Eigen::Vector4d& at) {
+  Eigen::Matrix<double, Eigen::Dynamic, 4> d = Eigen::Matrix<double, Eigen::Dynamic, 4>::Zero(nodes, 4);
+  if (nodes == 4) {
+    d.setIdentity();
+    return d;
+  }
+  for (int k = 0; k < 4; ++k) d(k, k) = 4 * at(k) - 1;
+  for (int e = 0; e < 6; ++e) {
+    const int a = fem::kTetEdges[e][0], b = fem::kTetEdges[e][1];
+    d(4 + e, a) = 4 * at(b);
+    d(4 + e, b) = 4 * at(a);
+  }
+  return d;
+}
+
+double von_mises_of(const Mat3& cauchy) {
+  const Mat3 deviator = cauchy - cauchy.trace() / 3 * Mat3::Identity();
+  return std::sqrt(1.5) * deviator.norm();
+}
+
+}  // namespace
+
+VectorX von_mises(const TetMesh& mesh, const std::string& material, double young_modulus_pa, double poisson_ratio,
+                  const VectorX& extra, const VectorX& displacement_m) {
+  const fem::MaterialLaw& law = fem::material_law(material);
+  const fem::Moduli moduli = fem::moduli(young_modulus_pa, poisson_ratio, extra);
+  const Index nodes = Index(mesh.tetrahedra.cols());
+  const auto points = nodes == 10 ? fem::tet_quadrature_4() : fem::tet_quadrature_1();
+  VectorX sum = VectorX::Zero(mesh.nodes_m.rows()), weight = sum;
+  MatrixX x(nodes, 3), u(nodes, 3);
+  for (Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
+    for (Index k = 0; k < nodes; ++k) {
+      const Index node = mesh.tetrahedra(t, k);
+      x.row(k) = mesh.nodes_m.row(node);
+      u.row(k) = displacement_m.segment<3>(3 * node);
+    }
+    double stress = 0, volume = 0;
+    for (const auto& point : points) {
+      const auto d = shape_derivatives(nodes, point.barycentric);
+      // Reference coordinates are the last three barycentric ones.
+      Eigen::Matrix<double, Eigen::Dynamic, 3> d_reference(nodes, 3);
+      for (int k = 0; k < 3; ++k) d_reference.col(k) = d.col(k + 1) - d.col(0);
+      const Mat3 jacobian = x.transpose() * d_reference;  // dx / d reference
+      const Mat3 gradient = u.transpose() * d_reference * jacobian.inverse();
+      Mat3 first = Mat3::Zero();
+      if (!std::isfinite(law.energy_and_stress(moduli, gradient, first))) continue;
+      const Mat3 f = Mat3::Identity() + gradient;
+      // A law of small strains knows no difference between the stresses.
+      const Mat3 cauchy = law.is_linear() ? first : Mat3(first * f.transpose() / f.determinant());
+      const double w = point.weight * std::abs(jacobian.determinant());
+      stress += w * von_mises_of(cauchy);
+      volume += w;
+    }
+    for (Index k = 0; k < nodes; ++k) {
+      sum(mesh.tetrahedra(t, k)) += stress;
+      weight(mesh.tetrahedra(t, k)) += volume;
+    }
+  }
+  return (weight.array() > 0).select(sum.array() / weight.array().max(1e-300), 0.0);
+}
+
+}  // namespace palpate::prediction
