@@ -148,7 +148,8 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   poisson_lower_ = unknowns[poisson].lower;
   poisson_upper_ =
       recording.model.poisson_fixed ? poisson_lower_ : unknowns[poisson].upper;  // one ratio needs no polynomial
-  if (!linear_) options_.threads = 1;  // steps share the threads, not the solves in them
+  // Steps share the threads; the solves in them use what is left over.
+  if (!linear_) options_.threads = std::max(1, options_.threads / static_cast<int>(workers_));
   bodies_.resize(linear_ ? 1 : workers_);
   solves_.assign(workers_, 0);
   for (std::size_t s = 0; s < steps_.size(); ++s) body_of(push(s), worker_of(s));
@@ -400,6 +401,9 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
       const double change = unknowns(from->columns[k]) - from->unknowns(from->columns[k]);
       if (change != 0) start += change * from->derivative.col(static_cast<Index>(k));
     }
+    // A straight line is no good guess for a far step.
+    const double moved_m = (start - from->displacement_m).lpNorm<Eigen::Infinity>();
+    if (moved_m > 0.2 * from->displacement_m.lpNorm<Eigen::Infinity>()) start = from->displacement_m;
   } else if (s > first_step_of(worker) && steps_[s - 1].push == steps_[s].push && memory_[s - 1].valid) {
     start = memory_[s - 1].displacement_m;
   }
