@@ -13,8 +13,11 @@
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
+#include "palpate/reconstruction/build_object.hpp"
 #include "palpate/sensing/back_projection.hpp"
+#include "palpate/sensing/observe.hpp"
 #include "palpate/sensing/plane_mask.hpp"
+#include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate {
 namespace {
@@ -28,6 +31,11 @@ RayCloud thinned_rays(const DepthFrame& frame) {
   RayCloud rays = sensing::back_project(frame, options);
   options.stride_px = static_cast<int>(std::floor(std::sqrt(static_cast<double>(rays.range_m.size()) / rays_a_frame)));
   return options.stride_px > 1 ? sensing::back_project(frame, options) : rays;
+}
+
+bool has_shapes(const RobotModel& robot) {
+  return std::any_of(robot.links.begin(), robot.links.end(),
+                     [](const RobotLink& link) { return !link.visual.empty() || !link.collision.empty(); });
 }
 
 /// Corners of quadratic tetrahedra alone, renumbered only if midpoints stood between them.
@@ -109,20 +117,43 @@ std::vector<geometry::FinerNear> finer_under_tools(const Recording& recording) {
   return finer;
 }
 
-/// Volume mesh of a recording that gives a surface; planes and boxes of its supports then have to find nodes of a mesh that
-/// follows the surface, so their tolerance becomes a share of its edges.
-void fill_with_tetrahedra(Recording& recording) {
-  if (!recording.rest.surface) {
-    throw Error("give the object's shape as rest.volume_mesh or rest.surface_mesh", "rest");
+/// Table that hides a side of the object from every view: where it rests, else the first plane of the environment.
+std::optional<Plane> hiding_plane(const Recording& recording) {
+  for (const auto& support : recording.supports) {
+    if (support.kind == SupportKind::table || support.kind == SupportKind::plane) return support.plane;
   }
-  geometry::TetrahedraliseOptions options;
-  options.tetrahedra = default_tetrahedra;
-  if (recording.model.refine == "auto") options.finer = finer_under_tools(recording);
-  auto filled = geometry::tetrahedralise(*recording.rest.surface, options);
-  for (const auto& warning : filled.warnings) recording.warnings.push_back(warning.message);
-  const double edge_m = typical_edge_m(filled.mesh);
-  for (auto& support : recording.supports) support.tolerance_m = std::max(support.tolerance_m, 0.1 * edge_m);
-  recording.rest.volume = std::move(filled.mesh);
+  if (!recording.environment.planes.empty()) return recording.environment.planes.front();
+  return std::nullopt;
+}
+
+reconstruction::BuiltObject build_from_views(const Recording& recording, const reconstruction::BuildOptions& options,
+                                             const OnProgress& progress) {
+  std::vector<PointCloud> clouds;
+  for (const DepthFrame& view : recording.rest.views) {
+    Points normals;
+    const RayCloud rays = sensing::observe(view, recording.environment, {}, &normals);
+    clouds.push_back(sensing::to_point_cloud(rays, normals));
+  }
+  reconstruction::FuseOptions fuse;
+  fuse.support = hiding_plane(recording);
+  return reconstruction::build_object(clouds, fuse, recording.supports, options, progress);
+}
+
+/// Volume mesh of a recording that gives a surface or views of one.
+void fill_with_tetrahedra(Recording& recording, const OnProgress& progress) {
+  if (!recording.rest.surface && recording.rest.views.empty()) {
+    throw Error("give the object's shape as rest.volume_mesh, rest.surface_mesh or rest.views", "rest");
+  }
+  reconstruction::BuildOptions options;
+  options.mesh.tetrahedra = default_tetrahedra;
+  if (recording.model.refine == "auto") options.mesh.finer = finer_under_tools(recording);
+  auto built = recording.rest.surface
+                   ? reconstruction::build_object(*recording.rest.surface, recording.supports, options, progress)
+                   : build_from_views(recording, options, progress);
+  for (const auto& warning : built.model.warnings) recording.warnings.push_back(warning);
+  recording.supports = std::move(built.model.supports);
+  recording.rest.surface = std::move(built.model.surface);
+  recording.rest.volume = std::move(built.model.volume);
   recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
 }
 
@@ -165,12 +196,17 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
 
 estimation::Inputs observe(const Recording& recording) {
   estimation::Inputs inputs;
+  std::optional<sensing::RobotMask> robot;  // a robot that was recorded without shapes cannot be masked
+  if (recording.robot && has_shapes(*recording.robot)) robot.emplace(*recording.robot);
   for (const auto& push : recording.pushes) {
     for (const auto& step : push.steps) {
       auto& terms = inputs.emplace_back();
       for (const auto& observation : step.observations) {
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
-          const auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
+          auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
+          if (robot && !step.joints_rad.empty()) {
+            masked = sensing::with_mask(masked, robot->mask(*frame, recording.joint_names, step.joints_rad));
+          }
           terms.push_back(
               estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad, frame->noise.bias_std_m});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
@@ -188,8 +224,8 @@ estimation::Inputs observe(const Recording& recording) {
   return inputs;
 }
 
-estimation::SimulatedObject build_simulated_object(Recording& recording) {
-  if (!recording.rest.volume) fill_with_tetrahedra(recording);
+estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress) {
+  if (!recording.rest.volume) fill_with_tetrahedra(recording, progress);
   const TetMesh& given = *recording.rest.volume;
   estimation::SimulatedObject object;
   object.material = recording.model.material;
@@ -201,8 +237,12 @@ estimation::SimulatedObject build_simulated_object(Recording& recording) {
   }
   recording.model.element = quadratic ? "tet10" : "tet4";
   if (recording.rest.surface) {
-    // Sensors see the given surface, not the mesh that fills it.
-    const TriMesh surface = subdivided(*recording.rest.surface, 0.5 * typical_edge_m(object.mesh));
+    // Sensors see the given surface, not the mesh that fills it; its facets must follow the dent as well as elements do.
+    double edge_m = 0.5 * typical_edge_m(object.mesh);
+    if (recording.model.refine == "auto") {
+      for (const auto& near : finer_under_tools(recording)) edge_m = std::min(edge_m, 0.5 * near.edge_m);
+    }
+    const TriMesh surface = subdivided(*recording.rest.surface, edge_m);
     object.surface = estimation::SimulatedSurface::embedded(object.mesh, surface, geometry::embed(surface.vertices_m, object.mesh));
   } else {
     object.surface = estimation::SimulatedSurface::boundary_of(
@@ -214,7 +254,7 @@ estimation::SimulatedObject build_simulated_object(Recording& recording) {
 Identified identify(const Recording& given, const IdentifyOptions& options, const OnProgress& progress) {
   Recording recording = with_overrides(given, options);
   const estimation::Inputs observed = observe(recording);                          // sec. IV-B: point clouds, robot masked
-  const estimation::SimulatedObject object = build_simulated_object(recording);   // sec. IV-C: tetrahedral model
+  const estimation::SimulatedObject object = build_simulated_object(recording, progress);  // sec. IV-C: tetrahedral model
   Identified out;
   out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
                    ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)

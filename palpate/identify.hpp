@@ -38,7 +38,8 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options);
 /// planes of the environment or nothing near the object.
 estimation::Inputs observe(const Recording& recording);
 
-/// Stage 2: the object as the solver sees it: volume mesh, element, simulated surface. Says the chosen element in the recording's model.
-estimation::SimulatedObject build_simulated_object(Recording& recording);
+/// Stage 2: the object as the solver sees it: volume mesh, element, simulated surface. Says the chosen element in the
+/// recording's model, and what was built (surface, volume, supports with the tolerance that their nodes need) in the recording.
+estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress = {});
 
 }  // namespace palpate

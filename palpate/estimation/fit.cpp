@@ -7,6 +7,7 @@
 #include <map>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/error_budget.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
@@ -38,7 +39,7 @@ std::vector<Nuisance> nuisances_from(const Unknowns& list, const Optimum& optimu
                                      const std::vector<int>& moving) {
   std::vector<Nuisance> out;
   for (std::size_t k = 0; k < moving.size(); ++k) {
-    if (moving[k] <= poisson) continue;
+    if (moving[k] <= poisson || list[moving[k]].name.rfind("rest_surface[", 0) == 0) continue;
     const Unknown& unknown = list[moving[k]];
     Nuisance nuisance;
     nuisance.name = unknown.name;
@@ -50,6 +51,41 @@ std::vector<Nuisance> nuisances_from(const Unknowns& list, const Optimum& optimu
     nuisance.prior_std = unknown.prior_std;
     nuisance.pull = (nuisance.value - unknown.prior_mean) / unknown.prior_std;
     out.push_back(nuisance);
+  }
+  return out;
+}
+
+/// The rest surface's slow error as one number: its rms over the surface.
+Nuisance rest_surface_from(const StepPrediction& predicted, const Optimum& optimum, const MatrixX& covariance,
+                           const std::vector<int>& moving) {
+  const SurfaceField& field = *predicted.field;
+  const Index first = static_cast<Index>(std::find(moving.begin(), moving.end(), predicted.field_unknown) - moving.begin());
+  const MatrixX& basis = field.basis();
+  const double vertices = static_cast<double>(basis.rows());
+  Nuisance nuisance;
+  nuisance.name = "rest_surface";
+  nuisance.unit = "m";
+  nuisance.value = (basis * optimum.unknowns.segment(predicted.field_unknown, field.modes())).norm() / std::sqrt(vertices);
+  const MatrixX block = covariance.block(first, first, field.modes(), field.modes());
+  nuisance.std = std::sqrt(std::max(0.0, (basis * block).cwiseProduct(basis).sum() / vertices));
+  nuisance.lower_95 = std::max(0.0, nuisance.value - z_95 * nuisance.std);
+  nuisance.upper_95 = nuisance.value + z_95 * nuisance.std;
+  nuisance.prior_std = field.std_m();
+  nuisance.pull = nuisance.value / nuisance.prior_std;
+  return nuisance;
+}
+
+/// E of each push alone, nu held at the joint optimum.
+std::vector<Parameter> per_push_from(const std::vector<PartialYoung>& parts) {
+  std::vector<Parameter> out;
+  for (const auto& part : parts) {
+    if (!part.usable) continue;
+    Parameter young{"young_modulus", part.name, "Pa"};
+    young.value = std::exp(part.log_young);
+    young.std = young.value * part.std;
+    young.lower_95 = std::exp(part.log_young - z_95 * part.std);
+    young.upper_95 = std::exp(part.log_young + z_95 * part.std);
+    out.push_back(young);
   }
   return out;
 }
@@ -179,14 +215,14 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
 
   const double factor = residuals.points > 0 ? tukey_information_factor(loss.tukey) : 1;
   const std::vector<int> moving = free_unknowns(unknowns);
-  MatrixX hessian(static_cast<Index>(moving.size()), static_cast<Index>(moving.size()));
-  for (std::size_t a = 0; a < moving.size(); ++a) {
-    for (std::size_t b = 0; b < moving.size(); ++b) {
-      hessian(static_cast<Index>(a), static_cast<Index>(b)) = optimum.evaluation.hessian(moving[a], moving[b]);
-    }
-  }
+  const MatrixX hessian = optimum.evaluation.information(factor)(moving, moving);
   const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
   answer.nuisances = nuisances_from(unknowns, optimum, covariance, moving);
+  for (const auto& predicted : objective.last_predictions()) {
+    if (predicted.field == nullptr) continue;
+    answer.nuisances.push_back(rest_surface_from(predicted, optimum, covariance, moving));
+    break;
+  }
 
   double pulls = 0;
   std::size_t flat = 0;
@@ -205,12 +241,28 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   answer.budget = error_budget(unknowns, hessian, moving);
 
   const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
+  if (posterior.cancelled) {
+    answer.termination = Termination::cancelled;
+    answer.message = "stopped by the caller";
+    return answer;
+  }
   answer.parameters = parameters_from(posterior, unknowns[poisson]);
   answer.covariance = posterior.covariance;
   answer.posterior = posterior_grid(posterior);
-  objective.evaluate(optimum.unknowns, loss);  // the last evaluation is the optimum again: verdicts look at it
+  objective.evaluate(optimum.unknowns, loss);  // the last evaluation is the optimum again: what follows looks at it
+  CrossChecks checks;
+  if (options.cross_checks && optimum.termination == Termination::converged) {
+    checks = cross_check(objective, optimum, loss, factor, progress);
+    if (checks.cancelled) {
+      answer.termination = Termination::cancelled;
+      answer.message = "stopped by the caller";
+      return answer;
+    }
+    answer.prediction = checks.held_out;
+    answer.per_push = per_push_from(checks.pushes);
+  }
   answer.fit.solves = model.solves();
-  answer.verdicts = judge({recording, objective, optimum, residuals, answer});
+  answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks});
   answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   return answer;

@@ -40,10 +40,27 @@ std::string body_key(const Push& push) {
   return key;
 }
 
+/// Force on the object along the push that a sensor read in this step; 0 where none did.
+double read_force_n(const Step& step, const Load& load) {
+  for (const auto& observation : step.observations) {
+    const auto* wrench = std::get_if<Wrench>(&observation);
+    if (wrench != nullptr && (wrench->tool.empty() || wrench->tool == load.tool)) {
+      return wrench->force_n.dot(load.direction.normalized());
+    }
+  }
+  return 0;
+}
+
+/// True for a tool that touches at Load::contact_m, which may then be elsewhere than thought.
+bool has_place(const Recording& recording, const Load& load) {
+  const auto tool = std::find_if(recording.tools.begin(), recording.tools.end(), [&](const Tool& t) { return t.name == load.tool; });
+  return tool != recording.tools.end() && tool->shape != ToolShape::vertices && tool->shape != ToolShape::platen;
+}
+
 }  // namespace
 
 struct ForwardModel::Body {
-  std::map<std::string, int> force_column;   // of a load's key: first of three
+  std::map<std::string, int> force_column;   // of a load's key: first of three; of nine where the contact may have shifted
   std::map<std::string, int> motion_column;  // of a platen
   int gravity_column = -1;
   MatrixX free_motions;
@@ -73,6 +90,13 @@ struct ForwardModel::Watched {
   MatrixX d_moved, d_conjugate, d_reaction;
 };
 
+/// Where a load acts: its columns, and the derivatives of those to a shift of the contact along two tangents.
+struct ForwardModel::LoadParts {
+  int first = -1;                 // of the columns; -1: this load has none
+  int shift_unknown = -1;         // first of two, or -1
+  std::vector<double> weight{1};  // of each three columns: 1, shift, shift
+};
+
 ForwardModel::~ForwardModel() = default;
 
 ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns,
@@ -88,6 +112,12 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     if (!(recording.density_kg_m3 > 0)) throw Error("gravity acts, so the density is needed", "density_kg_m3");
     density_ = unknowns.add_block("density", "kg/m3", recording.density_std_kg_m3, {""});
     if (density_ >= 0) unknowns[density_].prior_mean = recording.density_kg_m3;
+  }
+
+  if (recording.rest.surface_std_m > 0) {
+    field_.emplace(object_.surface.rest(), recording.rest.surface_std_m, recording.rest.surface_correlation_m);
+    field_unknown_ = unknowns.size();
+    for (Index k = 0; k < field_->modes(); ++k) unknowns.add({"rest_surface[" + std::to_string(k) + "]", "1", 0, 1});
   }
 
   // The clamp moves with everything that it holds: one rigid offset of the object in the base frame.
@@ -113,6 +143,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   }
   int common_clamp = clamp != nullptr && clamp->pose_varies == PoseVaries::never ? add_clamp("") : -1;
 
+  std::map<std::string, int> shift_of;  // a push's contact: first of two unknowns
   for (std::size_t p = 0; p < recording.pushes.size(); ++p) {
     const Push& push = recording.pushes[p];
     const std::string in_push = "[" + push.name + "]";
@@ -134,12 +165,19 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
       steps_.push_back({p, s});
       const std::string in_step = "[" + push.name + ":" + std::to_string(s) + "]";
       clamp_.push_back(clamp != nullptr && clamp->pose_varies == PoseVaries::step ? add_clamp(in_step) : push_clamp);
-      std::vector<int> errors;
+      std::vector<int> errors, shifts;
       for (const auto& load : push.steps[s].loads) {
+        const std::string shift = in_push + key_of(load);
+        if (load.contact_std_m > 0 && has_place(recording, load) && shift_of.count(shift) == 0) {
+          shift_of[shift] = unknowns.add_block("contact_shift" + in_push, "m", load.contact_std_m, {"_1", "_2"});
+        }
+        const auto known = shift_of.find(shift);
+        shifts.push_back(known == shift_of.end() ? -1 : known->second);
         const double std_n = load.force_n ? std::hypot(load.force_std_n, load.force_relative_std * load.force_n->norm()) : 0;
         errors.push_back(unknowns.add_block("force_error" + in_step, "N", std_n, xyz));
       }
       force_error_.push_back(errors);
+      contact_shift_.push_back(shifts);
     }
   }
   memory_.resize(steps_.size());
@@ -170,6 +208,13 @@ int ForwardModel::solves() const {
 const Step& ForwardModel::step(std::size_t s) const { return push(s).steps[steps_[s].step]; }
 const Push& ForwardModel::push(std::size_t s) const { return recording_->pushes[steps_[s].push]; }
 
+const Tool& ForwardModel::tool(const std::string& name) const {
+  for (const auto& tool : recording_->tools) {
+    if (tool.name == name) return tool;
+  }
+  throw Error("no tool of this name", "loads.tool " + name);
+}
+
 void ForwardModel::forget() {
   for (auto& memory : memory_) memory = Memory{};
 }
@@ -180,13 +225,6 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
   if (known != bodies.end()) return *known->second;
   auto& body = bodies[body_key(push)];
   body = std::make_unique<Body>();
-
-  const auto tool_of = [&](const Load& load) -> const Tool& {
-    for (const auto& tool : recording_->tools) {
-      if (tool.name == load.tool) return tool;
-    }
-    throw Error("no tool of this name", "loads.tool " + load.tool);
-  };
 
   std::vector<const Tool*> platens;
   for (const auto& tool : recording_->tools) {
@@ -207,7 +245,10 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
       for (const auto& load : step.loads) {
         if (load.travel_m || load.force_n.value_or(Vec3::Zero()).norm() + load.force_std_n == 0) continue;
         if (!body->force_column.emplace(key_of(load), static_cast<int>(3 * parts.size())).second) continue;
-        parts.push_back(load_columns(object_.mesh, tool_of(load), load));
+        const Tool& tool = this->tool(load.tool);
+        parts.push_back(load_columns(object_.mesh, tool, load));
+        if (!(load.contact_std_m > 0) || !has_place(*recording_, load)) continue;
+        for (const Vec3& tangent : tangents(load.direction)) parts.push_back(shifted_columns(object_.mesh, tool, load, tangent));
       }
     }
   }
@@ -262,6 +303,16 @@ RigidOffset ForwardModel::clamp_offset(std::size_t s, const VectorX& unknowns) c
   return offset;
 }
 
+ForwardModel::LoadParts ForwardModel::load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const {
+  LoadParts parts;
+  const auto found = body.force_column.find(key_of(step(s).loads[l]));
+  if (found == body.force_column.end()) return parts;
+  parts.first = found->second;
+  parts.shift_unknown = contact_shift_[s][l];
+  for (int k = 0; parts.shift_unknown >= 0 && k < 2; ++k) parts.weight.push_back(unknowns(parts.shift_unknown + k));
+  return parts;
+}
+
 ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const {
   Coefficients c;
   c.force = VectorX::Zero(body.forces.cols());
@@ -298,7 +349,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     const Load& load = now.loads[l];
     if (load.travel_m) {
       const int at = body.motion_column.at(load.tool);
-      c.motion(at) = *load.travel_m;
+      c.motion(at) = *load.travel_m - tool(load.tool).compliance_m_per_n * read_force_n(now, load);
       if (travel_offset_[p] >= 0) {
         c.motion(at) += unknowns(travel_offset_[p]);
         const int offset = column(travel_offset_[p]);
@@ -306,31 +357,32 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
       }
       continue;
     }
-    const auto found = body.force_column.find(key_of(load));
-    if (found == body.force_column.end()) continue;
-    const int first = found->second;
+    const LoadParts parts = load_parts(s, l, body, unknowns);
+    if (parts.first < 0) continue;
     const int error = force_error_[s][l];
     Vec3 measured = load.force_n.value_or(Vec3::Zero());
     if (error >= 0) measured += unknowns.segment<3>(error);
     const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
     Vec3 tare = Vec3::Zero();
-    if (tare_[p] >= 0)
-      tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
-    add_vector(first, scale * measured + tare);
-    if (error >= 0) {
-      for (int k = 0; k < 3; ++k) {
-        const int at = column(error + k);
-        c.d_force.block<3, 1>(first, at) += scale * into_object.col(k);
+    if (tare_[p] >= 0) tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
+    const Vec3 force = scale * measured + tare;
+    for (std::size_t part = 0; part < parts.weight.size(); ++part) {
+      const int first = parts.first + static_cast<int>(3 * part);
+      const double weight = parts.weight[part];
+      add_vector(first, weight * force);
+      const auto add_derivative = [&](int unknown, const Vec3& d) {
+        const int at = column(unknown);
+        c.d_force.block<3, 1>(first, at) += weight * (into_object * d);
+      };
+      for (int k = 0; error >= 0 && k < 3; ++k) add_derivative(error + k, scale * Vec3::Unit(k));
+      if (force_scale_ >= 0) add_derivative(force_scale_, measured);
+      const bool one_axis = tare_axis_[p].norm() > 0;
+      for (int k = 0; tare_[p] >= 0 && k < (one_axis ? 1 : 3); ++k) {
+        add_derivative(tare_[p] + k, one_axis ? tare_axis_[p] : Vec3(Vec3::Unit(k)));
       }
-    }
-    if (force_scale_ >= 0) {
-      const int at = column(force_scale_);
-      c.d_force.block<3, 1>(first, at) += into_object * measured;
-    }
-    if (tare_[p] >= 0) {
-      for (int k = 0; k < (tare_axis_[p].norm() > 0 ? 1 : 3); ++k) {
-        const int at = column(tare_[p] + k);
-        c.d_force.block<3, 1>(first, at) += into_object * (tare_axis_[p].norm() > 0 ? tare_axis_[p] : Vec3(Vec3::Unit(k)));
+      if (part > 0) {
+        const int at = column(parts.shift_unknown + static_cast<int>(part) - 1);
+        c.d_force.block<3, 1>(first, at) += into_object * force;
       }
     }
   }
@@ -441,6 +493,22 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
   return true;
 }
 
+/// Into the base frame: x = T(X + b n + u).
+void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const {
+  const RigidOffset clamp = clamp_offset(s, unknowns);
+  out.surface_m = object_.surface.rest().vertices_m;
+  for (Index v = 0; v < out.surface_m.rows(); ++v) {
+    out.surface_m.row(v) = clamp.apply(out.surface_m.row(v).transpose() + moved_m.segment<3>(3 * v));
+  }
+  if (!field_) return;
+  out.field = &*field_;
+  out.field_unknown = field_unknown_;
+  out.material_m = out.surface_m;
+  out.field_directions = field_->normals() * clamp.rotation().transpose();
+  const VectorX offset_m = field_->basis() * unknowns.segment(field_unknown_, field_->modes());
+  out.surface_m += offset_m.asDiagonal() * out.field_directions;
+}
+
 StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
   const std::size_t worker = worker_of(s);
   Body& body = body_of(push(s), worker);
@@ -464,34 +532,34 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
     return out;
   }
 
-  const RigidOffset clamp = clamp_offset(s, unknowns);
-  const TriMesh& rest = object_.surface.rest();
-  if (!derivatives) {
-    out.surface_m = rest.vertices_m;
-    for (Index v = 0; v < out.surface_m.rows(); ++v) {
-      out.surface_m.row(v) = clamp.apply(out.surface_m.row(v).transpose() + at.moved_m.segment<3>(3 * v));
-    }
-    return out;
-  }
+  place_surface(s, unknowns, at.moved_m, out);
+  if (!derivatives) return out;
 
   out.columns = {log_young, poisson};
   out.columns.insert(out.columns.end(), c.columns.begin(), c.columns.end());
   const Index count = static_cast<Index>(out.columns.size());
 
-  // Into the base frame: x = T(X + u).
+  const RigidOffset clamp = clamp_offset(s, unknowns);
   const Mat3 rotation = clamp.rotation();
   out.d_surface = std::move(at.d_moved);
-  out.surface_m.resize(rest.vertices_m.rows(), 3);
-  for (Index v = 0; v < rest.vertices_m.rows(); ++v) {
-    const Vec3 in_object = rest.vertices_m.row(v).transpose() + at.moved_m.segment<3>(3 * v);
-    out.surface_m.row(v) = clamp.apply(in_object);
-    if (clamp_[s] < 0) continue;
-    out.d_surface.middleRows<3>(3 * v) = (rotation * out.d_surface.middleRows<3>(3 * v)).eval();
-    const auto rigid = clamp.derivative(in_object);
-    for (Index k = 2; k < count; ++k) {
-      const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s];
-      if (component >= 0 && component < 6) out.d_surface.block<3, 1>(3 * v, k) += rigid.col(component);
+  if (clamp_[s] >= 0) {
+    for (Index v = 0; v < out.surface_m.rows(); ++v) {
+      out.d_surface.middleRows<3>(3 * v) = (rotation * out.d_surface.middleRows<3>(3 * v)).eval();
     }
+    const auto add_rigid = [&](const Points& at_m, MatrixX& derivative) {
+      for (Index v = 0; v < at_m.rows(); ++v) {
+        const auto rigid = clamp.derivative(clamp.apply_inverse(at_m.row(v)));
+        for (Index k = 2; k < count; ++k) {
+          const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s];
+          if (component >= 0 && component < 6) derivative.block<3, 1>(3 * v, k) += rigid.col(component);
+        }
+      }
+    };
+    if (field_) {
+      out.d_material = out.d_surface;
+      add_rigid(out.material_m, out.d_material);
+    }
+    add_rigid(out.surface_m, out.d_surface);
   }
 
   // What the tools should read.
@@ -520,12 +588,20 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
       for (Index k = 2; k < count; ++k) out.d_travel(l, k) = c.d_motion(m, k - 2);
     } else {
       out.force_n[at_load] = load.force_n.value_or(Vec3::Zero());
-      const auto found = body.force_column.find(key_of(load));
-      if (found == body.force_column.end()) continue;
+      const LoadParts parts = load_parts(s, at_load, body, unknowns);
+      if (parts.first < 0) continue;
       const Vec3 direction = rotation.transpose() * load.direction.normalized();
-      const Vec3 mean_motion_m = at.conjugate_m.segment<3>(found->second);
+      Vec3 mean_motion_m = Vec3::Zero();
+      for (std::size_t part = 0; part < parts.weight.size(); ++part) {
+        const Index first = parts.first + static_cast<Index>(3 * part);
+        const Vec3 conjugate_m = at.conjugate_m.segment<3>(first);
+        mean_motion_m += parts.weight[part] * conjugate_m;
+        out.d_travel.row(l) += parts.weight[part] * direction.transpose() * at.d_conjugate.middleRows<3>(first);
+        if (part == 0) continue;
+        const auto shift = std::find(out.columns.begin(), out.columns.end(), parts.shift_unknown + static_cast<int>(part) - 1);
+        out.d_travel(l, shift - out.columns.begin()) += direction.dot(conjugate_m);
+      }
       out.travel_m(l) = direction.dot(mean_motion_m);
-      out.d_travel.row(l) = direction.transpose() * at.d_conjugate.middleRows<3>(found->second);
       if (clamp_[s] < 0) continue;
       // A turned clamp turns the object under the tool's direction.
       const Mat3 turn = clamp.inverse_rotation_derivative(load.direction.normalized());
@@ -547,6 +623,7 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
       matrix.rightCols(1).setZero();
     };
     widen(out.d_surface);
+    if (out.d_material.size() > 0) widen(out.d_material);
     widen(out.d_travel);
     for (auto& block : out.d_force) widen(block);
     return wider - 1;

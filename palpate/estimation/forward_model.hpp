@@ -5,12 +5,14 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "palpate/core/recording.hpp"
 #include "palpate/estimation/rigid_offset.hpp"
 #include "palpate/estimation/simulated_surface.hpp"
+#include "palpate/estimation/surface_field.hpp"
 #include "palpate/estimation/unknowns.hpp"
 #include "palpate/fem/statics.hpp"
 
@@ -32,6 +34,15 @@ struct StepPrediction {
   std::vector<Vec3> force_n;  ///< a load: resultant on the object, base frame
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> d_force;  ///< a load: 3 x columns
   int inverted_elements = 0;                                      ///< -1: not counted, ask ForwardModel::inverted_elements
+
+  // Slow error of the rest surface: surface_m holds it; its many columns are not in d_surface but follow from its basis.
+  const SurfaceField* field = nullptr;  ///< nullptr: none
+  int field_unknown = -1;               ///< first of its coefficients
+  Points field_directions;              ///< a vertex: along which the field moves it, base frame
+  Points material_m;                    ///< surface without the field: what markers are fixed to
+  MatrixX d_material;                   ///< as d_surface, of material_m; empty where it is the same
+  const Points& markers_m() const { return field != nullptr ? material_m : surface_m; }
+  const MatrixX& d_markers() const { return d_material.size() > 0 ? d_material : d_surface; }
 };
 
 /// The object as the solver sees it.
@@ -52,6 +63,8 @@ class ForwardModel {
   std::size_t step_count() const { return steps_.size(); }
   const Step& step(std::size_t s) const;
   const Push& push(std::size_t s) const;
+  /// @throws Error when no tool has this name.
+  const Tool& tool(const std::string& name) const;
   StepIndex index(std::size_t s) const { return steps_[s]; }
   const SimulatedObject& object() const { return object_; }
 
@@ -84,8 +97,11 @@ class ForwardModel {
   Watched superpose(const Body& body, const Coefficients& c, const VectorX& unknowns, StepPrediction& out) const;
 
   std::size_t worker_of(std::size_t s) const;
+  void place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const;
   Body& body_of(const Push& push, std::size_t worker);
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
+  struct LoadParts;  // of one load: columns that work together
+  LoadParts load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const;
   RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;
 
   const Recording* recording_;
@@ -101,9 +117,12 @@ class ForwardModel {
   Vec3 clamp_pivot_m_ = Vec3::Zero();
   std::vector<int> clamp_;                     // a step: first of six unknowns, or -1
   std::vector<std::vector<int>> force_error_;  // a step and load: first of three unknowns, or -1
+  std::vector<std::vector<int>> contact_shift_;   // a step and load: first of two unknowns, or -1
   std::vector<int> tare_, travel_offset_;      // a push: first of three, the one; or -1
   std::vector<Vec3> tare_axis_;                // a push: zero = three unknowns, else one along this axis
   int force_scale_ = -1, density_ = -1;
+  std::optional<SurfaceField> field_;
+  int field_unknown_ = -1;
   std::vector<int> solves_;  // a worker
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/estimation/load_columns.hpp"
 
+#include <algorithm>
 #include <vector>
 
 #include "palpate/core/error.hpp"
@@ -47,6 +48,22 @@ Eigen::SparseMatrix<double> load_columns(const TetMesh& mesh, const Tool& tool, 
   throw Error("a force can be spread under vertices, a sphere, a disc, an edge or a capsule; give the motion (travel_m) of a "
               "platen, or describe the contact patch of a mesh tool by a disc of its radius",
               "tools." + tool.name + ".shape");
+}
+
+std::array<Vec3, 2> tangents(const Vec3& direction) {
+  const Vec3 along = direction.normalized();
+  Index least = 0;
+  along.cwiseAbs().minCoeff(&least);
+  const Vec3 first = (Vec3::Unit(least) - along(least) * along).normalized();
+  return {first, along.cross(first)};
+}
+
+Eigen::SparseMatrix<double> shifted_columns(const TetMesh& mesh, const Tool& tool, const Load& load, const Vec3& tangent) {
+  const double h = tool.radius_m > 0 ? tool.radius_m / 8 : std::max(tool.length_m, 1e-3) / 50;
+  Load ahead = load, behind = load;
+  ahead.contact_m += h * tangent;
+  behind.contact_m -= h * tangent;
+  return (load_columns(mesh, tool, ahead) - load_columns(mesh, tool, behind)) / (2 * h);
 }
 
 }  // namespace palpate::estimation

@@ -55,10 +55,7 @@ Objective::Objective(ForwardModel& model, const std::vector<std::vector<TermInpu
 }
 
 Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const OnProgress& progress) {
-  const Index count = unknowns_.size();
   Evaluation out;
-  out.hessian = MatrixX::Zero(count, count);
-  out.gradient = VectorX::Zero(count);
   rows_.assign(model_.step_count(), {});
   predictions_.assign(model_.step_count(), {});
   // Every worker solves and linearises its own steps; what follows adds them up in order, so that digits do not depend on
@@ -69,7 +66,7 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
   const auto work = [&](std::size_t worker) {
     try {
       for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
-        if (terms_[s].empty() || s % loss.every != loss.every / 2) continue;
+        if (terms_[s].empty() || !loss.counts(s)) continue;
         predictions_[s] = model_.predict(s, unknowns);
         if (!predictions_[s].converged) stop = true;
         if (stop) return;
@@ -101,14 +98,24 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
     }
   }
 
-  for (std::size_t s = 0; s < model_.step_count(); ++s) {
-    for (const TermRows& rows : rows_[s]) {
+  return assemble(rows_, unknowns, loss);
+}
+
+Evaluation Objective::assemble(const std::vector<std::vector<TermRows>>& all_rows, const VectorX& unknowns, const Loss& loss) const {
+  const Index count = unknowns_.size();
+  Evaluation out;
+  out.hessian = MatrixX::Zero(count, count);
+  out.robust_hessian = MatrixX::Zero(count, count);
+  out.gradient = VectorX::Zero(count);
+  for (std::size_t s = 0; s < all_rows.size(); ++s) {
+    if (!loss.counts(s)) continue;
+    for (const TermRows& rows : all_rows[s]) {
       double relevance = rows.cell.empty() ? 1 : loss.surface_weight;
       if (rows.robust) relevance /= loss.widening * loss.widening;
       VectorX weight = VectorX::Constant(rows.residual.size(), relevance);
       for (Index i = 0; i < rows.residual.size(); ++i) {
         if (rows.robust) {
-          out.cost += relevance * tukey_rho(rows.residual(i), loss.tukey);
+          out.robust_cost += relevance * tukey_rho(rows.residual(i), loss.tukey);
           weight(i) *= tukey_weight(rows.residual(i), loss.tukey);
         } else {
           out.cost += relevance * 0.5 * rows.residual(i) * rows.residual(i);
@@ -124,11 +131,14 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
       for (std::size_t a = 0; a < rows.unknowns.size(); ++a) {
         out.gradient(rows.unknowns[a]) += slope(static_cast<Index>(a));
         for (std::size_t b = 0; b < rows.unknowns.size(); ++b) {
-          out.hessian(rows.unknowns[a], rows.unknowns[b]) += block(static_cast<Index>(a), static_cast<Index>(b));
+          const double entry = block(static_cast<Index>(a), static_cast<Index>(b));
+          out.hessian(rows.unknowns[a], rows.unknowns[b]) += entry;
+          if (rows.robust) out.robust_hessian(rows.unknowns[a], rows.unknowns[b]) += entry;
         }
       }
     }
   }
+  out.cost += out.robust_cost;
   for (Index k = 0; k < count; ++k) {
     const Unknown& unknown = unknowns_[static_cast<int>(k)];
     if (!std::isfinite(unknown.prior_std) || unknown.fixed) continue;
@@ -142,12 +152,18 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
   return out;
 }
 
+std::vector<TermRows> Objective::rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns,
+                                         bool along_rays) const {
+  std::vector<TermRows> rows;
+  for (const auto& term : terms_[s]) rows.push_back(term->rows(predicted, unknowns, along_rays));
+  return rows;
+}
+
 double Objective::cost_of(const std::vector<StepPrediction>& predictions, const VectorX& unknowns, const Loss& loss) const {
   double cost = 0;
   for (std::size_t s = 0; s < predictions.size(); ++s) {
     if (predictions[s].surface_m.rows() == 0) continue;
-    for (const auto& term : terms_[s]) {
-      const TermRows rows = term->rows(predictions[s], unknowns, loss.along_rays);
+    for (const TermRows& rows : rows_of(s, predictions[s], unknowns, loss.along_rays)) {
       for (Index i = 0; i < rows.residual.size(); ++i) {
         cost += rows.robust ? tukey_rho(rows.residual(i), loss.tukey) : 0.5 * rows.residual(i) * rows.residual(i);
       }

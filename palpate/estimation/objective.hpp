@@ -19,7 +19,10 @@ struct Loss {
   double widening = 1;     ///< cut over the final cut while annealing: sigma of robust rows grows with it, priors do not
   bool along_rays = true;  ///< depth residuals along the ray (else closest point)
   std::size_t every = 1;      ///< steps that count: every n-th (the first rounds of a long recording need no more)
+  std::vector<char> steps;    ///< steps that count, one flag each (held-out prediction, a push alone); empty = all
   double surface_weight = 1;  ///< of rows with neighbours whose errors are correlated: 1 / variance inflation
+
+  bool counts(std::size_t step) const { return step % every == every / 2 && (steps.empty() || steps[step] != 0); }
 };
 
 struct Evaluation {
@@ -28,6 +31,13 @@ struct Evaluation {
   double cost = 0;         ///< sum of rho + prior, half of minus twice the log posterior
   MatrixX hessian;         ///< Gauss-Newton, priors included
   VectorX gradient;
+  double robust_cost = 0;  ///< the part of cost and Hessian that robust rows make
+  MatrixX robust_hessian;
+
+  /// Inverse covariance of all unknowns under clean Gaussian data: what robust rows say counts `factor` times (see
+  /// tukey_information_factor), exact rows and priors as they are.
+  MatrixX information(double factor) const { return hessian + (factor - 1) * robust_hessian; }
+  double information_cost(double factor) const { return cost + (factor - 1) * robust_cost; }
 };
 
 /// What the residuals at an optimum look like.
@@ -50,6 +60,12 @@ class Objective {
 
   /// Cost of a prediction that was made elsewhere (start search): no derivative, no prior.
   double cost_of(const std::vector<StepPrediction>& predictions, const VectorX& unknowns, const Loss& loss) const;
+
+  /// Normal equations of rows that were made before, at the unknowns that they were made at. No step is solved.
+  Evaluation assemble(const std::vector<std::vector<TermRows>>& rows, const VectorX& unknowns, const Loss& loss) const;
+
+  /// Rows of step s for a prediction that was made elsewhere.
+  std::vector<TermRows> rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns, bool along_rays) const;
 
   ResidualSummary summarise(const Loss& loss) const;            ///< of the last evaluation
   const std::vector<std::vector<TermRows>>& last_rows() const { return rows_; }  ///< a step: its terms
@@ -75,7 +91,7 @@ class Objective {
 double tukey_rho(double residual, double cut);
 double tukey_weight(double residual, double cut);
 
-/// What Gauss-Newton's weighted Hessian must be multiplied by so that its inverse is the covariance of the robust estimate
+/// What Gauss-Newton's weighted Hessian of robust rows must be multiplied by so that its inverse is the covariance of the robust estimate
 /// under clean Gaussian data: E[psi']^2 / (E[psi^2] E[w]) (Huber and Ronchetti, Robust Statistics, eq. 6.5).
 double tukey_information_factor(double cut);
 

@@ -23,23 +23,17 @@ Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& un
   for (int k : free_unknowns(list)) {
     if (k != poisson) others.push_back(k);
   }
-  MatrixX hessian(static_cast<Index>(others.size()), static_cast<Index>(others.size()));
-  VectorX cross(static_cast<Index>(others.size()));
-  for (std::size_t a = 0; a < others.size(); ++a) {
-    cross(static_cast<Index>(a)) = evaluation.hessian(others[a], poisson);
-    for (std::size_t b = 0; b < others.size(); ++b) {
-      hessian(static_cast<Index>(a), static_cast<Index>(b)) = evaluation.hessian(others[a], others[b]);
-    }
-  }
-  const Eigen::LDLT<MatrixX> factorised(factor * hessian);
+  const MatrixX information = evaluation.information(factor);
+  const VectorX cross = information.col(poisson)(others);
+  const Eigen::LDLT<MatrixX> factorised(information(others, others));
   VectorX unit = VectorX::Zero(static_cast<Index>(others.size()));
   unit(0) = 1;  // log E comes first
   Conditional out;
   out.log_young = unknowns(log_young);
   out.std_dev = std::sqrt(std::max(factorised.solve(unit)(0), 1e-30));
   out.log_determinant = factorised.vectorD().array().abs().max(1e-300).log().sum();
-  out.cost = factor * evaluation.cost;
-  out.slope = -factor * factorised.solve(cross)(0);  // d log E / d nu along the ridge
+  out.cost = evaluation.information_cost(factor);
+  out.slope = -factorised.solve(cross)(0);  // d log E / d nu along the ridge
   return out;
 }
 
@@ -125,13 +119,8 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   }
 
   // Standard deviation of nu with everything else free.
-  std::vector<int> moving = free_unknowns(list);
-  MatrixX hessian(static_cast<Index>(moving.size()), static_cast<Index>(moving.size()));
-  for (std::size_t a = 0; a < moving.size(); ++a) {
-    for (std::size_t b = 0; b < moving.size(); ++b) {
-      hessian(static_cast<Index>(a), static_cast<Index>(b)) = information_factor * optimum.evaluation.hessian(moving[a], moving[b]);
-    }
-  }
+  const std::vector<int> moving = free_unknowns(list);
+  const MatrixX hessian = optimum.evaluation.information(information_factor)(moving, moving);
   VectorX unit = VectorX::Zero(hessian.rows());
   unit(1) = 1;
   const double variance = hessian.ldlt().solve(unit)(1);
@@ -158,13 +147,18 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   few.max_iterations = 6;
   few.step_tolerance = 0.02;
   int done = 0;
+  const OnProgress keep_going = [&](std::string_view, double) {
+    return !progress || progress("posterior", static_cast<double>(done) / nodes);
+  };
   const auto visit = [&](Index i, const VectorX& start) {
-    if (progress) progress("posterior", static_cast<double>(done++) / nodes);
+    ++done;
     VectorX begin = start;
     begin(poisson) = node(i);
     objective.hold_poisson(true);
-    const Optimum conditional = optimise(objective, begin, loss, few, {});
+    const Optimum conditional = optimise(objective, begin, loss, few, keep_going);
     objective.hold_poisson(false);
+    posterior.cancelled = conditional.termination == Termination::cancelled;
+    if (posterior.cancelled) return start;
     if (!conditional.evaluation.usable) {
       density(i) = -1e6;
       mean(i) = start(log_young);
@@ -179,9 +173,10 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   };
   VectorX here = visit(nearest, optimum.unknowns);
   VectorX walk = here;
-  for (Index i = nearest + 1; i < nodes; ++i) walk = visit(i, walk);
+  for (Index i = nearest + 1; i < nodes && !posterior.cancelled; ++i) walk = visit(i, walk);
   walk = here;
-  for (Index i = nearest - 1; i >= 0; --i) walk = visit(i, walk);
+  for (Index i = nearest - 1; i >= 0 && !posterior.cancelled; --i) walk = visit(i, walk);
+  if (posterior.cancelled) return posterior;
 
   posterior.poisson = VectorX::LinSpaced(grid_size, from, to);
   density.array() -= density.maxCoeff();

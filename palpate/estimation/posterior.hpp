@@ -13,6 +13,7 @@ struct Posterior {
   VectorX log_young_mean;     ///< given nu
   VectorX log_young_std;
   MatrixX covariance;         ///< 2 x 2 of (log E, nu)
+  bool cancelled = false;     ///< the caller asked to stop: nothing else is filled
   bool quadrature = false;    ///< conditional optima were solved at several nu (else Laplace, cut at the bounds)
 
   double poisson_quantile(double probability) const;

@@ -107,26 +107,50 @@ void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
                                             " elements of the simulation are turned inside out: the load is beyond what "
                                             "this material model describes. Use neo_hookean, or smaller forces."});
   }
-  std::string unused;
-  const auto note = [&](bool given, const std::string& name) {
-    if (given && unused.find(name) == std::string::npos) unused += (unused.empty() ? "" : ", ") + name;
-  };
-  note(in.recording.rest.surface_std_m > 0, "rest.surface_std_m");
-  for (const auto& tool : in.recording.tools) note(tool.compliance_m_per_n > 0, "tools.compliance_m_per_n");
-  for (const auto& push : in.recording.pushes) {
-    for (const auto& step : push.steps) {
-      for (const auto& load : step.loads) note(load.contact_std_m > 0, "loads.contact_std_m");
-    }
-  }
-  if (!unused.empty()) {
-    out.push_back({"input_not_used", "The recording states " + unused +
-                                         ", which this fit does not propagate: the true uncertainty is larger than the "
-                                         "interval says."});
-  }
   if (in.recording.rest.state == RestState::under_pressure) {
     out.push_back({"apparent_modulus_only",
                    "The object is inflated: a solid model gives an apparent modulus that depends on pressure and tool, not "
                    "the elasticity of its skin."});
+  }
+}
+
+/// Differences that chance makes once in a hundred recordings are said.
+constexpr double rare = 0.01;
+
+void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
+  double poisson_std = 0;
+  for (const auto& parameter : in.answer.parameters) {
+    if (parameter.name == "poisson_ratio") poisson_std = parameter.std;
+  }
+  if (homogeneity_p_value(in.checks.pushes, poisson_std) < rare) {
+    const PartialYoung *softest = nullptr, *stiffest = nullptr;
+    for (const auto& part : in.checks.pushes) {
+      if (!part.usable) continue;
+      if (softest == nullptr || part.log_young < softest->log_young) softest = &part;
+      if (stiffest == nullptr || part.log_young > stiffest->log_young) stiffest = &part;
+    }
+    out.push_back({"not_homogeneous",
+                   "The pushes do not agree on one E: from " + number(std::exp(softest->log_young)) + " Pa (" + softest->name +
+                       ") to " + number(std::exp(stiffest->log_young)) + " Pa (" + stiffest->name +
+                       "), more than their intervals allow. The object is not the same everywhere, or a contact point or "
+                       "support is wrong; look at E by push."});
+  }
+  const auto differ = [&](const PartialYoung& a, const PartialYoung& b) {
+    return a.usable && b.usable && homogeneity_p_value({a, b}, poisson_std) < rare;
+  };
+  const auto ratio = [](const PartialYoung& a, const PartialYoung& b) { return number(std::exp(a.log_young - b.log_young)); };
+  if (differ(in.checks.low_loads, in.checks.high_loads)) {
+    const bool softens = in.checks.high_loads.log_young < in.checks.low_loads.log_young;
+    out.push_back({"not_linear",
+                   "E drifts with the load: the higher half of the loads gives " + ratio(in.checks.high_loads, in.checks.low_loads) +
+                       " times the E of the lower half, so the material " + (softens ? "softens" : "stiffens") +
+                       " beyond what the law `" + in.answer.material +
+                       "` describes. For small strains believe the lower loads; try another --material (foam softens)."});
+  }
+  if (differ(in.checks.loading, in.checks.unloading)) {
+    out.push_back({"hysteresis", "Unloading gives " + ratio(in.checks.unloading, in.checks.loading) +
+                                     " times the E of loading: the object creeps, or the tool slipped. Wait longer at each "
+                                     "step, or press more slowly."});
   }
 }
 
@@ -140,6 +164,7 @@ std::vector<Verdict> judge(const VerdictInput& input) {
   judge_poisson(input, verdicts);
   judge_nuisances(input, verdicts);
   judge_state(input, verdicts);
+  judge_parts(input, verdicts);
   return verdicts;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "palpate/core/identification.hpp"
+#include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/objective.hpp"
 #include "palpate/estimation/optimise.hpp"
 
@@ -15,6 +16,7 @@ struct VerdictInput {
   const Optimum& optimum;
   const ResidualSummary& residuals;
   const Identification& answer;  ///< parameters, nuisances and fit are filled
+  const CrossChecks& checks;     ///< empty where none were made
 };
 
 /// What the numbers mean, in plain words; codes are stable and listed in docs/uncertainty.md.

@@ -48,6 +48,12 @@ TEST_P(Derivatives, AreThoseOfSurfaceForceAndTravel) {
         claimed.segment<3>(here.d_surface.rows() + 4 * l + 1) += here.d_force[static_cast<std::size_t>(l)].col(column);
       }
     }
+    ASSERT_NE(here.field, nullptr);
+    if (const int mode = k - here.field_unknown; mode >= 0 && mode < here.field->modes()) {
+      for (Index v = 0; v < here.surface_m.rows(); ++v) {
+        claimed.segment<3>(3 * v) += here.field->basis()(v, mode) * here.field_directions.row(v).transpose();
+      }
+    }
     const double h = difference_of(unknowns, k);
     VectorX ahead = at, behind = at;
     ahead(k) += h;
@@ -68,7 +74,7 @@ TEST_P(Derivatives, AreThoseOfSurfaceForceAndTravel) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Clamped, Derivatives,
-                         testing::Combine(testing::Values("neo_hookean", "linear"), testing::Values(0, 1, 2),
+                         testing::Combine(testing::Values("neo_hookean", "linear"), testing::Values(0, 1, 2, 3),
                                           testing::Bool()));
 
 /// A bar that lies on z = 0 without friction, under a platen without friction at its top.

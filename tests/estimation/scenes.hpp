@@ -76,7 +76,8 @@ inline Support sliding(const std::string& name, const Vec3& point_m, const Vec3&
 inline const Vec3 block_size_m(0.06, 0.04, 0.03);
 
 /// The block clamped at x = 0 in a clamp whose pose is uncertain, under its own weight. Push "tip": a measured force at the
-/// free end, and an unloaded step. Push "plate": a smooth platen pressed into the top. Every nuisance has a prior.
+/// free end, and an unloaded step. Push "plate": a smooth platen pressed into the top. Push "disc": a pad whose place is not
+/// exactly known. The rest surface has a slow error. Every nuisance has a prior.
 inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   Recording recording;
   Support clamp;
@@ -104,7 +105,13 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   plate.shape = ToolShape::platen;
   plate.plane = {Vec3(0, 0, block_size_m.z()), -Vec3::UnitZ()};
   plate.contact = ContactLaw::frictionless;
-  recording.tools = {tip, plate};
+  Tool disc;
+  disc.name = "disc";
+  disc.shape = ToolShape::disc;
+  disc.radius_m = 0.012;
+  recording.tools = {tip, plate, disc};
+  recording.rest.surface_std_m = 4e-4;
+  recording.rest.surface_correlation_m = 0.03;
 
   Push by_tip;
   by_tip.name = "tip";
@@ -130,7 +137,18 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   by_plate.steps.resize(1);
   by_plate.steps[0].loads = {travel};
 
-  recording.pushes = {by_tip, by_plate};
+  Push by_disc;
+  by_disc.name = "disc";
+  Load press;
+  press.tool = "disc";
+  press.force_n = Vec3(0.02, 0, -0.15);
+  press.contact_m = Vec3(0.04, 0.02, block_size_m.z());
+  press.direction = Vec3(0.1, 0, -1).normalized();
+  press.contact_std_m = 2e-3;
+  by_disc.steps.resize(1);
+  by_disc.steps[0].loads = {press};
+
+  recording.pushes = {by_tip, by_plate, by_disc};
   return recording;
 }
 

@@ -67,6 +67,8 @@ TermInput markers(const Scene&) {
 
 TermInput travel(const Scene&) { return ToolTravel{"tip", 0.004, 2e-4}; }
 
+TermInput travel_of_disc(const Scene&) { return ToolTravel{"disc", 0.004, 2e-4}; }
+
 TermInput wrench(const Scene&) {
   Wrench wrench;
   wrench.force_n = Vec3(0.1, -0.2, -1.5);
@@ -83,7 +85,7 @@ TermInput single_axis_wrench(const Scene& scene) {
 struct Case {
   const char* name;
   TermInput (*make)(const Scene&);
-  std::size_t step;  ///< of clamped_block: 0 tip, 1 unloaded, 2 plate
+  std::size_t step;  ///< of clamped_block: 0 tip, 1 unloaded, 2 plate, 3 disc
   bool along_rays;
   bool weight = true;
 };
@@ -95,6 +97,8 @@ const std::vector<Case> cases{
     {"cloud_tip", cloud, 0, true},
     {"cloud_plate", cloud, 2, true},
     {"cloud_unloaded", cloud, 1, true, false},
+    {"rays_disc", rays, 3, true},
+    {"travel_disc", travel_of_disc, 3, true},
     {"markers_tip", markers, 0, true},
     {"markers_plate", markers, 2, true},
     {"travel_tip", travel, 0, true},
@@ -151,7 +155,10 @@ TEST_P(TermContract, JacobianIsTheDerivativeOfTheResidual) {
     // the unknown moves by its prior's standard deviation.
     VectorX measured(rows.residual.size());
     for (Index i = 0; i < measured.size(); ++i) {
-      const bool seen = std::isfinite(rows.residual(i)) && std::isfinite(above(i)) && std::isfinite(below(i));
+      bool seen = std::isfinite(rows.residual(i)) && std::isfinite(above(i)) && std::isfinite(below(i));
+      // Where the closest triangle changes between the two differences there is no derivative to compare with.
+      const double left = rows.residual(i) - below(i), right = above(i) - rows.residual(i);
+      seen = seen && std::abs(right - left) < 0.01 * (std::abs(right) + std::abs(left)) + 1e-6;
       measured(i) = seen ? (above(i) - below(i)) / (2 * h) : claimed(i);
       compared += seen;
     }

@@ -38,7 +38,9 @@ class CloudTerm : public Term {
     TermRows rows;
     rows.unknowns = predicted.columns;
     for (int k = 0; pose_ >= 0 && k < 6; ++k) rows.unknowns.push_back(pose_ + k);
-    rows.jacobian.resize(points_m_.rows(), static_cast<Index>(rows.unknowns.size()));
+    const FieldColumns field(predicted);
+    field.append_unknowns(rows.unknowns);
+    rows.jacobian.setZero(points_m_.rows(), static_cast<Index>(rows.unknowns.size()));
     rows.residual.resize(points_m_.rows());
     rows.sigma = sigma_m_;
     rows.cell = cell_;
@@ -57,12 +59,12 @@ class CloudTerm : public Term {
       // The distance grows along `apart`; on the surface itself that direction is the face's normal.
       if (apart.norm() > 1e-9) normal = side * apart.normalized();
       rows.residual(i) = side * apart.norm() / sigma_m_(i);
-      rows.jacobian.row(i).head(count).setZero();
       for (int k = 0; k < 3; ++k) {
         rows.jacobian.row(i).head(count) -=
             hit.barycentric(k) / sigma_m_(i) * (normal.transpose() * predicted.d_surface.middleRows<3>(3 * triangle(k)));
       }
-      if (pose_ >= 0) rows.jacobian.row(i).tail<6>() = normal.transpose() * frame.derivative(points_m_.row(i)) / sigma_m_(i);
+      field.subtract(rows.jacobian, i, triangle, hit.barycentric, normal / sigma_m_(i));
+      if (pose_ >= 0) rows.jacobian.row(i).segment<6>(count) = normal.transpose() * frame.derivative(points_m_.row(i)) / sigma_m_(i);
       rows.observed_m.row(i) = point;
     }
     return rows;

@@ -47,6 +47,7 @@ class MarkerTerm : public Term {
   }
 
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool) const override {
+    const Points& surface_m = predicted.markers_m();  // a marker's place is measured itself: the seen shape's error is not its
     std::vector<Index> seen;
     for (Index m = 0; m < markers_.rest_m.rows(); ++m) {
       if (!patches_[static_cast<std::size_t>(m)].vertices.empty()) seen.push_back(m);
@@ -70,12 +71,12 @@ class MarkerTerm : public Term {
       Vec3 centre = Vec3::Zero();
       MatrixX d_centre = MatrixX::Zero(3, count);
       for (Index v : patch.vertices) {
-        centre += share * predicted.surface_m.row(v).transpose();
-        d_centre += share * predicted.d_surface.middleRows<3>(3 * v);
+        centre += share * surface_m.row(v).transpose();
+        d_centre += share * predicted.d_markers().middleRows<3>(3 * v);
       }
       Mat3 correlation = Mat3::Zero();
       for (Index v : patch.vertices) {
-        correlation += (predicted.surface_m.row(v).transpose() - centre) * (rest_.vertices_m.row(v) - patch.centre_m.transpose());
+        correlation += (surface_m.row(v).transpose() - centre) * (rest_.vertices_m.row(v) - patch.centre_m.transpose());
       }
       const Eigen::JacobiSVD<Mat3> svd(correlation, Eigen::ComputeFullU | Eigen::ComputeFullV);
       Mat3 sign = Mat3::Identity();
@@ -87,7 +88,7 @@ class MarkerTerm : public Term {
       for (Index v : patch.vertices) {
         const Vec3 arm = rotation * (rest_.vertices_m.row(v).transpose() - patch.centre_m);
         for (Index k = 0; k < count; ++k) {
-          moment.col(k) += arm.cross(Vec3(predicted.d_surface.block<3, 1>(3 * v, k)));
+          moment.col(k) += arm.cross(Vec3(predicted.d_markers().block<3, 1>(3 * v, k)));
         }
       }
       const MatrixX spin = (symmetric.trace() * Mat3::Identity() - symmetric).ldlt().solve(moment);

@@ -37,6 +37,8 @@ class RayTerm : public Term {
     rows.unknowns = predicted.columns;
     for (int k = 0; pose_ >= 0 && k < 6; ++k) rows.unknowns.push_back(pose_ + k);
     if (bias_ >= 0) rows.unknowns.push_back(bias_);
+    const FieldColumns field(predicted);
+    field.append_unknowns(rows.unknowns);
     rows.jacobian = MatrixX::Zero(rays_.range_m.size(), static_cast<Index>(rows.unknowns.size()));
     rows.residual.resize(rays_.range_m.size());
     rows.sigma = rays_.sigma_m;
@@ -90,6 +92,7 @@ class RayTerm : public Term {
             barycentric(k) / sigma_m *
             (gradient.transpose() * predicted.d_surface.middleRows<3>(3 * tree_.mesh().triangles(triangle, k)));
       }
+      field.subtract(rows.jacobian, i, tree_.mesh().triangles.row(triangle), barycentric, gradient / sigma_m);
       if (pose_ >= 0) {
         rows.jacobian.block<1, 6>(i, pose_column) = gradient.transpose() * frame.derivative(lever) / sigma_m;
       }

@@ -20,4 +20,25 @@ std::string step_suffix(const TermContext& context);
 /// Six unknowns of a frame's pose, or -1 when it is exactly known.
 int add_frame_pose(const TermContext& context, double pose_std_m, double pose_std_rad);
 
+/// Columns of the rest surface's slow error at the end of a term's jacobian; none where the recording states no such error.
+class FieldColumns {
+ public:
+  explicit FieldColumns(const StepPrediction& predicted) : predicted_(predicted) {}
+  Index count() const { return predicted_.field != nullptr ? predicted_.field->modes() : 0; }
+  void append_unknowns(std::vector<int>& unknowns) const {
+    for (Index k = 0; k < count(); ++k) unknowns.push_back(predicted_.field_unknown + static_cast<int>(k));
+  }
+  /// Row of residual = gradient . (observed - surface point), the point being `barycentric` of `vertices`.
+  template <class Vertices>
+  void subtract(MatrixX& jacobian, Index row, const Vertices& vertices, const Vec3& barycentric, const Vec3& gradient) const {
+    for (int k = 0; k < 3 && count() > 0; ++k) {
+      const double along = gradient.dot(Vec3(predicted_.field_directions.row(vertices(k))));
+      jacobian.row(row).tail(count()) -= barycentric(k) * along * predicted_.field->basis().row(vertices(k));
+    }
+  }
+
+ private:
+  const StepPrediction& predicted_;
+};
+
 }  // namespace palpate::estimation

@@ -84,7 +84,11 @@ std::unique_ptr<Term> make_travel_term(const ToolTravel& travel, const TermConte
     if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, push.travel_offset_std_m});
     offset = context.shared[name];
   }
-  return std::make_unique<TravelTerm>(travel.travel_m, travel.sigma_m, static_cast<Index>(load), offset);
+  // The encoder reads the tip's motion plus what stick and arm give way.
+  const Load& loaded = context.model.step(context.step).loads[load];
+  const double yielded_m =
+      context.model.tool(loaded.tool).compliance_m_per_n * loaded.force_n.value_or(Vec3::Zero()).dot(loaded.direction.normalized());
+  return std::make_unique<TravelTerm>(travel.travel_m - yielded_m, travel.sigma_m, static_cast<Index>(load), offset);
 }
 
 std::unique_ptr<Term> make_wrench_term(const Wrench& wrench, const TermContext& context) {

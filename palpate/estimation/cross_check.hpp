@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Do the parts of a recording agree? E of single pushes, of low and high loads, of loading and unloading, all at the joint fit's
+// nu; and prediction of pushes that the fit has not seen.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "palpate/core/identification.hpp"
+#include "palpate/estimation/optimise.hpp"
+
+namespace palpate::estimation {
+
+/// log E of some steps alone, everything else but nu free under its prior.
+struct PartialYoung {
+  std::string name;
+  double log_young = 0, std = 0;  ///< std: nu known
+  double slope = 0;               ///< d log E / d nu
+  bool usable = false;
+  bool cancelled = false;
+};
+
+struct CrossChecks {
+  std::vector<PartialYoung> pushes;             ///< empty where there is one push only
+  PartialYoung low_loads, high_loads;           ///< usable where pushes have levels
+  PartialYoung loading, unloading;              ///< usable where steps were recorded on the way back
+  HeldOut held_out;
+  bool cancelled = false;
+};
+
+/// Refits parts of the recording from the joint optimum. The objective's last evaluation is the optimum's when it starts, and
+/// when it ends.
+/// @param factor  information factor of robust rows
+CrossChecks cross_check(Objective& objective, const Optimum& optimum, const Loss& loss, double factor, const OnProgress& progress);
+
+/// Cochran's Q test that parts share one E: chance of differences at least as large (Cochran 1954). Each part's variance holds
+/// its own noise, what nu's uncertainty does to it apart from the others, and 2 % for the tool's contact, which no part knows.
+/// @returns 1 for fewer than two usable parts
+double homogeneity_p_value(const std::vector<PartialYoung>& parts, double poisson_std);
+
+/// Upper tail of the chi-square distribution.
+double chi_square_tail(double value, int degrees_of_freedom);
+
+}  // namespace palpate::estimation

@@ -1,0 +1,89 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// Parts of a recording that disagree are found, and parts that agree are left alone; pushes that the fit has not seen are
+// predicted better than by doing nothing.
+#include "palpate/estimation/cross_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+bool says(const Identification& answer, const std::string& code) {
+  for (const auto& verdict : answer.verdicts) {
+    if (verdict.code == code) return true;
+  }
+  return false;
+}
+
+/// The block pushed twice, as if the second push met a body of another E.
+Identification fit_of_two(double first_young_pa, double second_young_pa) {
+  Recording recording = pushed_block_recording();
+  recording.pushes.push_back(recording.pushes[0]);
+  recording.pushes[1].name = "again";
+  PushedBlock one, two;
+  one.young_pa = first_young_pa;
+  two.young_pa = second_young_pa;
+  two.seed = 8;
+  Inputs inputs = clouds_of(one);
+  for (auto& step : clouds_of(two)) inputs.push_back(step);
+  return fit(recording, coarse_block(), inputs, {});
+}
+
+TEST(CrossCheck, PushesOnOneBodyAgreeAndPredictEachOther) {
+  const Identification answer = fit_of_two(2e4, 2e4);
+  EXPECT_FALSE(says(answer, "not_homogeneous"));
+  EXPECT_FALSE(says(answer, "not_linear"));
+  ASSERT_EQ(answer.per_push.size(), 2u);
+  for (const auto& push : answer.per_push) EXPECT_NEAR(push.value, 2e4, 4 * push.std) << push.region;
+  ASSERT_TRUE(answer.prediction.available);
+  EXPECT_LT(answer.prediction.surface_rms_m, 1.15 * PushedBlock{}.sigma_m);  // noise is all that is left
+  EXPECT_GT(answer.prediction.baseline_no_deformation_rms_m, 2 * answer.prediction.surface_rms_m);
+  EXPECT_GT(answer.prediction.baseline_last_step_rms_m, 1.2 * answer.prediction.surface_rms_m);
+  EXPECT_LT(answer.prediction.force_error, 0.1);
+}
+
+TEST(CrossCheck, PushesOnBodiesOfDifferentStiffnessAreCalledSo) {
+  const Identification answer = fit_of_two(2e4, 3e4);
+  EXPECT_TRUE(says(answer, "not_homogeneous"));
+  ASSERT_EQ(answer.per_push.size(), 2u);
+  EXPECT_NEAR(answer.per_push[0].value, 2e4, 0.1 * 2e4);
+  EXPECT_NEAR(answer.per_push[1].value, 3e4, 0.1 * 3e4);
+  EXPECT_NEAR(answer.prediction.force_error, 0.45, 0.15);  // |2/3 - 1| and |3/2 - 1|
+}
+
+TEST(CrossCheck, MaterialThatStiffensBeyondItsLawIsCalledSo) {
+  Recording recording = pushed_block_recording();
+  PushedBlock soft, stiff;
+  stiff.young_pa = 1.5 * soft.young_pa;
+  Inputs inputs = clouds_of(soft);
+  inputs[1] = clouds_of(stiff)[1];  // the higher load meets a stiffer body
+  const Identification answer = fit(recording, coarse_block(), inputs, {});
+  EXPECT_TRUE(says(answer, "not_linear"));
+}
+
+TEST(CochranQ, IsTheChiSquareTestOfWeightedMeans) {
+  // Upper tails from tables of the chi-square distribution.
+  EXPECT_NEAR(chi_square_tail(3.841, 1), 0.05, 1e-4);
+  EXPECT_NEAR(chi_square_tail(5.991, 2), 0.05, 1e-4);
+  EXPECT_NEAR(chi_square_tail(7.815, 3), 0.05, 1e-4);
+  EXPECT_NEAR(chi_square_tail(18.307, 10), 0.05, 1e-4);
+  EXPECT_NEAR(chi_square_tail(24.725, 11), 0.01, 1e-4);
+  EXPECT_EQ(chi_square_tail(0, 3), 1);
+
+  PartialYoung a{"a", std::log(1.0), 0.05, 0, true}, b{"b", std::log(1.1), 0.05, 0, true};
+  const double difference = std::log(1.1) / std::sqrt(2 * (0.05 * 0.05 + 0.02 * 0.02));
+  EXPECT_NEAR(homogeneity_p_value({a, b}, 0), std::erfc(difference / std::sqrt(2.0)), 1e-9);
+  // What a common nu would explain is no evidence.
+  b.slope = 2;
+  EXPECT_GT(homogeneity_p_value({a, b}, 0.05), homogeneity_p_value({a, b}, 0));
+  b.usable = false;
+  EXPECT_EQ(homogeneity_p_value({a, b}, 0), 1);
+}
+
+}  // namespace
+}  // namespace palpate::estimation
