@@ -9,9 +9,11 @@
 
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/reconstruction/build_object.hpp"
+#include "palpate/report/mesh_picture.hpp"
 #include "palpate/sensing/observe.hpp"
 
 namespace palpate::cli {
@@ -77,6 +79,7 @@ int run(const Options& o, Session& session) {
   std::filesystem::create_directories(folder);
   for (const char* name : {"model.vtu", "model.msh", "model.vtk"}) io::write_mesh(folder / name, built.model.volume);
   io::write_mesh(folder / "surface.ply", built.model.surface);
+  io::write_file(folder / "model.png", report::encode_png(report::draw_mesh(built.model.volume, 1600, 800)));
 
   const auto& c = built.check;
   for (const std::string& w : built.model.warnings) session.warn(w);
@@ -101,7 +104,7 @@ int run(const Options& o, Session& session) {
                   {"hausdorff_m", built.hausdorff_m},
                   {"unseen_share", built.model.unseen_share},
                   {"seconds", seconds},
-                  {"files", {"model.vtu", "model.msh", "model.vtk", "surface.ply"}},
+                  {"files", {"model.vtu", "model.msh", "model.vtk", "model.png", "surface.ply"}},
                   {"warnings", built.model.warnings}});
   return exit_done;
 }
@@ -113,7 +116,9 @@ Run verbs::model(CLI::App& app) {
   app.add_option("INPUT", o->input,
                  "mesh file: a surface (OBJ, STL, PLY, ...), however broken, or a volume (MSH, VTK, VTU); or a recording")
       ->required();
-  app.add_option("-o,--output", o->output, "folder for model.vtu, model.msh, model.vtk and surface.ply")->required();
+  app.add_option("-o,--output", o->output,
+                 "folder for model.vtu, model.msh, model.vtk, model.png (a picture) and surface.ply")
+      ->required();
   app.add_option("--tetrahedra", o->tetrahedra, "wished number of tetrahedra; 0 keeps those of a volume as they are")
       ->type_name("N")
       ->capture_default_str();

@@ -2,6 +2,7 @@
 #include "palpate/geometry/surface_distance.hpp"
 
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -9,7 +10,7 @@
 
 namespace palpate::geometry {
 
-SurfaceDistance one_sided_distance(const TriMesh& from, const TriMesh& to, int samples) {
+SurfaceDistance one_sided_distance(const TriMesh& from, const TriMesh& to, int samples, const CountedPoints& counted) {
   const TriangleTree tree(to);
   const auto corner = [&](Index t, int k) { return Vec3(from.vertices_m.row(from.triangles(t, k)).transpose()); };
   std::vector<double> cumulative(from.triangles.rows());
@@ -21,6 +22,11 @@ SurfaceDistance one_sided_distance(const TriMesh& from, const TriMesh& to, int s
   std::mt19937 rng(1);
   std::uniform_real_distribution<double> u;
   double sum = 0, largest = 0;
+  int count = 0;
+  const double ask2 = counted.counts ? counted.from_m * counted.from_m : std::numeric_limits<double>::infinity();
+  const auto counts = [&](const ClosestPoint& c, const Vec3& p, Index triangle) {
+    return c.squared_distance_m2 <= ask2 || counted.counts(p, triangle);
+  };
   std::size_t t = 0;
   Index hint = -1;
   for (int i = 0; i < samples; ++i) {
@@ -29,8 +35,11 @@ SurfaceDistance one_sided_distance(const TriMesh& from, const TriMesh& to, int s
     double v = u(rng), w = u(rng);
     if (v + w > 1) v = 1 - v, w = 1 - w;
     const auto id = static_cast<Index>(t);
-    const ClosestPoint c = tree.closest((1 - v - w) * corner(id, 0) + v * corner(id, 1) + w * corner(id, 2), hint);
+    const Vec3 p = (1 - v - w) * corner(id, 0) + v * corner(id, 1) + w * corner(id, 2);
+    const ClosestPoint c = tree.closest(p, hint);
     hint = c.triangle;
+    if (!counts(c, p, id)) continue;
+    ++count;
     sum += c.squared_distance_m2;
     largest = std::max(largest, c.squared_distance_m2);
   }
@@ -41,13 +50,13 @@ SurfaceDistance one_sided_distance(const TriMesh& from, const TriMesh& to, int s
         done[from.triangles(i, k)] = 1;
         const ClosestPoint c = tree.closest(corner(i, k), hint);
         hint = c.triangle;
-        largest = std::max(largest, c.squared_distance_m2);
+        if (c.squared_distance_m2 > largest && counts(c, corner(i, k), i)) largest = c.squared_distance_m2;
       }
-  return {std::sqrt(sum / samples), std::sqrt(largest)};
+  return {std::sqrt(sum / std::max(1, count)), std::sqrt(largest)};
 }
 
-SurfaceDistance surface_distance(const TriMesh& a, const TriMesh& b, int samples) {
-  const SurfaceDistance ab = one_sided_distance(a, b, samples), ba = one_sided_distance(b, a, samples);
+SurfaceDistance surface_distance(const TriMesh& a, const TriMesh& b, int samples, const CountedPoints& counted) {
+  const SurfaceDistance ab = one_sided_distance(a, b, samples, counted), ba = one_sided_distance(b, a, samples);
   return {std::sqrt(0.5 * (ab.rms_m * ab.rms_m + ba.rms_m * ba.rms_m)), std::max(ab.hausdorff_m, ba.hausdorff_m)};
 }
 

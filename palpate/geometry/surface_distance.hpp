@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
+
 #include "palpate/core/mesh.hpp"
 
 namespace palpate::geometry {
@@ -10,10 +12,18 @@ struct SurfaceDistance {
   double hausdorff_m = 0;  ///< largest distance of a sample or vertex of one surface from the other
 };
 
-/// Two-sided distance, `samples` points spread by area on each surface plus all vertices (which count for hausdorff_m only).
-SurfaceDistance surface_distance(const TriMesh& a, const TriMesh& b, int samples = 20000);
+/// Says whether a point of a triangle counts; asked of points that are farther than `from_m` only, because it may be slow.
+struct CountedPoints {
+  std::function<bool(const Vec3& point_m, Index triangle)> counts;
+  double from_m = 0;
+};
 
-/// Largest and mean-square distance of `from` from `to` only.
-SurfaceDistance one_sided_distance(const TriMesh& from, const TriMesh& to, int samples = 20000);
+/// Largest and root-mean-square distance of `from` from `to`: `samples` points spread by area, and all vertices, which count
+/// for hausdorff_m only.
+SurfaceDistance one_sided_distance(const TriMesh& from, const TriMesh& to, int samples = 20000,
+                                   const CountedPoints& counted = {});
+
+/// Both ways; `counted` is about points of `a`.
+SurfaceDistance surface_distance(const TriMesh& a, const TriMesh& b, int samples = 20000, const CountedPoints& counted = {});
 
 }  // namespace palpate::geometry

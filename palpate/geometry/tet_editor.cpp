@@ -214,7 +214,7 @@ bool TetEditor::link_condition(Index a, Index b, const std::vector<Index>& ring)
   return shared_edges.empty();
 }
 
-bool TetEditor::collapse(Index gone, Index kept, double above, const Accept& accept, double tolerance) {
+bool TetEditor::collapse(Index gone, Index kept, double above, const Accept& accept, double most_drift_m) {
   if (boundary[gone] && !boundary[kept]) return false;
   std::vector<Index> ring;
   std::vector<Tet> fresh;
@@ -242,7 +242,7 @@ bool TetEditor::collapse(Index gone, Index kept, double above, const Accept& acc
       nearest = std::min(nearest, std::sqrt(squared_distance_to_triangle(x[gone], x[t[0]], x[t[1]], x[t[2]])));
     // a thin tip must not be eaten up by many small bites
     const double drift = std::max(drift_m[kept], drift_m[gone] + nearest);
-    if (drift > allowed_m(tolerance, std::min(size_m[gone], size_m[kept]))) return false;
+    if (drift > most_drift_m) return false;
     if (accept && !accept(before, after)) return false;
     drift_m[kept] = drift;
   }

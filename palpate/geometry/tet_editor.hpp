@@ -46,8 +46,8 @@ class TetEditor {
   using Accept = std::function<bool(const std::vector<Tri>& before, const std::vector<Tri>& after)>;
 
   /// Merges `gone` into `kept` at kept's place, if the result stays manifold and its smallest quality exceeds `above`.
-  /// `tolerance`: how much of the wished edge length repeated merges may cut off the boundary.
-  bool collapse(Index gone, Index kept, double above, const Accept& accept, double tolerance = 1e300);
+  /// `most_drift_m`: how much repeated merges may cut off the boundary.
+  bool collapse(Index gone, Index kept, double above, const Accept& accept, double most_drift_m = 1e300);
   /// Replaces the tetrahedra around an edge by the best triangulation of its ring (Shewchuk 2002), interior or boundary.
   bool remove_edge(Index a, Index b, const Accept& accept);
   /// Two tetrahedra at a face become three around the edge between their far corners.

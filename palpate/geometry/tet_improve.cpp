@@ -51,22 +51,31 @@ TetEditor::Accept near_surface(const TetEditor& mesh, const Solid& solid, double
 class Improver {
  public:
   Improver(TetEditor& mesh, const Solid& solid, const SurfaceSamples& samples, const ImproveOptions& options)
-      : m_(mesh), solid_(solid), samples_(samples), o_(options), accept_(near_surface(mesh, solid, options.tolerance)) {}
+      : m_(mesh),
+        solid_(solid),
+        samples_(samples),
+        o_(options),
+        accept_(near_surface(mesh, solid, options.tolerance)),
+        tolerance_(options.tolerance) {}
 
   bool run(const OnProgress& progress) {
     for (int round = 0; round < o_.most_rounds; ++round) {
       if (progress && !progress("quality", double(round) / o_.most_rounds)) return false;
       const double floor = std::min(o_.target_quality, 0.2 + 0.04 * round);
-      if (round < 4 || round % 2 == 0) fit_to_surface(m_, solid_, samples_, floor);
-      const double below = round < 3 ? 0.7 : o_.target_quality + (round < 6 ? 0.08 : 0.03);
+      if (round < 2 || round % 2 == 0) fit_to_surface(m_, solid_, samples_, floor);
+      const double below = round < 2 ? 0.62 : o_.target_quality + (round < 6 ? 0.08 : 0.03);
       swap(below);
       smooth(below);
       if (round % 2 == 1) merge(o_.target_quality);
       smooth(below);
       if (round > 3 && worst() >= o_.target_quality) break;
     }
-    for (int round = 0; round < 6 && worst() < o_.target_quality; ++round) {
+    for (int round = 0; round < 12 && worst() < (round < 8 ? o_.target_quality : usable); ++round) {
       off_surface_ = round > 1;
+      if (round >= 8) {  // better a little off the surface than an element that spoils the stiffness matrix
+        tolerance_ *= 1.4;
+        accept_ = near_surface(m_, solid_, tolerance_);
+      }
       insert(o_.target_quality);
       swap(o_.target_quality);
       smooth(o_.target_quality);
@@ -84,6 +93,8 @@ class Improver {
   }
 
  private:
+  static constexpr double usable = 0.3;  ///< 17.5 and 134 degrees
+
   std::vector<Index> worse_than(double q) const {
     std::vector<Index> out;
     for (std::size_t t = 0; t < m_.tets.size(); ++t)
@@ -117,9 +128,11 @@ class Improver {
         return (m_.x[a[0]] - m_.x[a[1]]).squaredNorm() < (m_.x[b[0]] - m_.x[b[1]]).squaredNorm();
       });
       for (const auto& [gone, kept] : edges)
-        if (m_.collapse(gone, kept, std::min(below, m_.star_quality(gone) + 1e-6), accept_, o_.tolerance)) break;
+        if (m_.collapse(gone, kept, std::min(below, m_.star_quality(gone) + 1e-6), accept_, drift(gone, kept))) break;
     }
   }
+
+  double drift(Index a, Index b) const { return m_.allowed_m(tolerance_, std::min(m_.size_m[a], m_.size_m[b])); }
 
   /// Splits an edge of a bad element where the new vertex, well placed, leaves only better ones.
   void insert(double below) {
@@ -146,17 +159,30 @@ class Improver {
     for (const Index v : todo) smooth_vertex(v);
   }
 
-  /// Soft minimum of the star's quality and its gradient by differences.
-  double soft(Index v, const Vec3& at) const {
-    constexpr double sharpness = 25;
+  /// Gradient by differences of the soft minimum of the star's quality; elements well above the worst weigh nothing in it.
+  Vec3 gradient(Index v, double worst, double h) const {
+    constexpr double sharpness = 25, reach = 0.16;
+    Vec3 g = Vec3::Zero();
     double sum = 0;
     for (const Index id : m_.star[v]) {
+      const double here = m_.quality[id];
+      if (here > worst + reach) continue;
+      const double weight = std::exp(-sharpness * (here - worst));
+      sum += weight;
       const TetEditor::Tet& t = m_.tets[id];
       std::array<Vec3, 4> p;
-      for (int k = 0; k < 4; ++k) p[k] = t[k] == v ? at : m_.x[t[k]];
-      sum += std::exp(-sharpness * tet_quality(p[0], p[1], p[2], p[3]));
+      int place = 0;
+      for (int k = 0; k < 4; ++k) {
+        p[k] = m_.x[t[k]];
+        if (t[k] == v) place = k;
+      }
+      for (int k = 0; k < 3; ++k) {
+        p[place][k] += h;
+        g[k] += weight * (tet_quality(p[0], p[1], p[2], p[3]) - here) / h;
+        p[place][k] -= h;
+      }
     }
-    return -std::log(sum) / sharpness;
+    return g / sum;
   }
 
   void smooth_vertex(Index v) {
@@ -166,6 +192,7 @@ class Improver {
     ClosestPoint foot;
     Vec3 offset = Vec3::Zero();
     bool on_surface = false;
+    Around around;
     if (outer) {
       normal = m_.boundary_normal(v);
       if (normal.isZero(0)) return;
@@ -175,9 +202,7 @@ class Improver {
     }
     const double h = 1e-4 * m_.size_m[v];
     for (int step = 0; step < 3; ++step) {
-      const double here = soft(v, m_.x[v]);
-      Vec3 g;
-      for (int k = 0; k < 3; ++k) g[k] = (soft(v, m_.x[v] + h * Vec3::Unit(k)) - here) / h;
+      Vec3 g = gradient(v, q, h);
       if (outer && !off_surface_) g -= g.dot(normal) * normal;
       const double slope = g.norm();
       if (!(slope > 1e-9)) break;
@@ -192,7 +217,7 @@ class Improver {
         }
         const double fresh = m_.star_quality_at(v, to, q);
         if (fresh > q + 1e-4) {
-          if (outer && !stays_near(v, to, foot.triangle)) continue;
+          if (outer && !stays_near(v, to, foot.triangle, around)) continue;
           m_.move(v, to);
           q = fresh;
           moved = true;
@@ -207,24 +232,36 @@ class Improver {
     for (int i = 0; i < 24; ++i, reach *= 0.93) {
       const Vec3 to = m_.x[v] + reach * Vec3(uniform_(rng_), uniform_(rng_), uniform_(rng_));
       const double fresh = m_.star_quality_at(v, to, q);
-      if (fresh <= q + 1e-4 || (outer && !stays_near(v, to, foot.triangle))) continue;
+      if (fresh <= q + 1e-4 || (outer && !stays_near(v, to, foot.triangle, around))) continue;
       m_.move(v, to);
       q = fresh;
     }
   }
 
-  /// Sum of squared distances of the boundary triangles' middles must not grow noticeably.
-  bool stays_near(Index v, const Vec3& to, Index hint) {
-    double before = 0, after = 0;
-    const Vec3 old = m_.x[v];
-    for (const auto& t : m_.boundary_triangles(v)) {
-      const Vec3 rest = m_.x[t[1]] + m_.x[t[2]];
-      before = std::max(before, solid_.closest((old + rest) / 3, hint).squared_distance_m2);
-      after = std::max(after, solid_.closest((to + rest) / 3, hint).squared_distance_m2);
+  /// The boundary triangles around a vertex that moves, and the largest squared distance of their middles so far.
+  struct Around {
+    std::vector<TetEditor::Tri> triangles;
+    double farthest2 = -1;
+  };
+
+  /// That distance must not grow noticeably.
+  bool stays_near(Index v, const Vec3& to, Index hint, Around& around) const {
+    const auto farthest2 = [&](const Vec3& at) {
+      double most = 0;
+      for (const auto& t : around.triangles)
+        most = std::max(most, solid_.closest((at + m_.x[t[1]] + m_.x[t[2]]) / 3, hint).squared_distance_m2);
+      return most;
+    };
+    if (around.farthest2 < 0) {
+      around.triangles = m_.boundary_triangles(v);
+      around.farthest2 = farthest2(m_.x[v]);
     }
-    const double allowed = (off_surface_ ? o_.tolerance : 0.04) * m_.size_m[v];
+    const double allowed = (off_surface_ ? tolerance_ : 0.04) * m_.size_m[v];
     if (off_surface_ && solid_.closest(to, hint).squared_distance_m2 > allowed * allowed) return false;
-    return after <= std::max(1.02 * before, allowed * allowed);
+    const double after = farthest2(to);
+    if (after > std::max(1.02 * around.farthest2, allowed * allowed)) return false;
+    around.farthest2 = after;  // the caller moves the vertex now
+    return true;
   }
 
   TetEditor& m_;
@@ -234,6 +271,7 @@ class Improver {
   TetEditor::Accept accept_;
   std::mt19937 rng_{1};
   std::uniform_real_distribution<double> uniform_{-1, 1};
+  double tolerance_;
   bool off_surface_ = false;  ///< boundary vertices may leave the surface within the tolerance
 };
 
@@ -267,7 +305,8 @@ void merge_short_edges(TetEditor& mesh, const Solid& solid, double share, double
       for (const auto& [gone, kept] : {std::pair{s.a, s.b}, std::pair{s.b, s.a}}) {
         if (mesh.boundary[gone] && !mesh.boundary[kept]) continue;
         const double above = std::min(above_quality, mesh.star_quality(gone));
-        if (mesh.collapse(gone, kept, above, accept, 0.12)) {
+        const double drift = mesh.allowed_m(0.12, std::min(mesh.size_m[gone], mesh.size_m[kept]));
+        if (mesh.collapse(gone, kept, above, accept, drift)) {
           ++merged;
           break;
         }

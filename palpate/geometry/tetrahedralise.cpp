@@ -12,6 +12,8 @@
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/lattice_cut.hpp"
 #include "palpate/geometry/surface_distance.hpp"
+#include "palpate/geometry/surface_fit.hpp"
+#include "palpate/geometry/tet_coarsen.hpp"
 #include "palpate/geometry/tet_improve.hpp"
 
 namespace palpate::geometry {
@@ -71,16 +73,18 @@ std::pair<Index, double> drop_small_pieces(TetEditor& mesh, double share) {
   return dropped;
 }
 
+/// Longest edge that the caller wants at a place.
+double finest_near(const TetrahedraliseOptions& o, const Vec3& p) {
+  double edge = std::numeric_limits<double>::infinity();
+  for (const FinerNear& f : o.finer)
+    edge = std::min(edge, f.edge_m + 0.5 * std::max(0.0, (p - f.point_m).norm() - f.radius_m));
+  return edge;
+}
+
 std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, const TetrahedraliseOptions& o, double cell) {
   Lattice lattice(solid, cell);
   lattice.refine_to_surface(samples, o.detail * cell, cell / o.finest);
-  if (!o.finer.empty())
-    lattice.refine_to_size([&](const Vec3& p) {
-      double edge = std::numeric_limits<double>::infinity();
-      for (const FinerNear& f : o.finer)
-        edge = std::min(edge, f.edge_m + 0.5 * std::max(0.0, (p - f.point_m).norm() - f.radius_m));
-      return edge;
-    });
+  if (!o.finer.empty()) lattice.refine_to_size([&](const Vec3& p) { return finest_near(o, p); });
   Draft out{cut_lattice(lattice, solid), 0, 0};
   if (out.mesh.count() == 0) return std::nullopt;
   // thin parts that the lattice tears into pieces get a finer one around the pieces, as long as that brings them together
@@ -155,42 +159,49 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     throw Error("the surface encloses nothing: there is no inside to fill. Close it, or complete it first", "surface");
   const double reference = solid.watertight() ? *check_surface(solid.surface()).volume_m3 : counted_volume(solid);
   const double volume = std::max(reference, 1e-4 * (solid.max_m() - solid.min_m()).prod());
-  // A lattice of cubes has 12 tetrahedra a cube; boundaries and thin parts cost more, found by trying.
-  double cell = o.edge_m > 0 ? o.edge_m / 0.93 : std::cbrt(12 * volume / o.tetrahedra) * 1.3;
+  // A lattice of cubes has 12 tetrahedra a cube; boundaries and thin parts cost more, found by trying. What is too much is
+  // merged again where the surface loses least.
+  double cell = o.edge_m > 0 ? o.edge_m / 0.93 : std::cbrt(12 * volume / o.tetrahedra) * 1.2;
   const double shrinks = 0.95;  // improvement merges some more
+  constexpr int attempts = 5;
   std::optional<Draft> best;
-  double best_miss = std::numeric_limits<double>::infinity();
-  double too_few = std::numeric_limits<double>::infinity(), too_many = 0;  // cells that gave too few and too many
-  double last_cell = 0, last_ratio = 0;
-  constexpr int attempts = 6;
+  double best_ratio = 0;
   for (int attempt = 0; attempt < attempts; ++attempt) {
     if (progress && !progress("lattice", double(attempt) / attempts)) out.cancelled = true;
     auto fresh = draft(solid, samples, o, cell);
     const double ratio = fresh ? shrinks * fresh->mesh.count() / o.tetrahedra : 0.2;
-    const double miss = std::abs(std::log(ratio));
-    if (fresh && (o.edge_m > 0 || miss < best_miss)) best = std::move(fresh), best_miss = miss;
-    if ((best && (o.edge_m > 0 || best_miss < 0.06)) || out.cancelled) break;
-    // the next cell by the secant of log count over log cell, within the bracket once there is one
-    const double log_cell = std::log(cell), log_ratio = std::log(ratio);
-    double slope = -2.3;
-    if (attempt > 0 && log_cell != last_cell)
-      slope = std::clamp((log_ratio - last_ratio) / (log_cell - last_cell), -3.0, -0.7);
-    last_cell = log_cell, last_ratio = log_ratio;
-    (ratio < 1 ? too_few : too_many) = cell;
-    cell = std::exp(log_cell + std::clamp(-log_ratio / slope, -0.6, 0.6));
-    const auto [low, high] = std::minmax(too_few, too_many);
-    if (too_many > 0 && std::isfinite(too_few) && (cell <= low || cell >= high)) cell = std::sqrt(low * high);
+    if (fresh && (best_ratio < 1 ? ratio > best_ratio : ratio >= 1)) best = std::move(fresh), best_ratio = ratio;
+    if ((best && o.edge_m > 0) || (ratio > 0.95 && ratio < 5) || out.cancelled) break;
+    cell *= std::pow(std::clamp(ratio / 1.25, 0.2, 3.0), 0.43);
   }
   if (!best)
     throw Error(fmt::format("the object is thinner everywhere than {} tetrahedra can show; ask for more", o.tetrahedra),
                 "surface");
+  if (best_ratio > 1.05 && o.edge_m == 0 && o.improve && !out.cancelled) {
+    CoarsenOptions fewer{static_cast<Index>(o.tetrahedra / shrinks), 0.1 * cell, {}};
+    if (!o.finer.empty()) fewer.edge_m = [&](const Vec3& p) { return finest_near(o, p); };
+    fit_to_surface(best->mesh, solid, samples, 0.1);  // sharp edges are cut off by the lattice: first find them again
+    coarsen(best->mesh, solid, samples, fewer);
+  }
   if (o.improve && !out.cancelled) out.cancelled = !improve(best->mesh, solid, samples, {}, progress);
 
   out.mesh = best->mesh.compact();
   out.check = check_volume(out.mesh);
   const TriMesh boundary = boundary_surface(out.mesh).surface;
   if (known_volume) out.volume_error = out.check.volume_m3 / reference - 1;
-  const auto distance = solid.watertight() ? surface_distance(surface, boundary) : one_sided_distance(surface, boundary);
+  // what lies buried within other parts of a self-intersecting input is no boundary, and need not be met
+  const double step = 1e-4 * solid.diagonal_m();
+  const CountedPoints seen{[&](const Vec3& p, Index triangle) {
+                             const auto corner = [&](int k) -> Vec3 {
+                               return surface.vertices_m.row(surface.triangles(triangle, k)).transpose();
+                             };
+                             const Vec3 n = step * (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+                             return !(solid.inside(p + n) && solid.inside(p - n));
+                           },
+                           20 * step};
+  constexpr int points = 20000;
+  const auto distance = solid.watertight() ? surface_distance(surface, boundary, points, seen)
+                                           : one_sided_distance(surface, boundary, points, seen);
   out.surface_rms_m = distance.rms_m;
   out.hausdorff_m = distance.hausdorff_m;
   if (!solid.watertight()) out.unseen_share = share_over_holes(boundary, solid);

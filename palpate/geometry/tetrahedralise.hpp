@@ -22,7 +22,7 @@ struct TetrahedraliseOptions {
   Index tetrahedra = 10000;      ///< wished number, met within some percent; not used when edge_m is given
   double edge_m = 0;             ///< wished edge length of thick parts; 0 = from `tetrahedra`
   std::vector<FinerNear> finer;  ///< on top of `tetrahedra`
-  double detail = 0.1;           ///< parts that edges would miss by more than this share of one get shorter ones (0.02..1)
+  double detail = 0.12;          ///< parts that edges would miss by more than this share of one get shorter ones (0.02..1)
   int finest = 16;               ///< how many times shorter at most (1..32)
   bool improve = true;           ///< false: the cut lattice as it is, for inspection
 };
@@ -35,7 +35,8 @@ struct Tetrahedralisation {
   VolumeCheck check;                   ///< of `mesh`
   SurfaceCheck surface;                ///< of the input
   std::optional<double> volume_error;  ///< signed share of the surface's volume; empty when the surface is not watertight
-  double surface_rms_m = 0;            ///< between input and boundary, both ways (open input: input to boundary only)
+  double surface_rms_m = 0;            ///< between input and boundary, both ways (open input: input to boundary only);
+                                       ///< triangles buried within other parts of the input do not count
   double hausdorff_m = 0;              ///< likewise, the largest distance
   double unseen_share = 0;             ///< share of the boundary that closes holes of the input
   Index flipped_triangles = 0;         ///< turned round to make the surface face outwards

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/reconstruction/build_object.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/registration/views.hpp"
 
 namespace palpate::reconstruction {
 namespace {
@@ -21,6 +26,55 @@ bool found_by_place(SupportKind kind) {
 
 void add_warnings(ObjectModel& model, const std::vector<geometry::Finding>& findings) {
   for (const auto& f : findings) model.warnings.push_back(f.message);
+}
+
+double mean_sigma(const PointCloud& c) { return c.sigma_m.size() > 0 ? c.sigma_m.mean() : 0; }
+
+/// Leaves out points on the support and behind it: within three deviations of the noise, at least a thousandth of the
+/// cloud's size.
+void drop_support(std::vector<PointCloud>& clouds, const Plane& plane) {
+  for (PointCloud& c : clouds) {
+    const auto n = static_cast<Index>(c.points_m.rows());
+    if (n == 0) continue;
+    const double size = (c.points_m.colwise().maxCoeff() - c.points_m.colwise().minCoeff()).norm();
+    const double limit = std::max(3 * mean_sigma(c), 1e-3 * size);
+    const bool normals = c.normals.rows() == n, each = c.sigma_m.size() == n && n > 1;
+    Index kept = 0;
+    for (Index i = 0; i < n; ++i) {
+      const double height = plane.normal.dot(Vec3(c.points_m.row(i).transpose()) - plane.point_m);
+      // a flank close above the plane belongs to the object: only what also faces like the plane is taken for it
+      const bool flat = !normals || plane.normal.dot(c.normals.row(i).transpose()) > 0.8;
+      if (height < -limit || (height < limit && flat)) continue;
+      c.points_m.row(kept) = c.points_m.row(i).eval();
+      if (normals) c.normals.row(kept) = c.normals.row(i).eval();
+      if (each) c.sigma_m[kept] = c.sigma_m[i];
+      ++kept;
+    }
+    c.points_m.conservativeResize(kept, 3);
+    if (normals) c.normals.conservativeResize(kept, 3);
+    if (each) c.sigma_m.conservativeResize(kept);
+  }
+}
+
+void turn(PointCloud& c, const Pose& T) {
+  c.points_m = ((c.points_m * T.linear().transpose()).rowwise() + T.translation().transpose()).eval();
+  c.normals = (c.normals * T.linear().transpose()).eval();
+}
+
+void hand_on_uncertainty(BuiltObject& out, const FusedViews& fused) {
+  TriMesh seen = fused.facets;
+  seen.triangles.conservativeResize(fused.seen, 3);
+  const geometry::TriangleTree to_seen(seen);
+  const Points& v = out.model.surface.vertices_m;
+  out.surface_sigma_m.resize(v.rows());
+  out.seen.resize(static_cast<std::size_t>(v.rows()));
+  for (Index i = 0; i < v.rows(); ++i) {
+    const auto c = to_seen.closest(v.row(i).transpose());
+    const double far = std::sqrt(c.squared_distance_m2);
+    // facets lie loosely beside each other: within a cell of one the surface was seen
+    out.seen[static_cast<std::size_t>(i)] = far < fused.cell_m;
+    out.surface_sigma_m[i] = std::hypot(fused.sigma_m[c.triangle], far < fused.cell_m ? 0 : 0.5 * far);
+  }
 }
 
 }  // namespace
@@ -53,14 +107,37 @@ BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& sup
 
 BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions& fuse, const std::vector<Support>& supports,
                          const BuildOptions& options, const OnProgress& progress) {
-  const FusedViews fused = fuse_views(views, fuse);
+  std::vector<PointCloud> clouds = views;
+  const bool uncertain =
+      std::any_of(views.begin(), views.end(), [](const PointCloud& c) { return c.pose_std_m > 0 || c.pose_std_rad > 0; });
+  std::vector<std::string> warnings;
+  std::vector<Pose> correction;
+  if (fuse.support) drop_support(clouds, *fuse.support);
+  if (options.align_views && uncertain) {
+    std::vector<std::size_t> filled;
+    std::vector<PointCloud> moving;
+    for (std::size_t v = 0; v < clouds.size(); ++v)
+      if (clouds[v].points_m.rows() > 0) filled.push_back(v), moving.push_back(clouds[v]);
+    if (moving.size() > 1) {
+      const auto aligned = registration::align_views(moving);
+      correction.assign(clouds.size(), Pose::Identity());
+      for (std::size_t k = 0; k < filled.size(); ++k) {
+        correction[filled[k]] = aligned.correction[k];
+        turn(clouds[filled[k]], aligned.correction[k]);
+      }
+      if (!aligned.converged) warnings.push_back("the views' poses could not be corrected: " + aligned.reason);
+    }
+  }
+  const FusedViews fused = fuse_views(clouds, fuse);
   BuiltObject out = build_object(fused.facets, supports, options, progress);
   out.model.surface = geometry::boundary_surface(out.model.volume).surface;
   out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
+  hand_on_uncertainty(out, fused);
+  out.view_correction = std::move(correction);
   // the plane's share was not seen either
   const double all = fused.seen_area_m2 + fused.support_area_m2;
   out.model.unseen_share += (1 - out.model.unseen_share) * (all > 0 ? fused.support_area_m2 / all : 0);
-  out.model.warnings.clear();  // facets are open by nature; what they say of holes is said by the share
+  out.model.warnings = std::move(warnings);  // facets are open by nature; what they say of holes is said by the share
   add_warnings(out.model, out.check.findings);
   if (out.model.unseen_share > 0.05)
     out.model.warnings.push_back(std::to_string(static_cast<int>(100 * out.model.unseen_share + 0.5)) +

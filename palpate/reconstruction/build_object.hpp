@@ -10,6 +10,7 @@ namespace palpate::reconstruction {
 
 struct BuildOptions {
   geometry::TetrahedraliseOptions mesh;  ///< of a surface that has to be filled
+  bool align_views = true;  ///< correct the poses of views that have a prior spread (PointCloud::pose_std_*), all at once
 };
 
 struct BuiltObject {
@@ -18,6 +19,13 @@ struct BuiltObject {
   std::optional<double> volume_error;  ///< as in geometry::Tetrahedralisation; empty for a given volume
   double surface_rms_m = 0;            ///< between given surface and boundary of the volume
   double hausdorff_m = 0;
+  /// How far the surface may be off along its normal, one standard deviation a vertex of model.surface; empty where the
+  /// surface was given. Where nothing was seen: half of the distance to the nearest part that was, for the completion may be
+  /// anywhere up to there.
+  VectorX surface_sigma_m;
+  std::vector<char> seen;  ///< a vertex of model.surface: 1 where a sensor saw it; empty where it was given
+  std::vector<Pose>
+      view_correction;  ///< applied to each view on the left before fusing; empty when poses were taken as known
 };
 
 /// Fills a surface and ties it to the volume. Supports that are found by their place (plane, table, wall, box) get a
@@ -26,7 +34,8 @@ struct BuiltObject {
 BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options = {},
                          const OnProgress& progress = {});
 
-/// Fuses views (see fuse_views) and fills them; the surface is the watertight boundary of the volume.
+/// Aligns views whose poses are not exactly known (see registration::align_views), fuses them (see fuse_views), what lies on
+/// or behind the support left out, and fills them; the surface is the watertight boundary of the volume.
 BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions& fuse, const std::vector<Support>& supports,
                          const BuildOptions& options = {}, const OnProgress& progress = {});
 

@@ -25,7 +25,7 @@ Key key_of(const Cell& c) {
 
 struct Facet {
   Vec3 middle, normal;
-  double area_m2 = 0;
+  double area_m2 = 0, sigma_m = 0;
 };
 
 std::pair<Vec3, Vec3> tangents(const Vec3& n) {
@@ -79,6 +79,7 @@ bool settle(Facet& f, const Grid& grid, double cell) {
   Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   int count = 0;
+  double squares = 0, weights = 0;
   grid.around(f.middle, 1, [&](Index i) {
     if (grid.normal(i).dot(f.normal) < 0.5) return;
     const Vec3 d = (grid.point(i) - f.middle) / cell;
@@ -88,14 +89,20 @@ bool settle(Facet& f, const Grid& grid, double cell) {
     Eigen::Matrix<double, 6, 1> row;
     row << 1, x, y, x * x, x * y, y * y;
     a += w * row * row.transpose();
-    b += w * f.normal.dot(d) * row;
+    const double z = f.normal.dot(d);
+    b += w * z * row;
+    squares += w * z * z, weights += w;
     ++count;
   });
   if (count < 3) return false;
   const int terms = count >= 18 ? 6 : 1;  // fewer points do not carry a curvature
   a.diagonal().array() += 1e-6 * a(0, 0);
   Eigen::Matrix<double, 6, 1> s = Eigen::Matrix<double, 6, 1>::Zero();
-  s.head(terms) = a.topLeftCorner(terms, terms).ldlt().solve(b.head(terms));
+  const Eigen::LDLT<MatrixX> factor(a.topLeftCorner(terms, terms));
+  s.head(terms) = factor.solve(b.head(terms));
+  // scatter of the points about the fit, and what is left of it at the middle
+  const double scatter2 = std::max(0.0, squares - s.dot(b)) / weights * count / std::max(1, count - terms);
+  f.sigma_m = cell * std::sqrt(scatter2 * factor.solve(VectorX::Unit(terms, 0))[0]);
   f.middle += std::clamp(s[0], -1.0, 1.0) * cell * f.normal;
   f.normal = (f.normal - std::clamp(s[1], -1.0, 1.0) * u - std::clamp(s[2], -1.0, 1.0) * v).normalized();
   return true;
@@ -171,7 +178,7 @@ std::vector<Facet> down_to(const Plane& plane, const std::vector<Facet>& facets,
       const Square s{x, y};
       if (outside.contains(s) || seen_below(s)) continue;
       const Vec3 middle = plane.point_m + (double(x) + 0.5) * step * u + (double(y) + 0.5) * step * v;
-      out.push_back({middle, -plane.normal, step * step});
+      out.push_back({middle, -plane.normal, step * step, 0});
       for (const Square& n : neighbours(s)) {
         // up to the lower end of a flank that was seen, or of what was seen from above
         const auto top = lowest.find(seen_below(n) ? n : s);
@@ -180,7 +187,7 @@ std::vector<Facet> down_to(const Plane& plane, const std::vector<Facet>& facets,
         const double tall = top->second.height;
         const int rows = std::max(0, static_cast<int>(std::lround(tall / step)));
         for (int k = 0; k < rows; ++k)
-          out.push_back({middle + 0.5 * step * away + (k + 0.5) * tall / rows * plane.normal, away, step * tall / rows});
+          out.push_back({middle + 0.5 * step * away + (k + 0.5) * tall / rows * plane.normal, away, step * tall / rows, 0});
       }
     }
   return out;
@@ -226,7 +233,7 @@ FusedViews fuse_views(const std::vector<PointCloud>& clouds, const FuseOptions& 
   std::vector<Facet> facets;
   for (const auto& bin : grid.bins()) {
     if (static_cast<int>(bin.size()) < options.fewest_points) continue;
-    Facet f{Vec3::Zero(), Vec3::Zero(), 0};
+    Facet f{Vec3::Zero(), Vec3::Zero(), 0, 0};
     for (const Index i : bin) f.middle += grid.point(i), f.normal += grid.normal(i);
     f.middle /= double(bin.size());
     if (f.normal.norm() < 0.3 * double(bin.size())) continue;  // two sheets in one cell
@@ -235,7 +242,12 @@ FusedViews fuse_views(const std::vector<PointCloud>& clouds, const FuseOptions& 
   }
   if (facets.empty()) throw Error("no part of the surface is covered densely enough; raise cell_m", "clouds");
   share_out_area(facets, out.cell_m);
-  for (const Facet& f : facets) out.seen_area_m2 += f.area_m2;
+  out.seen = static_cast<Index>(facets.size());
+  out.sigma_m.resize(out.seen);
+  for (Index i = 0; i < out.seen; ++i) {
+    out.seen_area_m2 += facets[i].area_m2;
+    out.sigma_m[i] = facets[i].sigma_m;
+  }
   if (options.support) {
     const auto bottom = down_to(*options.support, facets, out.cell_m);
     for (const Facet& f : bottom) out.support_area_m2 += f.area_m2;

@@ -20,6 +20,8 @@ void check(const FuseOptions& options);
 
 struct FusedViews {
   TriMesh facets;              ///< one triangle a cell, outward, as large as the surface that it stands for; open
+  Index seen = 0;              ///< that many facets come first and were seen; the others complete the object
+  VectorX sigma_m;             ///< of the seen facets along their normals, from the scatter of the points and their number
   double cell_m = 0;           ///< width that was used
   double seen_area_m2 = 0;     ///< area of the facets that sensors saw
   double support_area_m2 = 0;  ///< area of the facets that complete the object down to the support

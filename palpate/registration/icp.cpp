@@ -67,6 +67,9 @@ class Aligner {
   }
 
  private:
+  /// Does the cloud say how good its points are? One common value of 0 says nothing.
+  bool absolute() const { return cloud_.sigma_m.size() > 0 && cloud_.sigma_m[0] > 0; }
+
   bool normal_fits(Index i, const Vec3& normal) const {
     if (cloud_.normals.rows() != cloud_.points_m.rows()) return true;
     return normal.dot(T_.linear() * cloud_.normals.row(i).transpose()) > std::cos(o_.reject_angle_rad);
@@ -75,7 +78,8 @@ class Aligner {
   std::vector<Pairing> pair_up(Index stride) {
     std::vector<Pairing> pairs;
     const auto n = static_cast<Index>(cloud_.points_m.rows());
-    const bool weighted = cloud_.sigma_m.size() == n;
+    const bool each = cloud_.sigma_m.size() == n, common = !each && absolute();
+    const double same = common ? 1 / (cloud_.sigma_m[0] * cloud_.sigma_m[0]) : 1;
     pairs.reserve(n / stride + 1);
     const TriMesh& m = surface_.mesh();
     for (Index i = 0; i < n; i += stride) {
@@ -93,7 +97,7 @@ class Aligner {
       p.normal /= length;
       if (!normal_fits(i, p.normal)) continue;
       p.gap = p.point - c.point_m;
-      p.weight = weighted ? 1 / (cloud_.sigma_m[i] * cloud_.sigma_m[i]) : 1;
+      p.weight = each ? 1 / (cloud_.sigma_m[i] * cloud_.sigma_m[i]) : same;
       const double miss = o_.metric == IcpMetric::point_to_plane ? std::abs(p.normal.dot(p.gap)) : p.gap.norm();
       p.miss = miss * std::sqrt(p.weight);
       pairs.push_back(p);
@@ -163,8 +167,7 @@ class Aligner {
       inverse = scale.asDiagonal() * inverse * scale.asDiagonal();
       const Vector6 step = inverse * n.g;
       const double dof = std::max(1.0, double(n.counting) * (o_.metric == IcpMetric::point_to_plane ? 1 : 3) - 6);
-      const bool absolute = cloud_.sigma_m.size() == cloud_.points_m.rows();
-      const double variance = absolute ? std::max(1.0, n.sum / dof) : n.sum / dof;
+      const double variance = absolute() ? std::max(1.0, n.sum / dof) : n.sum / dof;
       T_ = Pose(Eigen::Translation3d(n.centre)) * small_motion(step) * Pose(Eigen::Translation3d(-n.centre)) * T_;
       T_.linear() = Eigen::Quaterniond(T_.linear()).normalized().toRotationMatrix();
 
@@ -214,8 +217,11 @@ IcpResult align(const PointCloud& cloud, const geometry::TriangleTree& surface, 
   check(options);
   if (cloud.points_m.rows() < 6) throw Error("fewer than six points", "align: cloud");
   if (!cloud.points_m.allFinite()) throw Error("a point is not finite", "align: cloud");
-  const bool each = cloud.sigma_m.size() == cloud.points_m.rows();
-  if (each && !(cloud.sigma_m.minCoeff() > 0)) throw Error("a standard deviation is not above 0", "align: cloud.sigma_m");
+  if (cloud.sigma_m.size() > 1 && cloud.sigma_m.size() != cloud.points_m.rows())
+    throw Error("needs one value, or one for each point", "align: cloud.sigma_m");
+  const double least = cloud.sigma_m.size() > 0 ? cloud.sigma_m.minCoeff() : 1;
+  if (!(least >= 0) || (cloud.sigma_m.size() > 1 && least == 0))
+    throw Error("a standard deviation is not above 0", "align: cloud.sigma_m");
   return Aligner(cloud, surface, start, options).run();
 }
 

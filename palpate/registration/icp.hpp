@@ -23,7 +23,7 @@ struct IcpOptions {
   double tukey = 0;               ///< beyond this many robust deviations a pair counts nothing (0 = off, else >= 2)
   double reject_angle_rad = 1.2;  ///< between the cloud's normal (where known) and the surface's
   int max_iterations = 50;        ///< >= 1
-  double stop_share = 0.02;       ///< converged when a step is below this share of the answer's own standard deviation
+  double stop_share = 0.05;       ///< converged when a step is below this share of the answer's own standard deviation
 };
 
 /// @throws Error naming the field and its bounds.
@@ -43,8 +43,9 @@ struct IcpResult {
   std::string reason = "align() was not called.";
 };
 
-/// Points are weighted by 1 / sigma_m^2 where the cloud gives one for each; the covariance is then scaled by the misfit only
-/// if that is larger than one. @throws Error on bad options or fewer than six points.
+/// Points are weighted by 1 / sigma_m^2 where the cloud gives it; the covariance is then scaled by the misfit only if that
+/// is larger than one, and by the misfit alone where the cloud is silent. @throws Error on bad options or fewer than six
+/// points.
 IcpResult align(const PointCloud& cloud, const geometry::TriangleTree& surface, const Pose& T_surface_cloud,
                 const IcpOptions& options = {});
 

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -61,6 +62,11 @@ TEST_F(Model, a_surface_in_millimetres_becomes_files_that_can_be_read_back) {
     EXPECT_EQ(back.tetrahedra.rows(), o.json["tetrahedra"].get<Index>()) << name;
   }
   EXPECT_EQ(io::read_tri_mesh(folder_ / "out/surface.ply").triangles.rows(), 5120);
+  std::ifstream picture(folder_ / "out/model.png", std::ios::binary);
+  std::string head(8, ' ');
+  picture.read(head.data(), 8);
+  EXPECT_EQ(head, "\x89PNG\r\n\x1a\n");
+  EXPECT_GT(fs::file_size(folder_ / "out/model.png"), 10000U);
 }
 
 TEST_F(Model, open_input_has_no_volume_error_and_a_sheet_is_refused) {

@@ -86,6 +86,39 @@ TEST(Tetrahedralise, sharp_edges_are_kept_within_a_share_of_an_edge) {
   EXPECT_LT(r.hausdorff_m, 0.02 * r.surface.diagonal_m());
 }
 
+TEST(Tetrahedralise, thin_spikes_and_sharp_edges_survive_with_few_elements) {
+  // a star of twelve arms: its edges are sharper than the elements that its volume alone would get
+  std::vector<Vec3> v;
+  std::vector<std::array<Index, 3>> t;
+  constexpr Index n = 24, m = n + 1;
+  for (int z = 0; z < 2; ++z) {
+    for (Index i = 0; i < n; ++i) {
+      const double a = 2 * M_PI * i / n, r = i % 2 ? 0.05 : 0.1;
+      v.emplace_back(r * std::cos(a), r * std::sin(a), 0.02 * z);
+    }
+    v.emplace_back(0, 0, 0.02 * z);
+  }
+  for (Index i = 0; i < n; ++i) {
+    const Index j = (i + 1) % n;
+    t.insert(t.end(), {{n, j, i}, {m + n, m + i, m + j}, {i, j, m + j}, {i, m + j, m + i}});
+  }
+  const auto r = with(shapes::make(v, t), 3000);
+  expect_usable(r);
+  EXPECT_EQ(r.check.components, 1);
+  EXPECT_NEAR(r.check.tetrahedra, 3000, 450);
+  EXPECT_LT(std::abs(*r.volume_error), 0.02);
+  EXPECT_LT(r.surface_rms_m, 0.0025 * r.surface.diagonal_m());
+  EXPECT_LT(r.hausdorff_m, 0.02 * r.surface.diagonal_m());
+}
+
+TEST(Tetrahedralise, what_is_buried_in_other_parts_need_not_be_met) {
+  // a small ball inside a large one, facing outward: the union has no cavity
+  const auto r = with(shapes::join(shapes::sphere(0.05, 4), shapes::sphere(0.01, 3)), 2000);
+  expect_usable(r);
+  EXPECT_LT(r.hausdorff_m, 0.01 * r.surface.diagonal_m());
+  EXPECT_NEAR(r.check.volume_m3, 4.0 / 3 * M_PI * std::pow(0.05, 3), 0.01 * r.check.volume_m3);
+}
+
 TEST(Tetrahedralise, is_repeatable) {
   const TriMesh m = shapes::torus(0.1, 0.03, 32, 16);
   EXPECT_EQ(with(m, 800).mesh.nodes_m, with(m, 800).mesh.nodes_m);

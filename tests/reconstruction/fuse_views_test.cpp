@@ -12,6 +12,7 @@
 #include "palpate/geometry/surface_distance.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/reconstruction/build_object.hpp"
+#include "palpate/registration/icp.hpp"
 
 namespace palpate::reconstruction {
 namespace {
@@ -71,6 +72,43 @@ TEST(FuseViews, eight_noisy_views_become_a_watertight_surface) {
   EXPECT_NEAR(built.check.volume_m3, truth, 0.01 * truth);
 }
 
+TEST(FuseViews, views_from_poses_that_are_a_little_wrong_close_up) {
+  const geometry::TriangleTree tree(lump());
+  std::mt19937 rng(5);
+  std::normal_distribution<double> g;
+  std::vector<PointCloud> clouds;
+  for (int k = 0; k < 4; ++k) {
+    // around the object and from above and below, so that neighbours overlap
+    PointCloud c = view(tree, Vec3(std::cos(1.57 * k), std::sin(1.57 * k), k % 2 ? 0.6 : -0.6), 0.0012, rng);
+    const Vec3 turn = 0.006 * Vec3(g(rng), g(rng), g(rng)), shift = 0.002 * Vec3(g(rng), g(rng), g(rng));
+    const Mat3 r = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    c.points_m = ((c.points_m * r.transpose()).rowwise() + shift.transpose()).eval();
+    c.normals = (c.normals * r.transpose()).eval();
+    c.pose_std_m = 0.002, c.pose_std_rad = 0.006;
+    clouds.push_back(c);
+  }
+  BuildOptions o;
+  o.mesh.tetrahedra = 8000;
+  const auto whole = [&](const BuiltObject& b) {  // against the truth, wherever it may stand as a whole
+    PointCloud c;
+    c.points_m = b.model.surface.vertices_m;
+    const Pose T = registration::align(c, tree, Pose::Identity()).T_surface_cloud;
+    TriMesh s = b.model.surface;
+    s.vertices_m = (s.vertices_m * T.linear().transpose()).rowwise() + T.translation().transpose();
+    return geometry::surface_distance(tree.mesh(), s).rms_m;
+  };
+  const auto aligned = build_object(clouds, {}, {}, o);
+  o.align_views = false;
+  const double before = whole(build_object(clouds, {}, {}, o)), after = whole(aligned);
+  RecordProperty("before_um", static_cast<int>(1e6 * before));
+  RecordProperty("after_um", static_cast<int>(1e6 * after));
+  EXPECT_LT(after, 0.0004);
+  EXPECT_LT(after, 0.5 * before);
+  ASSERT_EQ(aligned.view_correction.size(), 4U);
+  EXPECT_EQ(aligned.surface_sigma_m.size(), aligned.model.surface.vertices_m.rows());
+  EXPECT_LT(aligned.surface_sigma_m.minCoeff(), 0.0005);
+}
+
 TEST(FuseViews, one_view_from_above_is_completed_down_to_the_table) {
   TriMesh m = shapes::sphere(0.05, 5, Vec3(0, 0, 0.05));
   const geometry::TriangleTree tree(m);
@@ -86,6 +124,19 @@ TEST(FuseViews, one_view_from_above_is_completed_down_to_the_table) {
   EXPECT_GT(built.check.volume_m3, ball);         // the cylinder below the equator is filled
   EXPECT_LT(built.check.volume_m3, 1.35 * ball);  // half a ball and that cylinder: 1.25
   EXPECT_NEAR(built.check.min_m.z(), 0, 0.003);
+  // the top was seen and is known to a fraction of the noise, the foot of the invented flank is known to a centimetre or two
+  const Points& v = built.model.surface.vertices_m;
+  for (Index i = 0; i < v.rows(); ++i) {
+    if (v(i, 2) > 0.08) {
+      EXPECT_TRUE(built.seen[i]);
+      EXPECT_LT(built.surface_sigma_m[i], 0.0005);
+    }
+    if (v(i, 2) < 0.01 && v.row(i).head<2>().norm() > 0.045) {
+      EXPECT_FALSE(built.seen[i]);
+      EXPECT_GT(built.surface_sigma_m[i], 0.01);
+      EXPECT_LT(built.surface_sigma_m[i], 0.04);
+    }
+  }
 }
 
 TEST(FuseViews, says_what_is_missing) {
