@@ -37,7 +37,7 @@ Recording load_recording_unchecked(Session& session, const fs::path& path, const
     if (clock.usable)
       session.say(fmt::format("clock      {}: {:+.1f} +- {:.1f} ms against the arm's (correlation {:.2f}), taken off",
                               clock.sensor, 1e3 * clock.offset_s, 1e3 * clock.std_s, clock.correlation));
-  for (const std::string& note : made.notes) session.warn("note       " + note);
+  for (const std::string& note : made.notes) session.warn(note);
   std::error_code code;
   if (fs::is_regular_file(path, code))
     made.recording.input_hashes[path.filename().string()] = io::sha256_hex(io::read_file(path));

@@ -34,9 +34,9 @@ nlohmann::json look_into_bag(Session& session, const std::filesystem::path& path
                       {"understood", !topic.use.empty()}});
   }
   if (!survey.frames.empty()) session.say(fmt::format("frames     {}", fmt::join(survey.frames, ", ")));
-  for (const std::string& warning : bag.warnings) session.warn("warning    " + warning);
-  for (const std::string& lack : survey.missing) session.warn("missing    " + lack);
-  if (suggest) {
+  for (const std::string& lack : survey.missing) session.warn(lack);
+  if (suggest) {  // with a mapping, the recording says what was lost
+    for (const std::string& warning : bag.warnings) session.warn(warning);
     session.say("mapping    none is given (--mapping FILE, or mapping.yaml beside the bag); one to start from:");
     std::istringstream lines(survey.mapping);
     for (std::string line; std::getline(lines, line);) session.say("    " + line);

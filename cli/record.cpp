@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "cli/logged_robot.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
@@ -26,7 +27,7 @@ struct RecordArguments {
   double young_modulus_pa = 0;
   double poisson_ratio = -1;
   bool resume = false;
-  std::string bag;
+  std::string bag, raw_bag;
   acquisition::PushOptions push;
 };
 
@@ -67,9 +68,10 @@ int record_push(Session& session, const RecordArguments& arguments) {
   for (const Push& push : recording.pushes)
     if (push.name == plan.name) so_far = &push;
   io::RecordingWriter writer(folder, recording);
+  LoggedRobot logged(robot, recording.joint_names);
   bool begun = so_far != nullptr;
   const acquisition::PushReport report = acquisition::run_push(
-      robot, plan, arguments.push,
+      logged, plan, arguments.push,
       [&](const Push& push, const Step& step) {
         if (!begun) writer.begin_push(push);
         begun = true;
@@ -81,6 +83,13 @@ int record_push(Session& session, const RecordArguments& arguments) {
   for (const int step : report.unsettled) session.warn(fmt::format("step {} had not settled when it was recorded", step));
   session.say(fmt::format("stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps in {}", acquisition::to_words(report.stop),
                           report.message, report.highest_force_n, 1000 * report.deepest_m, report.steps, arguments.output));
+  if (!arguments.raw_bag.empty()) {
+    Recording scene = robot.scene();
+    scene.robot.reset();  // the masks are in the bag
+    scene.joint_names.clear();
+    logged.write_bag(scene, arguments.raw_bag);
+    session.say(fmt::format("{}: all that the sensors said, as a robot's recorder keeps it", arguments.raw_bag));
+  }
   session.result({{"recording", arguments.output},
                   {"stop", acquisition::to_words(report.stop)},
                   {"message", report.message},
@@ -136,11 +145,17 @@ Run verbs::record(CLI::App& app) {
   app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m")->check(CLI::PositiveNumber);
   app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N")->check(CLI::PositiveNumber);
   app.add_option("--bag", arguments->bag, "also write a bag (rosbag2: MCAP) with its mapping into this folder");
+  app.add_option("--raw-bag", arguments->raw_bag,
+                 "also write what the sensors said all the while (MCAP), as a robot's own recorder does");
   app.add_flag("--resume", arguments->resume, "go on with a recording that was cut off");
   return [arguments](Session& session) {
     std::error_code code;
-    if (!arguments->bag.empty() && std::filesystem::exists(arguments->bag, code) && !std::filesystem::is_empty(arguments->bag, code))
-      throw Error("is there already; choose another folder or remove it", arguments->bag);
+    for (const std::string& bag : {arguments->bag, arguments->raw_bag}) {
+      if (!bag.empty() && std::filesystem::exists(bag, code) && !std::filesystem::is_empty(bag, code))
+        throw Error("is there already; choose another folder or remove it", bag);
+    }
+    if (arguments->demo && !arguments->raw_bag.empty())
+      throw Error("the built-in recording is made without a robot; leave --demo out", "--raw-bag");
     const int outcome = arguments->demo ? record_demo(session, *arguments) : record_push(session, *arguments);
     if (!arguments->bag.empty()) {
       io::write_bag(io::read_recording_unchecked(arguments->output), arguments->bag);

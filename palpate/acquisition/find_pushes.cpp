@@ -133,7 +133,10 @@ std::vector<StillTime> find_still_times(const Track& track, const ContactSpan& s
     for (sensing::ContactSample& one : stretch) one.force_n -= span.tare_n;
     sensing::SettlingOptions options;
     options.window_s = plan.hold_s;
-    found.push_back({stretch.back().time_s, sensing::settling(stretch, span.direction, options).settled});
+    const sensing::Settling state = sensing::settling(stretch, span.direction, options);
+    // Nobody can wait any more: only a force that crept beyond doubt is worth a word.
+    const double limit_n_s = std::max(options.rate_n_s, options.relative_rate_s * std::abs(state.force_n));
+    found.push_back({stretch.back().time_s, std::abs(state.rate_n_s) - 2 * state.rate_std_n_s < limit_n_s});
   };
   std::size_t left = span.begin, right = span.begin, begin = span.begin;
   bool still = false;

@@ -32,7 +32,7 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
 
 struct StillTime {
   double time_s = 0;
-  bool settled = false;
+  bool settled = false;  ///< false: the force crept, beyond two standard deviations of its rate
 };
 /// Ends of the stretches of a span in which the tip stood still for `hold_s`.
 std::vector<StillTime> find_still_times(const Track& track, const ContactSpan& span, const StreamPlan& plan);

@@ -78,7 +78,7 @@ FrameTree tree_of(const StreamPlan& plan, const SensorStreams& streams) {
     std::vector<Index> link_of;
     for (std::size_t i = 0; i < robot->links.size(); ++i) {
       const std::string& name = robot->links[i].name;
-      if (name == root || tree.knows(name)) continue;
+      if (name == root || tree.has_parent(name)) continue;
       links.push_back({root, name, false, {}});
       link_of.push_back(Index(i));
     }

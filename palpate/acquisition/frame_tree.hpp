@@ -18,6 +18,7 @@ class FrameTree {
   explicit FrameTree(const std::vector<FrameLink>& links, double largest_gap_s = 1.0);
 
   bool knows(const std::string& frame) const;
+  bool has_parent(const std::string& frame) const { return above_.count(frame) > 0; }
   /// True when a way leads from one to the other, at whatever time.
   bool connects(const std::string& a, const std::string& b) const;
   /// T_target_source, or nothing when they are not connected or a link was not seen near that time.

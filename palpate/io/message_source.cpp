@@ -115,7 +115,7 @@ MessageSource read_bag_folder(const fs::path& folder) {
     metadata = metadata_of(folder / metadata_name);
   } else {
     metadata.files = bag_files_in(folder);
-    warnings.push_back("there is no metadata.yaml (the recorder was cut off): all bag files of the folder are read");
+    warnings.push_back("there is no metadata.yaml (was the recorder cut off?): all bag files of the folder are read");
   }
   std::vector<MessageSource> sources;
   for (const std::string& file : metadata.files) {

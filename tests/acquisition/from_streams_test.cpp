@@ -221,6 +221,117 @@ TEST(FromStreams, AClockThatCannotBeFoundIsLeftAlone) {
   EXPECT_THAT(made.notes, testing::Contains(HasSubstr("could not be aligned")));
 }
 
+/// A column that goes up and down, with a box for a tool; its tip's frame turns z down.
+RobotModel column() {
+  RobotModel robot;
+  robot.name = "column";
+  RobotLink tip{"tip", {}, {}};
+  RobotShape box;
+  box.kind = RobotShape::Kind::box;
+  box.size_m = Vec3(0.02, 0.02, 0.02);
+  tip.visual.push_back(box);
+  robot.links = {{"base", {}, {}}, {"carriage", {}, {}}, tip};
+  RobotJoint lift;
+  lift.kind = RobotJoint::Kind::prismatic;
+  lift.name = "lift";
+  lift.parent = "base";
+  lift.child = "carriage";
+  lift.axis = Vec3::UnitZ();
+  lift.T_parent_joint.translation() = Vec3(0.3, 0.1, 0);
+  lift.lower = -1, lift.upper = 1;
+  RobotJoint flange;
+  flange.name = "flange";
+  flange.parent = "carriage";
+  flange.child = "tip";
+  flange.T_parent_joint.linear() = tip_at(0).linear();
+  robot.joints = {lift, flange};
+  return robot;
+}
+
+TEST(FromStreams, WithoutTransformsOfTheTipTheJointsTellWhereItIs) {
+  SensorStreams streams = lab();
+  FrameLink& tip = streams.frames[0];
+  streams.joint_names = {"gripper_of_another_device", "lift"};
+  for (const PoseSample& sample : tip.samples) streams.joints.push_back({sample.time_s, {0.5, height_m(sample.time_s)}});
+  streams.frames.erase(streams.frames.begin());
+  StreamPlan by_joints = plan();
+  by_joints.recording.robot = column();
+  const auto with_joints = recording_from(by_joints, streams).recording.pushes,
+             with_frames = recording_from(plan(), lab()).recording.pushes;
+  ASSERT_EQ(with_joints.size(), 1u);
+  ASSERT_EQ(with_joints[0].steps.size(), with_frames[0].steps.size());
+  for (std::size_t i = 1; i + 1 < with_joints[0].steps.size(); ++i) {
+    EXPECT_LT((*with_joints[0].steps[i].loads[0].force_n - *with_frames[0].steps[i].loads[0].force_n).norm(), 1e-9);
+    EXPECT_NEAR(travel_of(with_joints[0].steps[i]), travel_of(with_frames[0].steps[i]), 1e-9);
+  }
+}
+
+TEST(FromStreams, PixelsOfTheRobotAreLeftOut) {
+  SensorStreams streams = lab();
+  for (const PoseSample& sample : streams.frames[0].samples)
+    streams.joints.push_back({sample.time_s, {height_m(sample.time_s)}});
+  streams.joint_names = {"lift"};
+  // A camera 40 cm above the tool that looks down.
+  Pose above = Pose::Identity();
+  above.linear() = tip_at(0).linear();
+  above.translation() = Vec3(0.3, 0.1, 0.5);
+  streams.frames[2].samples[0].T_parent_child = above;
+  streams.cameras[0].mask_robot = true;
+  streams.cameras[0].like.camera = {64, 48, 200, 200, 31.5, 23.5, DistortionModel::none, {}};
+  streams.cameras[0].image = [](std::size_t) { return DepthImage(DepthImage::Constant(48, 64, 0.5f)); };
+  StreamPlan masked = plan();
+  masked.recording.robot = column();
+  const FromStreams made = recording_from(masked, streams);
+  for (const Step& step : made.recording.pushes[0].steps) {
+    for (const Observation& one : step.observations) {
+      const auto* frame = std::get_if<DepthFrame>(&one);
+      if (frame == nullptr) continue;
+      ASSERT_EQ(frame->mask.rows(), 48);
+      EXPECT_EQ(frame->mask(24, 32), 1) << "the tool, in the middle of the picture";
+      EXPECT_EQ(frame->mask(2, 2), 0);
+      // 2 cm at about 40 cm: 10 pixels a side, widened by the mask's margins.
+      EXPECT_GT(frame->mask.cast<int>().sum(), 80);
+      EXPECT_LT(frame->mask.cast<int>().sum(), 600);
+    }
+  }
+  masked.recording.robot.reset();
+  EXPECT_THROW(recording_from(masked, streams), Error) << "no description, no mask";
+}
+
+TEST(FromStreams, CloudsComeIntoTheBaseFrame) {
+  SensorStreams streams = lab();
+  Pose pose = Pose::Identity();
+  pose.rotate(Eigen::AngleAxisd(0.4, Vec3::UnitY()));
+  pose.pretranslate(Vec3(0, 0, 1));
+  streams.frames[2].samples[0].T_parent_child = pose;
+  CloudStream clouds;
+  clouds.name = "/points";
+  clouds.frame = "camera";
+  clouds.sigma_m = 0.001;
+  for (int i = 0; i < 300; ++i) clouds.times_s.push_back(0.1 * i);
+  clouds.cloud = [](std::size_t i) {
+    PointCloud cloud;
+    cloud.points_m.resize(2, 3);
+    cloud.points_m << 0.1 * static_cast<double>(i), 0, 0, 0, 0.2, 0.3;
+    return cloud;
+  };
+  streams.clouds.push_back(clouds);
+  const auto steps = recording_from(plan(), streams).recording.pushes.at(0).steps;
+  std::size_t seen = 0;
+  for (const Step& step : steps) {
+    for (const Observation& one : step.observations) {
+      const auto* cloud = std::get_if<PointCloud>(&one);
+      if (cloud == nullptr) continue;
+      ++seen;
+      EXPECT_LT((Vec3(cloud->points_m.row(1)) - pose * Vec3(0, 0.2, 0.3)).norm(), 1e-12);
+      const double i = (pose.inverse() * Vec3(cloud->points_m.row(0))).x() / 0.1;
+      EXPECT_NEAR(0.1 * i, step.time_s, 0.051) << "the cloud nearest in time";
+      EXPECT_EQ(cloud->sigma_m[0], 0.001);
+    }
+  }
+  EXPECT_EQ(seen, steps.size());
+}
+
 TEST(FromStreams, WhatIsMissingIsSaidWithACure) {
   const auto message = [](const StreamPlan& asked, const SensorStreams& streams) -> std::string {
     try {

@@ -59,6 +59,11 @@ TEST(BagWrite, ComesBackAsItWas) {
         EXPECT_NEAR(observation<ToolTravel>(b)->travel_m, observation<ToolTravel>(a)->travel_m, 1e-14);
         EXPECT_EQ(observation<ToolTravel>(b)->sigma_m, observation<ToolTravel>(a)->sigma_m);
       }
+      if (const auto* cloud = observation<PointCloud>(a)) {
+        ASSERT_NE(observation<PointCloud>(b), nullptr);
+        EXPECT_EQ(observation<PointCloud>(b)->points_m, cloud->points_m);
+        EXPECT_EQ(observation<PointCloud>(b)->sigma_m, cloud->sigma_m);
+      }
       const DepthFrame &seen = *observation<DepthFrame>(a), &read = *observation<DepthFrame>(b);
       EXPECT_EQ(read.depth_m, seen.depth_m);
       EXPECT_EQ(read.mask, seen.mask);

@@ -67,6 +67,11 @@ inline Recording made_up() {
         frame.mask(1, 2) = 1;
       }
       step.observations.emplace_back(frame);
+      PointCloud cloud;
+      cloud.points_m = Points::Constant(3, 3, 0.125 + 0.25 * i);  // exact in single precision
+      cloud.normals = Points(0, 3);
+      cloud.sigma_m = VectorX::Constant(1, 0.0015);
+      step.observations.emplace_back(cloud);
       push.steps.push_back(step);
     }
     recording.pushes.push_back(push);

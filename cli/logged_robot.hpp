@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "palpate/acquisition/robot.hpp"
+#include "palpate/io/mcap.hpp"
+
+namespace palpate::cli {
+
+/// A robot whose every reading is kept as a recorder of ROS would keep it: joint states, forces as the sensor says them (not
+/// tared), poses of tip and camera, depth images. Nothing in the bag says what a push or a step is.
+class LoggedRobot : public acquisition::Robot {
+ public:
+  LoggedRobot(acquisition::Robot& robot, std::vector<std::string> joint_names)
+      : robot_(robot), joint_names_(std::move(joint_names)) {}
+
+  acquisition::RobotState read() override;
+  acquisition::Motion move(const Pose& T_base_tip, double speed_m_s) override { return robot_.move(T_base_tip, speed_m_s); }
+  void stop() override { robot_.stop(); }
+  DepthFrame take_depth_image() override;
+  void wait(double duration_s) override { robot_.wait(duration_s); }
+  double travel_sigma_m() const override { return robot_.travel_sigma_m(); }
+
+  /// Writes FOLDER/FOLDER.mcap and FOLDER/mapping.yaml, by which steps are found in it again.
+  /// @param scene  object, supports, tools and robot, without pushes
+  void write_bag(const Recording& scene, const std::filesystem::path& folder);
+
+ private:
+  void put(const std::string& topic, const std::string& type, double time_s, const std::string& data);
+
+  acquisition::Robot& robot_;
+  io::McapWriter mcap_;
+  std::map<std::string, std::uint16_t> channels_;
+  DepthFrame camera_;  ///< of the last image, without its pixels
+  std::vector<std::string> joint_names_;
+};
+
+}  // namespace palpate::cli

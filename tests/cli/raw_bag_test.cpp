@@ -1,0 +1,56 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// What the lab's sensors said all the while, cut into steps again, against what the push protocol recorded itself.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "io/made_up_recording.hpp"
+#include "palpate/io/recording.hpp"
+
+namespace palpate::io {
+namespace {
+
+using namespace palpate::io::test;
+
+TEST(RawBag, GivesTheStepsOfTheProtocol) {
+  if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  const TemporaryFolder folder("raw_bag");
+  const std::string base = folder.path().string();
+  const std::string command = std::string("'") + PALPATE_CLI + "' --quiet --seed 5 record -o '" + base +
+                              "/folder' --raw-bag '" + base + "/raw' --young-modulus 20000 --force-limit 5 2> '" + base +
+                              "/err'";
+  ASSERT_EQ(std::system(command.c_str()), 0) << folder.get("err");
+  const Recording protocol = read_recording(folder.path() / "folder");
+  BagMapping mapping = read_mapping(folder.path() / "raw/mapping.yaml");
+  const SensorStreams streams = read_streams(read_bag(folder.path() / "raw"), mapping);
+  const Recording found = acquisition::recording_from(mapping.plan, streams).recording;
+  EXPECT_TRUE(check_recording(found).empty());
+  ASSERT_EQ(found.pushes.size(), 1u);
+  std::vector<const Step*> expected, steps;
+  for (const Step& step : protocol.pushes.at(0).steps)
+    if (!step.loads.empty()) expected.push_back(&step);
+  for (const Step& step : found.pushes[0].steps)
+    if (!step.loads.empty()) steps.push_back(&step);
+  ASSERT_GE(expected.size(), 3u);
+  ASSERT_EQ(steps.size(), expected.size());
+  const auto travel_of = [](const Step& step) {
+    for (const Observation& one : step.observations)
+      if (const auto* travel = std::get_if<ToolTravel>(&one)) return travel->travel_m;
+    return std::nan("");
+  };
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    // The sensor's noise is 0.05 N: means over 0.5 s of 50 Hz and tares over a second differ by a few hundredths.
+    EXPECT_LT((*steps[i]->loads[0].force_n - *expected[i]->loads[0].force_n).norm(), 0.06) << i;
+    EXPECT_LT((steps[i]->loads[0].contact_m - expected[i]->loads[0].contact_m).norm(), 0.0008) << "an increment is 0.5 mm";
+    EXPECT_NEAR(travel_of(*steps[i]), travel_of(*expected[i]), 0.0008);
+    EXPECT_EQ(steps[i]->unloading, expected[i]->unloading);
+    bool seen = false;
+    for (const Observation& one : steps[i]->observations) seen |= std::holds_alternative<DepthFrame>(one);
+    EXPECT_TRUE(seen);
+  }
+}
+
+}  // namespace
+}  // namespace palpate::io
