@@ -18,7 +18,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kStaleContraction = 0.2;  // of the residual, per step with an old factor
 constexpr double kCompressible = 0.45;     // Poisson ratio by way of which hard cases are solved
 
-// Completes the axes to an orthonormal basis, holds nodes that no element uses, checks indices and motions.
+}  // namespace
+
 Boundary checked(const TetMesh& mesh, Boundary boundary) {
   const Index n = static_cast<Index>(mesh.nodes_m.rows());
   std::vector<char> used(n, 0), constrained(n, 0);
@@ -57,8 +58,6 @@ Boundary checked(const TetMesh& mesh, Boundary boundary) {
         throw Error("moves node " + std::to_string(it.row() / 3) + ", which no constraint holds", "boundary.motions");
   return boundary;
 }
-
-}  // namespace
 
 struct Statics::Impl {
   Impl(const TetMesh& mesh_in, const std::string& material, Boundary boundary_in, StaticsOptions options_in)

@@ -34,6 +34,10 @@ struct Boundary {
   bool inertia_relief = false;          ///< free object: rigid motions projected out, no constraints
 };
 
+/// Completes the constraints' axes to orthonormal bases, holds nodes that no element uses, gives empty columns their size.
+/// @throws Error on indices, axes or motions that do not fit the mesh
+Boundary checked(const TetMesh& mesh, Boundary boundary);
+
 /// How the part of an energy that locks near nu = 0.5 is integrated.
 enum class Dilatation {
   pointwise,  ///< as the law says: plain linear or quadratic tetrahedra

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// Energy, forces and tangent of rigid bodies touching the boundary of a mesh, by a stiff layer of stiffness k per area on
+// quadrature points (Wriggers, Computational Contact Mechanics, 2006, ch. 6):
+//
+//   e(y) = chi(y) k/2 <-g(y)>^2 + tangential part,      y = R' (x - c) in the tool's frame
+//
+// All of it derives from an energy (friction: for a given limit), so that Newton's steps have a merit function.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "palpate/fem/contact/rigid_shape.hpp"
+#include "palpate/fem/contact/surface_points.hpp"
+
+namespace palpate::fem {
+
+enum class Touch {
+  frictionless,
+  friction,  ///< Coulomb: |tangential| <= friction_coefficient * pressure
+  sticking,  ///< what touches does not slide; it may come off
+  bonded,    ///< what touches at the start is glued, also against pulling
+};
+
+/// Tangential memory and friction limits of one rigid body, one entry a surface point (empty for frictionless).
+struct TouchMemory {
+  std::vector<Vec3> anchor_m;    ///< tool frame: where the point sticks
+  std::vector<Vec3> normal;      ///< of the shape at the anchor
+  std::vector<double> limit_pa;  ///< largest tangential traction; infinite: sticks
+  std::vector<char> touching;    ///< 0: no, 1: sticks, 2: slides
+};
+
+/// A rigid body as the terms see it.
+struct TouchingBody {
+  const RigidShape* shape = nullptr;
+  Touch law = Touch::frictionless;
+  Pose T_base_tool = Pose::Identity();
+  const TouchMemory* memory = nullptr;  ///< needed but for frictionless
+  double stiffness_pa = 0;              ///< k times the size of a face
+};
+
+/// Derivatives to the tool's twist q = (translation of the tip, rotation about the tip), base axes.
+struct ToolTerms {
+  Vec6 gradient = Vec6::Zero();                                          ///< dE/dq: the wrench of the tool on the object
+  Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();  ///< d(gradient)/dq
+  MatrixX coupling;                                                      ///< 3n x 6: d(nodal forces)/dq
+};
+
+class ContactTerms {
+ public:
+  ContactTerms(const TetMesh& mesh, const BlockPattern& pattern, int per_edge);
+
+  const SurfacePoints& points() const { return points_; }
+  Vec3 position(const VectorX& u, Index face, int point) const;
+
+  /// Adds the nodal forces dE/du (3n) and the tool's gradient; returns the energy.
+  double energy_and_forces(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient) const;
+  /// Adds the tangent to the blocks and fills the tool's terms. @param convex  leaves out what bends the wrong way (deep
+  /// penetration of a curved tool), far from the solution
+  void tangent(const TouchingBody& body, const VectorX& u, bool convex, BlockValues& blocks, ToolTerms& tool) const;
+  /// d(nodal forces)/d radius (3n) and d(gradient)/d radius.
+  void d_radius(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient) const;
+  /// What a twist of the tool at the start does through the anchors, which are fixed then: d(nodal forces) (3n x 6) and
+  /// d(gradient). @param start  the tool's rotation at the start
+  void anchors_d_pose(const TouchingBody& body, const VectorX& u, const Mat3& start, MatrixX& forces,
+                      Eigen::Matrix<double, 6, 6>& gradient) const;
+  /// Points that lie within `reach_m` of the body's surface are glued to where they are.
+  TouchMemory bond(const TouchingBody& body, const VectorX& u, double reach_m) const;
+  /// Memory at the start of an increment: points that do not touch will slide from where they are now.
+  void begin_increment(const TouchingBody& body, const VectorX& u, TouchMemory& memory) const;
+  /// Friction limits from the present pressures; returns the largest change of force, newton.
+  double update_limits(const TouchingBody& body, const VectorX& u, double friction, TouchMemory& memory) const;
+  /// At the end of an increment: anchors follow what has slipped (return map).
+  void end_increment(const TouchingBody& body, const VectorX& u, TouchMemory& memory) const;
+
+  struct Patch {
+    Points points_m;       ///< present positions of touching points
+    VectorX pressure_pa;   ///< per rest area
+    VectorX area_m2;       ///< present area that each stands for
+    double penetration_m = 0;
+    double layer_energy_j = 0;  ///< of the normal compression
+    int slipping = 0;
+  };
+  Patch patch(const TouchingBody& body, const VectorX& u) const;
+
+ private:
+  struct Sample {
+    Vec3 gradient;  // of the energy density to y
+    Mat3 hessian;
+    double energy = 0, pressure = 0, gap = 0;
+    bool slips = false;
+  };
+  bool sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Vec3& outward, bool with_hessian,
+              Sample& out) const;
+  template <typename Visit>
+  void for_each_candidate(const TouchingBody& body, const VectorX& u, Visit&& visit) const;
+  template <typename Visit>
+  void for_each_touching(const TouchingBody& body, const VectorX& u, Visit&& visit) const;
+
+  Points rest_m_;
+  SurfacePoints points_;
+};
+
+}  // namespace palpate::fem

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/contact_statics.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/contact/contact_problem.hpp"
+
+namespace palpate::fem {
+namespace {
+
+ContactLoads between(const ContactLoads& a, const ContactLoads& b, double t) {
+  ContactLoads out = b;
+  out.force_coefficients = (1 - t) * a.force_coefficients + t * b.force_coefficients;
+  out.motion_coefficients = (1 - t) * a.motion_coefficients + t * b.motion_coefficients;
+  for (std::size_t c = 0; c < b.motion.size(); ++c) {
+    out.motion[c] = (1 - t) * a.motion[c] + t * b.motion[c];
+    out.wrench[c] = (1 - t) * a.wrench[c] + t * b.wrench[c];
+  }
+  return out;
+}
+
+// Takes a tool's pose along from one prescribed motion to the next; what it has moved along its free axes stays.
+Pose carried(const Pose& pose, const Vec6& from, const Vec6& to) {
+  const Pose last = moved(Pose::Identity(), from), next = moved(Pose::Identity(), to);
+  Pose out = pose;
+  out.translation() += next.translation() - last.translation();
+  out.linear() = next.linear() * last.linear().transpose() * pose.linear();
+  return out;
+}
+
+}  // namespace
+
+MatrixX along(const Vec3& direction) {
+  MatrixX axis = MatrixX::Zero(6, 1);
+  axis.col(0).head<3>() = direction.normalized();
+  return axis;
+}
+
+MatrixX any_translation() { return MatrixX::Identity(6, 3); }
+
+struct ContactStatics::Impl {
+  ContactSystem system;
+
+  // One increment from an equilibrium; `s` and `memory` are changed only when it converges.
+  std::string increment(const ContactProblem& p, const ContactLoads& from, const ContactLoads& to, ContactState& s,
+                        std::vector<TouchMemory>& memory, ContactEquilibrium& out) {
+    const auto count = system.contacts.size();
+    ContactState next = s;
+    std::vector<TouchMemory> next_memory = memory;
+    bool remembers = false;
+    for (std::size_t c = 0; c < count; ++c) {
+      remembers = remembers || system.contacts[c].law == Touch::friction || system.contacts[c].law == Touch::sticking;
+      system.terms.begin_increment(system.body(c, p.m, s.poses[c], memory), s.u, next_memory[c]);
+      next.poses[c] = carried(s.poses[c], from.motion[c], to.motion[c]);
+    }
+    if (!system.approach(p, next_memory, next)) return "a tool never meets the object along its wrench";
+    if (!system.evaluate(p, next_memory, next)) return "the law does not exist at the start of the increment";
+    system.soften_start(p, next_memory, next, out);
+    std::string reason = system.newton(p, next_memory, next, out);
+    // Friction limits follow the pressures: a fixed point around problems that each have an energy.
+    for (int round = 0; reason.empty() && remembers; ++round) {
+      double change = 0, force = 0;
+      for (std::size_t c = 0; c < count; ++c) {
+        change += system.terms.update_limits(system.body(c, p.m, next.poses[c], next_memory), next.u,
+                                             system.contacts[c].friction_coefficient, next_memory[c]);
+        force = std::max(force, next.gradients[c].head<3>().norm());
+      }
+      const double tolerance = system.options.friction_tolerance * force;
+      if (change <= tolerance) break;
+      if (round == system.options.max_friction_rounds) {
+        reason = "pressures and friction did not settle in " + std::to_string(round) + " rounds";
+        break;
+      }
+      if (!system.evaluate(p, next_memory, next)) return "the law does not exist at the start of a friction round";
+      reason = system.newton(p, next_memory, next, out);
+    }
+    if (!reason.empty()) return reason;
+    for (std::size_t c = 0; c < count; ++c)
+      system.terms.end_increment(system.body(c, p.m, next.poses[c], next_memory), next.u, next_memory[c]);
+    s = std::move(next);
+    memory = std::move(next_memory);
+    return {};
+  }
+};
+
+ContactStatics::ContactStatics(const TetMesh& mesh, const std::string& material, Boundary boundary,
+                               std::vector<RigidContact> contacts, ContactOptions options)
+    : impl_(new Impl{ContactSystem(mesh, material, std::move(boundary), std::move(contacts), options)}) {}
+ContactStatics::~ContactStatics() = default;
+ContactStatics::ContactStatics(ContactStatics&&) noexcept = default;
+ContactStatics& ContactStatics::operator=(ContactStatics&&) noexcept = default;
+
+const std::vector<RigidContact>& ContactStatics::contacts() const { return impl_->system.contacts; }
+const TetMesh& ContactStatics::mesh() const { return impl_->system.mesh; }
+
+ContactLoads ContactStatics::no_loads() const {
+  ContactLoads loads;
+  loads.force_coefficients = VectorX::Zero(impl_->system.boundary.forces.cols());
+  loads.motion_coefficients = VectorX::Zero(impl_->system.motions.cols());
+  loads.motion.assign(impl_->system.contacts.size(), Vec6::Zero());
+  loads.wrench = loads.motion;
+  return loads;
+}
+
+ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson_ratio, const ContactLoads& loads,
+                                         const ContactEquilibrium* from, const VectorX& extra) const {
+  ContactSystem& system = impl_->system;
+  const ContactProblem target = system.problem(young_modulus_pa, poisson_ratio, loads, extra);
+  ContactEquilibrium out;
+  out.young_modulus_pa = young_modulus_pa;
+  out.poisson_ratio = poisson_ratio;
+  out.extra = target.m.extra;
+  out.loads = loads;
+
+  const auto count = system.contacts.size();
+  ContactState s;
+  std::vector<TouchMemory> memory(count);
+  const ContactLoads start = from ? from->loads : no_loads();
+  s.travelled = VectorX::Zero(system.first_axis.back());
+  if (from) {
+    if (from->displacement_m.size() != 3 * system.mesh.nodes_m.rows() || from->touches.size() != count || !from->memory)
+      throw Error("is not a state of this mesh and these contacts", "from");
+    s.u = from->displacement_m;
+    for (const TouchResult& touch : from->touches) s.poses.push_back(touch.T_base_tool);
+    memory = *from->memory;
+  } else {
+    s.u = VectorX::Zero(3 * system.mesh.nodes_m.rows());
+    for (std::size_t c = 0; c < count; ++c) {
+      s.poses.push_back(system.contacts[c].T_base_tool);
+      if (system.contacts[c].law != Touch::bonded) continue;
+      memory[c] = system.terms.bond(system.body(c, target.m, s.poses[c], memory), s.u, system.contacts[c].bond_reach_m);
+      if (std::count(memory[c].touching.begin(), memory[c].touching.end(), 1) == 0)
+        throw Error("is bonded but touches nothing at the start: check its pose, or raise bond_reach_m",
+                    "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
+    }
+  }
+
+  double done = 0, step = 1.0 / system.options.increments;
+  const double smallest = step * std::pow(0.5, system.options.max_halvings);
+  ContactLoads last = start;
+  while (done < 1 && out.reason.empty()) {
+    const double next = done + step > 1 - 1e-9 ? 1 : done + step;
+    const ContactLoads part = between(start, loads, next);
+    const ContactProblem p = system.problem(young_modulus_pa, poisson_ratio, part, extra);
+    const std::string reason = impl_->increment(p, last, part, s, memory, out);
+    if (reason.empty()) {
+      ++out.increments;
+      done = next;
+      last = part;
+      step = std::min(2 * step, 1.0 / system.options.increments);
+    } else {
+      step *= 0.5;
+      if (step < smallest)
+        out.reason = "no equilibrium was found beyond " + std::to_string(100 * done) + " % of the load step (" + reason + ")";
+    }
+  }
+  out.converged = out.reason.empty();
+  // What was reached, also when it is not the whole load.
+  const ContactProblem reached = system.problem(young_modulus_pa, poisson_ratio, last, extra);
+  system.evaluate(reached, memory, s);
+  out.loads = last;
+  out.displacement_m = s.u;
+  out.residual = s.residual;
+  out.inverted_elements = s.inverted;
+  if (out.converged && s.inverted > 0)
+    out.reason =
+        std::to_string(s.inverted) + " elements are inside out: the equilibrium of the equations is not one of a body";
+  out.motion_reaction = system.motions.transpose() * (s.internal + s.touching - reached.external);
+  for (std::size_t c = 0; c < count; ++c) {
+    const ContactTerms::Patch patch = system.terms.patch(system.body(c, reached.m, s.poses[c], memory), s.u);
+    TouchResult touch;
+    touch.T_base_tool = s.poses[c];
+    touch.wrench = s.gradients[c];
+    touch.area_m2 = patch.area_m2.sum();
+    touch.penetration_m = patch.penetration_m;
+    const double force = touch.wrench.head<3>().norm();
+    touch.layer_m = force > 0 ? 2 * patch.layer_energy_j / force : 0;
+    touch.active_points = static_cast<int>(patch.points_m.rows());
+    touch.slipping_points = patch.slipping;
+    touch.patch_m = patch.points_m;
+    touch.patch_pressure_pa = patch.pressure_pa;
+    out.touches.push_back(std::move(touch));
+  }
+  out.increments_from_rest = out.increments + (from ? from->increments_from_rest : 0);
+  out.memory = std::make_shared<const std::vector<TouchMemory>>(std::move(memory));
+  return out;
+}
+
+ContactSensitivity ContactStatics::sensitivity(const ContactEquilibrium& at) const {
+  return sensitivity_of(impl_->system, at);
+}
+
+}  // namespace palpate::fem

@@ -1,0 +1,138 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// Contact against closed forms of the half space. A quarter of a block stands for it: its outer faces follow Boussinesq's
+// point force, which differs from the contact's own field by the square of patch over block size. Loads are small: the closed
+// forms know no motion of the surface along the tool, which makes a travel of 5 % of the radius 2 % too small.
+#include <gtest/gtest.h>
+
+#include "fem_meshes.hpp"
+#include "palpate/fem/contact_statics.hpp"
+#include "palpate/fem/discretisation.hpp"
+
+namespace palpate::fem {
+namespace {
+
+constexpr double kYoung = 20000, kPoisson = 0.3, kSize = 0.1;
+constexpr double kPlaneModulus = kYoung / (1 - kPoisson * kPoisson);
+
+// Displacement of the half space z > 0 under a unit force along z at the origin (Boussinesq; Johnson 1985, eq. 3.18).
+Vec3 boussinesq(const Vec3& x) {
+  const double g = kYoung / (2 * (1 + kPoisson)), rho = x.norm(), r = std::hypot(x.x(), x.y());
+  const double radial =
+      r * (x.z() / (rho * rho * rho) - (1 - 2 * kPoisson) / (rho * (rho + x.z()))) / (4 * M_PI * g);
+  const double down = (x.z() * x.z() / (rho * rho * rho) + 2 * (1 - kPoisson) / rho) / (4 * M_PI * g);
+  return {r > 0 ? radial * x.x() / r : 0, r > 0 ? radial * x.y() / r : 0, down};
+}
+
+// Quarter of the half space: x, y > 0, z down from the surface at z = 0; tools push along z.
+struct HalfSpace {
+  TetMesh mesh;
+  Boundary boundary;
+  HalfSpace(double edge, double radius, double growth = 0.7) {
+    const RefinedMesh fine =
+        refine_near(block_mesh(3, 3, 3, {kSize, kSize, kSize}), Vec3::Zero(), radius, edge, growth, 4000);
+    mesh = to_quadratic(fine.mesh);
+    std::vector<Eigen::Triplet<double>> far;
+    for (Index i = 0; i < mesh.nodes_m.rows(); ++i) {
+      const Vec3 x = node_position(mesh, i);
+      if (x.maxCoeff() > kSize - 1e-9) {
+        boundary.constraints.push_back({i, Mat3::Identity(), 3});
+        for (int k = 0; k < 3; ++k) far.emplace_back(3 * i + k, 0, boussinesq(x)(k));
+        continue;
+      }
+      Mat3 axes = Mat3::Zero();
+      int count = 0;
+      for (int k = 0; k < 2; ++k)
+        if (x(k) < 1e-9) axes.col(count++) = Vec3::Unit(k);
+      if (count > 0) boundary.constraints.push_back({i, axes, count});
+    }
+    boundary.motions.resize(3 * mesh.nodes_m.rows(), 1);
+    boundary.motions.setFromTriplets(far.begin(), far.end());
+  }
+  ContactEquilibrium press(RigidShapePtr shape, double force) const {
+    RigidContact tool;
+    tool.shape = std::move(shape);
+    tool.T_base_tool = tool_pose({0, 0, -0.0005}, Vec3::UnitZ());
+    tool.free_axes = along(Vec3::UnitZ());
+    const ContactStatics body(mesh, "linear", boundary, {tool});
+    ContactLoads loads = body.no_loads();
+    loads.wrench[0](2) = force / 4;
+    loads.motion_coefficients(0) = force;
+    return body.solve(kYoung, kPoisson, loads);
+  }
+};
+
+double travel(const ContactEquilibrium& e) { return e.touches[0].T_base_tool.translation().z() - e.touches[0].layer_m; }
+
+// F = 4/3 E* sqrt(R) d^1.5, a^2 = R d.
+TEST(HalfSpaceContact, SphereMeetsHertzAndConverges) {
+  const double radius = 1, force = 0.02;
+  const double expected = std::cbrt(9 * force * force / (16 * radius * kPlaneModulus * kPlaneModulus));
+  const double patch = std::sqrt(radius * expected);
+  double last = 1;
+  for (double edge : {0.008, 0.004}) {
+    const HalfSpace half(edge, 1.2 * patch);
+    const ContactEquilibrium e = half.press(sphere_shape(radius), force);
+    ASSERT_TRUE(e.converged) << e.reason;
+    EXPECT_NEAR(4 * e.touches[0].wrench(2), force, 1e-7 * force);
+    const double error = std::abs(travel(e) / expected - 1);
+    EXPECT_LT(error, 0.6 * last) << edge;
+    last = error;
+    EXPECT_NEAR(4 * e.touches[0].area_m2, M_PI * patch * patch, (edge > 0.005 ? 0.16 : 0.09) * M_PI * patch * patch);
+  }
+  EXPECT_LT(last, 0.004);
+}
+
+// F = 2 a E* d: the pressure is singular at the rim, which the mesh resolves at first order only.
+TEST(HalfSpaceContact, FlatPunchConverges) {
+  const double radius = 0.01, force = 0.005, expected = force / (2 * radius * kPlaneModulus);
+  double last = 1;
+  for (double edge : {0.008, 0.004, 0.002}) {
+    const HalfSpace half(edge, 1.1 * radius, 1);
+    const ContactEquilibrium e = half.press(disc_shape(radius), force);
+    ASSERT_TRUE(e.converged) << e.reason;
+    const double error = std::abs(travel(e) / expected - 1);
+    EXPECT_LT(error, 0.75 * last) << edge;
+    last = error;
+  }
+  EXPECT_LT(last, 0.015);
+}
+
+// A sphere given as triangles is the sphere.
+TEST(HalfSpaceContact, MeshToolIsTheShapeItWasMadeOf) {
+  const double radius = 0.03, force = 0.3;
+  TriMesh mesh;
+  constexpr int rings = 48, sectors = 96;
+  mesh.vertices_m.resize((rings - 1) * sectors + 2, 3);
+  const auto put = [&](Index i, double polar, double around) {
+    mesh.vertices_m.row(i) << radius * std::sin(polar) * std::cos(around), radius * std::sin(polar) * std::sin(around),
+        radius * (std::cos(polar) - 1);
+  };
+  std::vector<std::array<Index, 3>> triangles;
+  const auto id = [](int ring, int sector) { return 1 + (ring - 1) * sectors + sector % sectors; };
+  put(0, 0, 0);
+  for (int r = 1; r < rings; ++r)
+    for (int s = 0; s < sectors; ++s) put(id(r, s), M_PI * r / rings, 2 * M_PI * s / sectors);
+  const Index bottom = (rings - 1) * sectors + 1;
+  put(bottom, M_PI, 0);
+  for (int s = 0; s < sectors; ++s) {
+    triangles.push_back({0, id(1, s), id(1, s + 1)});
+    triangles.push_back({bottom, id(rings - 1, s + 1), id(rings - 1, s)});
+    for (int r = 1; r + 1 < rings; ++r) {
+      triangles.push_back({id(r, s), id(r + 1, s), id(r + 1, s + 1)});
+      triangles.push_back({id(r, s), id(r + 1, s + 1), id(r, s + 1)});
+    }
+  }
+  mesh.triangles.resize(static_cast<Index>(triangles.size()), 3);
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) mesh.triangles(static_cast<Index>(t), k) = triangles[t][k];
+  const HalfSpace half(0.004, 0.007);
+  const ContactEquilibrium exact = half.press(sphere_shape(radius), force), meshed = half.press(mesh_shape(mesh), force);
+  ASSERT_TRUE(exact.converged && meshed.converged) << exact.reason << meshed.reason;
+  // The facets' sagitta is R (pi / 48)^2 / 8 = 0.016 mm.
+  EXPECT_NEAR(travel(meshed), travel(exact), 2.5e-5);
+  EXPECT_NEAR(travel(meshed) / travel(exact), 1, 0.03);
+}
+
+}  // namespace
+}  // namespace palpate::fem
