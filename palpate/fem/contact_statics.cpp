@@ -153,7 +153,8 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
     } else {
       step *= 0.5;
       if (step < smallest)
-        out.reason = "no equilibrium was found beyond " + std::to_string(100 * done) + " % of the load step (" + reason + ")";
+        out.reason =
+            "no equilibrium was found beyond " + std::to_string(100 * done) + " % of the load step (" + reason + ")";
     }
   }
   out.converged = out.reason.empty();

@@ -61,7 +61,8 @@ struct TouchResult {
   Vec6 wrench = Vec6::Zero();  ///< of the tool on the object: force, torque about the tip; base axes
   double area_m2 = 0;          ///< of the deformed surface in contact
   double penetration_m = 0;    ///< largest
-  double layer_m = 0;  ///< share of the travel that is the layer's compression: subtract it for a rigid surface (first order)
+  double layer_m =
+      0;  ///< share of the travel that is the layer's compression: subtract it for a rigid surface (first order)
   int active_points = 0, slipping_points = 0;
   Points patch_m;  ///< active points, present positions
   VectorX patch_pressure_pa;
@@ -85,13 +86,13 @@ struct ContactEquilibrium {
 };
 
 /// Exact derivatives at a frictionless, bonded or sticking equilibrium, away from changes of the active set. One column a
-/// parameter: log E, nu, force coefficients, motion coefficients, then for every contact 6 of its pose (a shift of the tip, a
-/// rotation about it), 6 of its wrench, 1 of its radius.
+/// parameter: log E, nu, force coefficients, motion coefficients, then for every contact 6 of its pose (a shift of the tip,
+/// a rotation about it), 6 of its wrench, 1 of its radius.
 struct ContactSensitivity {
-  MatrixX displacement;          ///< 3n x p
-  std::vector<MatrixX> wrench;   ///< 6 x p, one a contact
-  std::vector<MatrixX> motion;   ///< 6 x p: twist of the tool (tip travel)
-  MatrixX motion_reaction;       ///< m x p
+  MatrixX displacement;         ///< 3n x p
+  std::vector<MatrixX> wrench;  ///< 6 x p, one a contact
+  std::vector<MatrixX> motion;  ///< 6 x p: twist of the tool (tip travel)
+  MatrixX motion_reaction;      ///< m x p
   Index log_young = 0, poisson = 1, first_force = 2, first_motion = 2;
   std::vector<Index> first_pose, first_wrench, radius;  ///< one a contact; radius -1 where the shape has none
 };

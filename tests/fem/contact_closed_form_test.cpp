@@ -1,8 +1,8 @@
 // label: oracle
 // SPDX-License-Identifier: Apache-2.0
 // Contact against closed forms of the half space. A quarter of a block stands for it: its outer faces follow Boussinesq's
-// point force, which differs from the contact's own field by the square of patch over block size. Loads are small: the closed
-// forms know no motion of the surface along the tool, which makes a travel of 5 % of the radius 2 % too small.
+// point force, which differs from the contact's own field by the square of patch over block size. Loads are small: the
+// closed forms know no motion of the surface along the tool, which makes a travel of 5 % of the radius 2 % too small.
 #include <gtest/gtest.h>
 
 #include "fem_meshes.hpp"
@@ -18,8 +18,7 @@ constexpr double kPlaneModulus = kYoung / (1 - kPoisson * kPoisson);
 // Displacement of the half space z > 0 under a unit force along z at the origin (Boussinesq; Johnson 1985, eq. 3.18).
 Vec3 boussinesq(const Vec3& x) {
   const double g = kYoung / (2 * (1 + kPoisson)), rho = x.norm(), r = std::hypot(x.x(), x.y());
-  const double radial =
-      r * (x.z() / (rho * rho * rho) - (1 - 2 * kPoisson) / (rho * (rho + x.z()))) / (4 * M_PI * g);
+  const double radial = r * (x.z() / (rho * rho * rho) - (1 - 2 * kPoisson) / (rho * (rho + x.z()))) / (4 * M_PI * g);
   const double down = (x.z() * x.z() / (rho * rho * rho) + 2 * (1 - kPoisson) / rho) / (4 * M_PI * g);
   return {r > 0 ? radial * x.x() / r : 0, r > 0 ? radial * x.y() / r : 0, down};
 }

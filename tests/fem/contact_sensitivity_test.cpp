@@ -98,8 +98,7 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
     const ContactEquilibrium a = solve(up, nullptr), b = solve(down, nullptr);
     const VectorX du = (a.displacement_m - b.displacement_m) / (2 * step);
     const Vec6 dw = (a.touches[0].wrench - b.touches[0].wrench) / (2 * step);
-    const Vec3 tip =
-        (a.touches[0].T_base_tool.translation() - b.touches[0].T_base_tool.translation()) / (2 * step);
+    const Vec3 tip = (a.touches[0].T_base_tool.translation() - b.touches[0].T_base_tool.translation()) / (2 * step);
     EXPECT_LT((du - s.displacement.col(column)).norm(), 1e-3 * du.norm() + 1e-6) << what;
     EXPECT_LT((dw - s.wrench[0].col(column)).norm(), 1e-3 * dw.norm() + 1e-4 * base.touches[0].wrench.norm()) << what;
     EXPECT_LT((tip - s.motion[0].col(column).head<3>()).norm(), 1e-3 * tip.norm() + 1e-7) << what;
@@ -110,7 +109,8 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
   check("weight", 1e-2, s.first_force + 2, [](Point& p, double h) { p.weight(2) += h; });
   for (int k = 0; k < 6; ++k) {
     if (bonded) break;  // all six are free
-    check("pose " + std::to_string(k), k < 3 ? 1e-9 : 1e-7, s.first_pose[0] + k, [k](Point& p, double h) { p.shift(k) += h; });
+    check("pose " + std::to_string(k), k < 3 ? 1e-9 : 1e-7, s.first_pose[0] + k,
+          [k](Point& p, double h) { p.shift(k) += h; });
   }
   if (scene.by_force) check("force", 1e-6, s.first_wrench[0] + 2, [](Point& p, double h) { p.wrench(2) += h; });
   if (s.radius[0] >= 0) check("radius", 1e-9, s.radius[0], [](Point& p, double h) { p.radius += h; });

@@ -131,9 +131,9 @@ TEST(Platen, ByForceAndByPoseIsTheBar) {
   const TetMesh mesh = to_quadratic(distorted(block_mesh(3, 3, 2, {0.06, 0.06, 0.04}), 0.002, 3));
   const double area = 0.06 * 0.06, force = 1.5;
   const auto solve = [&](bool by_force, double value) {
-    const ContactStatics body(mesh, "linear", Boundary(),
-                              {table(Touch::frictionless),
-                               platen(0.04, Touch::frictionless, by_force ? along(Vec3::UnitZ()) : MatrixX(6, 0))});
+    const ContactStatics body(
+        mesh, "linear", Boundary(),
+        {table(Touch::frictionless), platen(0.04, Touch::frictionless, by_force ? along(Vec3::UnitZ()) : MatrixX(6, 0))});
     ContactLoads loads = body.no_loads();
     (by_force ? loads.wrench[1] : loads.motion[1])(2) = -value;
     ContactEquilibrium e = body.solve(kYoung, 0.3, loads);
@@ -177,12 +177,14 @@ TetMesh ball(int cells, double radius) {
   }
   mesh = to_quadratic(mesh);
   const Tetrahedra faces = boundary_faces(mesh);
-  for (Index k = 0; k < faces.size(); ++k) mesh.nodes_m.row(faces.data()[k]) *= radius / mesh.nodes_m.row(faces.data()[k]).norm();
+  for (Index k = 0; k < faces.size(); ++k)
+    mesh.nodes_m.row(faces.data()[k]) *= radius / mesh.nodes_m.row(faces.data()[k]).norm();
   return mesh;
 }
 
-// Pressed between two plates: free with both plates driven (rigid motions projected out), and lying on a table that is fixed.
-// Both are the same state, and the closed form's within its error (a/R = 0.2) and the mesh's (a face is as large as the patch).
+// Pressed between two plates: free with both plates driven (rigid motions projected out), and lying on a table that is
+// fixed. Both are the same state, and the closed form's within its error (a/R = 0.2) and the mesh's (a face is as large as
+// the patch).
 TEST(FreeBall, BetweenTwoOpposedPushes) {
   const double radius = 0.03, force = 0.2;
   const TetMesh mesh = ball(8, radius);

@@ -29,8 +29,7 @@ std::string ContactSystem::iterate(const ContactProblem& p, const std::vector<To
     const VectorX jump = p.prescribed - system.prescribed_part(s.u);
     const bool at_target = jump.lpNorm<Eigen::Infinity>() <= 1e-14 * diameter_m;
     if (at_target && s.residual <= tolerance) return {};
-    if (step == max_steps)
-      return "Newton's method did not converge in " + std::to_string(step) + " steps";
+    if (step == max_steps) return "Newton's method did not converge in " + std::to_string(step) + " steps";
     tangent(p, memory, s, s.residual > 1e-3, t);
     bool factored = false;
     double shift = 0;

@@ -56,7 +56,8 @@ ContactSystem::ContactSystem(const TetMesh& mesh_in, const std::string& material
   first_axis.push_back(0);
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const RigidContact& contact = contacts[c];
-    const std::string where = "contacts[" + std::to_string(c) + "]" + (contact.name.empty() ? "" : " '" + contact.name + "'");
+    const std::string where =
+        "contacts[" + std::to_string(c) + "]" + (contact.name.empty() ? "" : " '" + contact.name + "'");
     if (!contact.shape) throw Error("has no shape", where);
     if (contact.free_axes.rows() != 6) throw Error("needs 6 rows (translation, rotation)", where + ".free_axes");
     if (contact.law == Touch::friction && !(contact.friction_coefficient >= 0))

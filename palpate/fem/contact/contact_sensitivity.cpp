@@ -15,9 +15,10 @@ ContactSensitivity sensitivity_of(ContactSystem& system, const ContactEquilibriu
       throw Error("friction has no exact derivatives here: difference two solutions, or let the contact slide or stick",
                   "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
     if (law == Touch::sticking && at.increments_from_rest != 1)
-      throw Error("a sticking contact has exact derivatives after one increment from rest only (its anchors then do not depend "
-                  "on the path): set increments to 1",
-                  "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
+      throw Error(
+          "a sticking contact has exact derivatives after one increment from rest only (its anchors then do not depend "
+          "on the path): set increments to 1",
+          "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
   }
   const ContactProblem p = system.problem(at.young_modulus_pa, at.poisson_ratio, at.loads, at.extra);
   ContactState s;

@@ -41,9 +41,9 @@ struct TouchingBody {
 
 /// Derivatives to the tool's twist q = (translation of the tip, rotation about the tip), base axes.
 struct ToolTerms {
-  Vec6 gradient = Vec6::Zero();                                          ///< dE/dq: the wrench of the tool on the object
+  Vec6 gradient = Vec6::Zero();  ///< dE/dq: the wrench of the tool on the object
   Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();  ///< d(gradient)/dq
-  MatrixX coupling;                                                      ///< 3n x 6: d(nodal forces)/dq
+  MatrixX coupling;                                                           ///< 3n x 6: d(nodal forces)/dq
 };
 
 class ContactTerms {
@@ -74,9 +74,9 @@ class ContactTerms {
   void end_increment(const TouchingBody& body, const VectorX& u, TouchMemory& memory) const;
 
   struct Patch {
-    Points points_m;       ///< present positions of touching points
-    VectorX pressure_pa;   ///< per rest area
-    VectorX area_m2;       ///< present area that each stands for
+    Points points_m;      ///< present positions of touching points
+    VectorX pressure_pa;  ///< per rest area
+    VectorX area_m2;      ///< present area that each stands for
     double penetration_m = 0;
     double layer_energy_j = 0;  ///< of the normal compression
     int slipping = 0;

@@ -25,10 +25,10 @@ class SurfacePoints {
   Index block(Index face, int a, int b) const {
     return blocks_[(static_cast<std::size_t>(face) * faces_.cols() + a) * faces_.cols() + b];
   }
-  auto shape(int point) const { return shapes_.col(point); }          ///< values at a point of every face
+  auto shape(int point) const { return shapes_.col(point); }                    ///< values at a point of every face
   auto d_shape(int point) const { return d_shapes_.middleCols<2>(2 * point); }  ///< to the first two barycentric coordinates
   double weight_m2(Index face, int point) const { return weights_[static_cast<std::size_t>(face) * per_face() + point]; }
-  double face_size_m(Index face) const { return size_m_[face]; }     ///< square root of its area
+  double face_size_m(Index face) const { return size_m_[face]; }  ///< square root of its area
   double cell_m(Index face) const { return size_m_[face] / per_edge_; }
 
  private:
