@@ -23,18 +23,19 @@ Vec3 boussinesq(const Vec3& x) {
   return {r > 0 ? radial * x.x() / r : 0, r > 0 ? radial * x.y() / r : 0, down};
 }
 
-// Quarter of the half space: x, y > 0, z down from the surface at z = 0; tools push along z.
+// Quarter (x, y > 0) or whole of the half space, z down from the surface at z = 0; tools push along z.
 struct HalfSpace {
   TetMesh mesh;
   Boundary boundary;
-  HalfSpace(double edge, double radius, double growth = 0.7) {
-    const RefinedMesh fine =
-        refine_near(block_mesh(3, 3, 3, {kSize, kSize, kSize}), Vec3::Zero(), radius, edge, growth, 4000);
+  HalfSpace(double edge, double radius, double growth = 0.7, bool whole = false) {
+    TetMesh block = whole ? block_mesh(6, 6, 3, {2 * kSize, 2 * kSize, kSize}) : block_mesh(3, 3, 3, {kSize, kSize, kSize});
+    if (whole) block.nodes_m.leftCols<2>().array() -= kSize;
+    const RefinedMesh fine = refine_near(block, Vec3::Zero(), radius, edge, growth, 6000);
     mesh = to_quadratic(fine.mesh);
     std::vector<Eigen::Triplet<double>> far;
     for (Index i = 0; i < mesh.nodes_m.rows(); ++i) {
       const Vec3 x = node_position(mesh, i);
-      if (x.maxCoeff() > kSize - 1e-9) {
+      if (std::max(x.head<2>().cwiseAbs().maxCoeff(), x.z()) > kSize - 1e-9) {
         boundary.constraints.push_back({i, Mat3::Identity(), 3});
         for (int k = 0; k < 3; ++k) far.emplace_back(3 * i + k, 0, boussinesq(x)(k));
         continue;
@@ -42,15 +43,16 @@ struct HalfSpace {
       Mat3 axes = Mat3::Zero();
       int count = 0;
       for (int k = 0; k < 2; ++k)
-        if (x(k) < 1e-9) axes.col(count++) = Vec3::Unit(k);
+        if (!whole && x(k) < 1e-9) axes.col(count++) = Vec3::Unit(k);
       if (count > 0) boundary.constraints.push_back({i, axes, count});
     }
     boundary.motions.resize(3 * mesh.nodes_m.rows(), 1);
     boundary.motions.setFromTriplets(far.begin(), far.end());
   }
-  ContactEquilibrium press(RigidShapePtr shape, double force) const {
+  ContactEquilibrium press(RigidShapePtr shape, double force, Touch law = Touch::frictionless) const {
     RigidContact tool;
     tool.shape = std::move(shape);
+    tool.law = law;
     tool.T_base_tool = tool_pose({0, 0, -0.0005}, Vec3::UnitZ());
     tool.free_axes = along(Vec3::UnitZ());
     const ContactStatics body(mesh, "linear", boundary, {tool});
@@ -95,6 +97,34 @@ TEST(HalfSpaceContact, FlatPunchConverges) {
     last = error;
   }
   EXPECT_LT(last, 0.015);
+}
+
+// A punch that does not let the surface slide is stiffer by (1 - nu) ln(3 - 4 nu) / (1 - 2 nu) (Mossakovskii 1954).
+TEST(HalfSpaceContact, StickingPunchIsStifferByMossakovskii) {
+  const double radius = 0.01, force = 0.005;
+  const HalfSpace half(0.004, 1.1 * radius, 1);
+  const ContactEquilibrium slides = half.press(disc_shape(radius), force),
+                           sticks = half.press(disc_shape(radius), force, Touch::sticking);
+  ASSERT_TRUE(slides.converged && sticks.converged) << slides.reason << sticks.reason;
+  const double expected = (1 - kPoisson) * std::log(3 - 4 * kPoisson) / (1 - 2 * kPoisson);
+  EXPECT_NEAR(travel(slides) / travel(sticks), expected, 0.005);
+}
+
+// Uniform pressure on a disc: mean depth 16 F (1 - nu^2) / (3 pi^2 a E), a load and no contact.
+TEST(HalfSpaceLoad, DiscPressureConverges) {
+  const double radius = 0.01, expected = 16 / (3 * M_PI * M_PI * radius * kPlaneModulus);
+  double last = 1;
+  for (double edge : {0.02, 0.01, 0.005}) {
+    HalfSpace half(edge, 1.1 * radius, 1, true);
+    half.boundary.forces = spread_over_patch(half.mesh, Vec3::Zero(), radius);
+    const Statics body(half.mesh, "linear", half.boundary);
+    const Equilibrium e = body.solve(kYoung, kPoisson, Vec3(0, 0, 1), VectorX::Ones(1));
+    const double error = std::abs(half.boundary.forces.col(2).dot(e.displacement_m) / expected - 1);
+    RecordProperty("error_edge_" + std::to_string(edge), std::to_string(error));
+    EXPECT_LT(error, last);
+    last = error;
+  }
+  EXPECT_LT(last, 0.01);
 }
 
 // A sphere given as triangles is the sphere.

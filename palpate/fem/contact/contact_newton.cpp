@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include "palpate/fem/contact/contact_problem.hpp"
@@ -7,7 +8,15 @@ namespace palpate::fem {
 
 std::string ContactSystem::newton(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s,
                                   ContactEquilibrium& out) {
-  return iterate(p, memory, s, out, options.statics.residual_tolerance, options.statics.max_newton_steps);
+  std::string reason = iterate(p, memory, s, out, options.statics.residual_tolerance, options.statics.max_newton_steps);
+  if (reason.empty() || !floating) return reason;
+  Vec3 left = Vec3::Zero();
+  for (Index i = 0; i < assembly.node_count(); ++i) left += s.unbalanced.segment<3>(3 * i);
+  // A sum over nodes as large as their norm: they pull together.
+  if (left.norm() > s.unbalanced.norm())
+    reason += "; nothing carries a force of (" + std::to_string(-left.x()) + ", " + std::to_string(-left.y()) + ", " +
+              std::to_string(-left.z()) + ") N";
+  return reason;
 }
 
 void ContactSystem::soften_start(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s,
