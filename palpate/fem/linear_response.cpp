@@ -7,15 +7,10 @@
 #include <complex>
 
 #include "palpate/core/error.hpp"
+#include "palpate/fem/chebyshev.hpp"
 
 namespace palpate::fem {
 namespace {
-
-// The compliance has poles where K(nu) is singular: nu = -1, and none with 1 - 2 nu > 0 else. In z the far half plane 1 - 2
-// nu < 0 starts at Im z = pi.
-double to_z(double nu) { return -std::log1p(-2 * nu); }
-double to_poisson(double z) { return -0.5 * std::expm1(-z); }
-double poisson_d_z(double z) { return 0.5 * std::exp(-z); }
 
 struct Range {
   double middle, half;
@@ -29,23 +24,7 @@ double convergence_rate(const Range& range) {
     const std::complex<double> root = std::sqrt(x * x - 1.0);
     return std::max(std::abs(x + root), std::abs(x - root));
   };
-  return std::min(rho({range.middle, EIGEN_PI}), rho({to_z(-1), 0}));
-}
-
-// Chebyshev polynomials T_0 .. T_{count-1} and their derivatives at x.
-void chebyshev(double x, VectorX& value, VectorX& slope) {
-  const Index count = value.size();
-  slope.resize(count);
-  double u_before = 0, u = 1;  // of the second kind: T_i' = i U_{i-1}
-  for (Index i = 0; i < count; ++i) {
-    value(i) = i == 0 ? 1 : i == 1 ? x : 2 * x * value(i - 1) - value(i - 2);
-    slope(i) = 0;
-    if (i == 0) continue;
-    slope(i) = static_cast<double>(i) * u;
-    const double next = 2 * x * u - u_before;
-    u_before = u;
-    u = next;
-  }
+  return std::min(rho({range.middle, EIGEN_PI}), rho({poisson_to_z(-1), 0}));
 }
 
 MatrixX stacked(const UnitResponses& r, bool slopes) {
@@ -118,7 +97,7 @@ std::shared_ptr<const UnitResponses> LinearResponse::at(double poisson_ratio) co
 }
 
 void LinearResponse::make_polynomial() const {
-  const double low = to_z(options_.poisson_lower), high = to_z(options_.poisson_upper);
+  const double low = poisson_to_z(options_.poisson_lower), high = poisson_to_z(options_.poisson_upper);
   const Range range{0.5 * (low + high), 0.5 * (high - low)};
   const double rate = convergence_rate(range);
   // A margin of a hundred, since the error has a constant in front; then more, should the last coefficients say so.
@@ -135,7 +114,7 @@ void LinearResponse::make_polynomial() const {
     for (int j = 0; j < nodes; ++j) {
       const double x = std::cos(EIGEN_PI * (2 * j + 1) / (2 * nodes));
       const double z = range.middle + range.half * x;
-      const UnitResponses solved = statics_.unit_responses(to_poisson(z), watched_);
+      const UnitResponses solved = statics_.unit_responses(z_to_poisson(z), watched_);
       ++factorisations_;
       residual = std::max(residual, solved.residual);
       const auto at = static_cast<std::size_t>(j);
@@ -170,9 +149,9 @@ void LinearResponse::make_polynomial() const {
 }
 
 UnitResponses LinearResponse::interpolate(double poisson_ratio) const {
-  const double low = to_z(options_.poisson_lower), high = to_z(options_.poisson_upper);
+  const double low = poisson_to_z(options_.poisson_lower), high = poisson_to_z(options_.poisson_upper);
   const Range range{0.5 * (low + high), 0.5 * (high - low)};
-  const double z = to_z(poisson_ratio);
+  const double z = poisson_to_z(poisson_ratio);
   VectorX value(static_cast<Index>(coefficients_.size())), slope;
   chebyshev(range.to_unit(z), value, slope);
   const double chain = 1 / (range.half * poisson_d_z(z));

@@ -59,6 +59,23 @@ Boundary checked(const TetMesh& mesh, Boundary boundary) {
   return boundary;
 }
 
+namespace {
+
+// Share of the boundary that a uniform pressure gives each node: a third of a face to its corners, or to its midpoints where
+// it has some (the corners of a quadratic face then carry none of it).
+VectorX surface_shares(const TetMesh& mesh) {
+  VectorX area = VectorX::Zero(mesh.nodes_m.rows());
+  const Tetrahedra faces = boundary_faces(mesh);
+  for (Index f = 0; f < faces.rows(); ++f) {
+    const Vec3 a = mesh.nodes_m.row(faces(f, 0)), b = mesh.nodes_m.row(faces(f, 1)), c = mesh.nodes_m.row(faces(f, 2));
+    const double third = (b - a).cross(c - a).norm() / 6;
+    for (int k = 0; k < 3; ++k) area(faces(f, faces.cols() == 6 ? 3 + k : k)) += third;
+  }
+  return area;
+}
+
+}  // namespace
+
 struct Statics::Impl {
   Impl(const TetMesh& mesh_in, const std::string& material, Boundary boundary_in, StaticsOptions options_in)
       : mesh(mesh_in),
@@ -73,6 +90,7 @@ struct Statics::Impl {
     if (!free) check_supported(mesh, boundary.constraints);
     motions = MatrixX(boundary.motions);
     for (Index k = 0; k < motions.cols(); ++k) motions.col(k) = system.prescribed_part(motions.col(k));
+    node_area_m2 = surface_shares(mesh);
     diameter_m = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
     if (law.is_linear() && !assembly.is_mixed()) {
       Moduli unit;
@@ -148,7 +166,7 @@ struct Statics::Impl {
   // @param near  s is close to a state that the last factor belongs to
   std::string newton(const Problem& p, State& s, Equilibrium& out, int max_steps, bool near) {
     State trial;
-    for (int step = 0;;) {
+    for (double effort = 0;;) {
       const VectorX jump = p.prescribed - system.prescribed_part(s.u);
       const bool at_target = jump.lpNorm<Eigen::Infinity>() <= 1e-14 * diameter_m;
       if (at_target && s.residual <= options.residual_tolerance) return {};
@@ -156,9 +174,12 @@ struct Statics::Impl {
         near = stale_step(p, jump, at_target, s, trial);
         if (near) continue;
       }
-      if (step++ == max_steps) return "Newton's method did not converge in " + std::to_string(max_steps) + " steps";
+      if (effort >= max_steps) return "Newton's method did not converge in " + std::to_string(max_steps) + " steps";
       bool shifted = false;
-      if (!factorise_tangent(p, s.u, out.factorisations, &shifted)) return "the tangent could not be factorised";
+      const bool factorised = factorise_tangent(p, s.u, out.factorisations, &shifted);
+      // Past a point of instability the energy falls slowly towards another state; that is progress all the same.
+      effort += shifted ? 0.15 : 1;
+      if (!factorised) return "the tangent could not be factorised";
       VectorX rhs = -(s.internal - p.external);
       if (!at_target) rhs -= assembly.multiply(blocks, jump);
       const VectorX d_free = system.solve(rhs);
@@ -298,6 +319,33 @@ struct Statics::Impl {
     out.residual = s.residual;
     out.inverted_elements = s.inverted;
     out.motion_reaction = motions.transpose() * (s.internal - p.external);
+    double forces = 0, squares = 0;
+    for (Index i = 0; i < node_area_m2.size(); ++i) {
+      const double force = p.external.segment<3>(3 * i).norm();
+      if (force == 0 || node_area_m2(i) == 0) continue;
+      forces += force;
+      squares += force * force / node_area_m2(i);
+    }
+    out.pressure_over_young = forces > 0 ? squares / (forces * p.m.young_pa) : 0;
+  }
+
+  Equilibrium solve_stepwise(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) {
+    const Problem p = problem(young, poisson, a, b, extra);
+    Equilibrium out = blank(young, poisson, a, b, p.m.extra);
+    State s;
+    out.reason = continuation(p, s, out);
+    out.converged = out.reason.empty();
+    finish(p, s, out);
+    return out;
+  }
+
+  bool is_stable(const Equilibrium& at) {
+    const Problem p =
+        problem(at.young_modulus_pa, at.poisson_ratio, at.force_coefficients, at.motion_coefficients, at.extra);
+    factored_u.resize(0);
+    linear_poisson = std::numeric_limits<double>::quiet_NaN();
+    assembly.tangent(law, p.m, at.displacement_m, blocks);
+    return system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots());
   }
 
   Equilibrium solve(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX* start,
@@ -488,6 +536,7 @@ struct Statics::Impl {
   ReducedSystem system;
   MatrixX motions;  // along prescribed directions only
   double diameter_m = 0;
+  VectorX node_area_m2;  // of the boundary, 0 inside
   // Scratch that const calls share (a Statics is not thread-safe).
   BlockValues blocks, blocks_lambda, blocks_mu;
   VectorX factored_u;  // where the factor is the exact tangent; empty: nowhere
@@ -515,6 +564,13 @@ std::vector<Equilibrium> Statics::solve_many(double young_modulus_pa, double poi
     throw Error("force and motion coefficients need the same number of columns (cases)", "Statics::solve_many");
   return impl_->solve_linear(young_modulus_pa, poisson_ratio, force_coefficients, motion_coefficients);
 }
+
+Equilibrium Statics::solve_stepwise(double young_modulus_pa, double poisson_ratio, const VectorX& force_coefficients,
+                                    const VectorX& motion_coefficients, const VectorX& extra) const {
+  return impl_->solve_stepwise(young_modulus_pa, poisson_ratio, force_coefficients, motion_coefficients, extra);
+}
+
+bool Statics::is_stable(const Equilibrium& at) const { return impl_->is_stable(at); }
 
 SensitivityAlong Statics::sensitivity_along(const Equilibrium& at, const MatrixX& force_directions,
                                             const MatrixX& motion_directions) const {

@@ -66,6 +66,9 @@ struct Equilibrium {
   int factorisations = 0;
   int inverted_elements = 0;
   double residual = 0;  ///< relative, as in StaticsOptions
+  /// Mean pressure under the loads over E, weighted with force. Above about 0.3 co-rotational and St. Venant-Kirchhoff
+  /// bodies lose stability under the tool, and every other law is far beyond small strain.
+  double pressure_over_young = 0;
 };
 
 /// Exact derivatives from the tangent's factor at the equilibrium (implicit function theorem).
@@ -122,6 +125,14 @@ class Statics {
   /// @param start  displacement to start Newton from (nullptr: zero)
   Equilibrium solve(double young_modulus_pa, double poisson_ratio, const VectorX& force_coefficients,
                     const VectorX& motion_coefficients, const VectorX* start = nullptr, const VectorX& extra = {}) const;
+
+  /// The same with the loads stepped up from rest, never at once: where several equilibria exist, the one on the branch that
+  /// starts at rest.
+  Equilibrium solve_stepwise(double young_modulus_pa, double poisson_ratio, const VectorX& force_coefficients,
+                             const VectorX& motion_coefficients, const VectorX& extra = {}) const;
+
+  /// True where the energy has no direction of negative curvature at `at` (its tangent is positive definite).
+  bool is_stable(const Equilibrium& at) const;
 
   /// Re-factorises the tangent at `at` only if it is not the last one solved (linear material: once per nu).
   Sensitivity sensitivity(const Equilibrium& at) const;
