@@ -100,8 +100,8 @@ void LinearResponse::make_polynomial() const {
   const double low = poisson_to_z(options_.poisson_lower), high = poisson_to_z(options_.poisson_upper);
   const Range range{0.5 * (low + high), 0.5 * (high - low)};
   const double rate = convergence_rate(range);
-  // A margin of a hundred, since the error has a constant in front; then more, should the last coefficients say so.
-  double wanted = std::log(100 / options_.tolerance) / (2 * std::log(rate));
+  // The last coefficients say whether it is enough.
+  double wanted = std::log(3 / options_.tolerance) / (2 * std::log(rate));
   usable_ = false;
   while (wanted <= options_.max_factorisations) {
     const int nodes = std::max(3, static_cast<int>(std::ceil(wanted)));
