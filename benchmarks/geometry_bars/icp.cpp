@@ -49,7 +49,9 @@ bool row(const geometry::TriangleTree& tree, int width, int height, double focal
     }
     const Pose start = random_motion(5 * M_PI / 180, 0.01, rng);
     const Stopwatch watch;
-    const auto r = registration::align(v.cloud, tree, start);
+    registration::IcpOptions o;
+    o.sensor_m = 0.5 * Vec3(0.3, -0.5, 1).normalized();
+    const auto r = registration::align(v.cloud, tree, start, o);
     ours_s.push_back(watch.seconds());
     const auto in_bounds = [&](const Vector6& d) { return std::sqrt(d.dot(h * d) / 6); };
     const Vector6 d = as_vector(r.T_surface_cloud);

@@ -50,13 +50,15 @@ bool is_small(const TetEditor::Pieces& pieces, Index id, double share) {
   return v[id] < largest && v[id] < share * std::accumulate(v.begin(), v.end(), 0.0);
 }
 
-/// Corners of small pieces, with the edge length there.
+/// Corners of small pieces, with the edge length there. Specks are not worth being tied to the rest.
 std::vector<std::pair<Vec3, double>> loose_points(const TetEditor& mesh, double share) {
+  constexpr double speck = 1e-5;
   const auto pieces = mesh.pieces();
+  const double all = std::accumulate(pieces.volume_m3.begin(), pieces.volume_m3.end(), 0.0);
   std::vector<std::pair<Vec3, double>> out;
   std::vector<char> done(mesh.x.size(), 0);
   for (std::size_t t = 0; t < mesh.tets.size(); ++t)
-    if (mesh.alive[t] && is_small(pieces, pieces.of[t], share))
+    if (mesh.alive[t] && pieces.volume_m3[pieces.of[t]] > speck * all && is_small(pieces, pieces.of[t], share))
       for (const Index v : mesh.tets[t])
         if (!std::exchange(done[v], 1)) out.emplace_back(mesh.x[v], mesh.size_m[v]);
   return out;
@@ -91,7 +93,8 @@ std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, co
   constexpr double small = 0.01;
   for (int attempt = 0; attempt < 4; ++attempt) {
     const auto loose = loose_points(out.mesh, small);
-    if (loose.empty()) break;
+    constexpr std::size_t most = 1500;  // more are the scraps of a noisy soup, not a few torn parts
+    if (loose.empty() || loose.size() > most) break;
     lattice.refine_to_size([&](const Vec3& p) {
       double edge = std::numeric_limits<double>::infinity();
       for (const auto& [at, size] : loose)

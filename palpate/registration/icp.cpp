@@ -60,8 +60,10 @@ class Aligner {
     IcpResult out;
     // far from the answer a few thousand points say as much as all: only the last steps take every point
     const Index stride = std::max<Index>(1, static_cast<Index>(cloud_.points_m.rows()) / 3000);
-    if (stride > 1) iterate(stride, 5 * o_.stop_share, out);
-    iterate(1, o_.stop_share, out);
+    if (stride > 1 || o_.sensor_m) iterate(stride, 5 * o_.stop_share, out);
+    along_rays_ = o_.sensor_m.has_value();
+    iterate(1, along_rays_ ? 4 * o_.stop_share : o_.stop_share,
+            out);  // rays that change over at rims keep finer steps alive
     out.T_surface_cloud = T_;
     return out;
   }
@@ -69,6 +71,18 @@ class Aligner {
  private:
   /// Does the cloud say how good its points are? One common value of 0 says nothing.
   bool absolute() const { return cloud_.sigma_m.size() > 0 && cloud_.sigma_m[0] > 0; }
+
+  geometry::ClosestPoint on_ray(const Vec3& point) const {
+    const Vec3 d = (point - T_ * *o_.sensor_m).normalized();
+    geometry::ClosestPoint out;
+    const Vec3 from = point - o_.reject_m * d;
+    if (const auto hit = surface_.cast(from, d, 2 * o_.reject_m)) {
+      out.triangle = hit->triangle;
+      out.point_m = from + hit->range_m * d;
+      out.squared_distance_m2 = (out.point_m - point).squaredNorm();
+    }
+    return out;
+  }
 
   bool normal_fits(Index i, const Vec3& normal) const {
     if (cloud_.normals.rows() != cloud_.points_m.rows()) return true;
@@ -85,7 +99,7 @@ class Aligner {
     for (Index i = 0; i < n; i += stride) {
       Pairing p;
       p.point = T_ * Vec3(cloud_.points_m.row(i).transpose());
-      const auto c = surface_.closest(p.point, hint_[i]);
+      const auto c = along_rays_ ? on_ray(p.point) : surface_.closest(p.point, hint_[i]);
       if (c.triangle < 0 || c.squared_distance_m2 > o_.reject_m * o_.reject_m) continue;
       hint_[i] = c.triangle;
       const Vec3 a = m.vertices_m.row(m.triangles(c.triangle, 0)).transpose(),
@@ -96,8 +110,12 @@ class Aligner {
       if (!(length > 0)) continue;
       p.normal /= length;
       if (!normal_fits(i, p.normal)) continue;
+      double cosine = 1;  // of noise along the ray, along the normal
+      if (along_rays_) cosine = std::abs(p.normal.dot((p.point - T_ * *o_.sensor_m).normalized()));
+      if (cosine < 0.2) continue;
       p.gap = p.point - c.point_m;
       p.weight = each ? 1 / (cloud_.sigma_m[i] * cloud_.sigma_m[i]) : same;
+      p.weight /= cosine * cosine;
       const double miss = o_.metric == IcpMetric::point_to_plane ? std::abs(p.normal.dot(p.gap)) : p.gap.norm();
       p.miss = miss * std::sqrt(p.weight);
       pairs.push_back(p);
@@ -195,6 +213,7 @@ class Aligner {
   IcpOptions o_;
   Pose T_;
   std::vector<Index> hint_;
+  bool along_rays_ = false;
 };
 
 void require(bool ok, const char* field, const char* bounds) {

@@ -2,6 +2,7 @@
 // Iterative closest point of a cloud against a surface, started from what the robot knows.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "palpate/core/recording.hpp"
@@ -23,7 +24,10 @@ struct IcpOptions {
   double tukey = 0;               ///< beyond this many robust deviations a pair counts nothing (0 = off, else >= 2)
   double reject_angle_rad = 1.2;  ///< between the cloud's normal (where known) and the surface's
   int max_iterations = 50;        ///< >= 1
-  double stop_share = 0.05;       ///< converged when a step is below this share of the answer's own standard deviation
+  /// Where the points were seen from, in the cloud's frame. Noise along the rays that exceeds the surface's own roughness
+  /// biases closest points; with it the last steps pair every point with what its ray meets, and sigma is along the ray.
+  std::optional<Vec3> sensor_m;
+  double stop_share = 0.05;  ///< converged when a step is below this share of the answer's own standard deviation
 };
 
 /// @throws Error naming the field and its bounds.

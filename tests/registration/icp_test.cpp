@@ -144,6 +144,57 @@ TEST(Icp, outliers_are_trimmed_or_down_weighted) {
   EXPECT_LT(with_tukey, 0.25 * plain);
 }
 
+TEST(Icp, pairs_along_rays_are_not_biased_by_noise_that_exceeds_the_roughness) {
+  // ripples of 0.4 mm under noise of 1.2 mm: closest points are drawn to the crests
+  TriMesh m = shapes::sphere(1, 6);
+  for (Index i = 0; i < m.vertices_m.rows(); ++i) {
+    const Vec3 d = m.vertices_m.row(i).transpose();
+    const double r = 0.1 * (1 + 0.25 * std::sin(3 * d.x() + 1) * std::cos(2 * d.y()) + 0.15 * std::sin(4 * d.z() + d.x()));
+    m.vertices_m.row(i) = ((r + 0.0004 * std::sin(90 * d.x()) * std::sin(90 * d.y())) * d).transpose();
+  }
+  const geometry::TriangleTree tree(m);
+  const Vec3 eye(0.05, -0.1, 0.5);
+  constexpr double sigma = 0.0012;
+  constexpr int seeds = 12;
+  std::vector<double> ratio;
+  double normalised = 0;
+  for (int s = 0; s < seeds; ++s) {
+    std::mt19937 rng(300 + s);
+    std::normal_distribution<double> g;
+    std::vector<Vec3> points;
+    Matrix6 h = Matrix6::Zero();
+    for (int y = -60; y <= 60; ++y)
+      for (int x = -60; x <= 60; ++x) {
+        const Vec3 d = (Vec3(0.0033 * x, 0.0033 * y, 0) - eye).normalized();
+        const auto hit = tree.cast(eye, d);
+        if (!hit) continue;
+        const auto corner = [&](int k) { return Vec3(m.vertices_m.row(m.triangles(hit->triangle, k)).transpose()); };
+        const Vec3 n = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+        if (-n.dot(d) < 0.3) continue;
+        points.push_back(eye + (hit->range_m + sigma * g(rng)) * d);
+        Eigen::Matrix<double, 6, 1> j;  // of the range, in units of its noise
+        j << points.back().cross(n), n;
+        h += j * j.transpose() / std::pow(sigma * n.dot(d), 2);
+      }
+    PointCloud cloud;
+    cloud.points_m.resize(static_cast<Index>(points.size()), 3);
+    for (std::size_t i = 0; i < points.size(); ++i) cloud.points_m.row(static_cast<Index>(i)) = points[i].transpose();
+    cloud.sigma_m = VectorX::Constant(1, sigma);
+    IcpOptions o;
+    o.sensor_m = eye;
+    const auto r = align(cloud, tree, offset(0.03, 0.004, rng), o);
+    ASSERT_TRUE(r.converged) << r.reason;
+    const auto d = as_vector(r.T_surface_cloud);
+    ratio.push_back(std::sqrt(d.dot(h * d) / 6));
+    normalised += d.dot(r.covariance.ldlt().solve(d)) / (6 * seeds);
+  }
+  std::sort(ratio.begin(), ratio.end());
+  EXPECT_LT(ratio[seeds / 2], 1.25);
+  EXPECT_LT(ratio.back(), 3);
+  EXPECT_GT(normalised, 0.5);
+  EXPECT_LT(normalised, 1.7);
+}
+
 TEST(Icp, tells_along_which_directions_it_may_slide) {
   const geometry::TriangleTree plane(shapes::make({{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}));
   PointCloud cloud;
