@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// `palpate record -o FOLDER`: the push protocol on the lab's robot, written step by step, so that a run that was cut off can
-// go on. `--demo` writes the built-in recording instead.
+// `palpate record --object NAME|FILE -o FOLDER`: the push protocol on the lab's robot at every site of an object, written step
+// by step, so that a run that was cut off can go on. `--demo` writes the built-in recording instead.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -12,9 +13,12 @@
 #include "cli/verbs.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/fem/materials.hpp"
 #include "palpate/io/bag_write.hpp"
+#include "palpate/io/mesh_file.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/lab/built_in.hpp"
+#include "palpate/lab/object.hpp"
 #include "palpate/lab/robot.hpp"
 
 namespace palpate::cli {
@@ -22,6 +26,7 @@ namespace {
 
 struct RecordArguments {
   bool demo = false;
+  std::string object = "cube", material, depth_sensor = "realsense_d435", force_sensor = "generic";
   std::string output;
   std::string truth;
   double young_modulus_pa = 0;
@@ -45,44 +50,117 @@ nlohmann::json truth_json(const lab::DemoTruth& truth) {
   return json;
 }
 
-// Runs the protocol; every finished step is on the disk before the next one begins.
-int record_push(Session& session, const RecordArguments& arguments) {
-  const std::filesystem::path folder = arguments.output;
+// A name of the lab's table, or a mesh file.
+lab::LabObject object_of(const RecordArguments& arguments, std::uint64_t seed) {
+  lab::ObjectOptions options;
+  options.seed = seed;
+  if (!arguments.material.empty()) options.material = arguments.material;
+  if (arguments.young_modulus_pa != 0) options.young_modulus_pa = arguments.young_modulus_pa;
+  if (arguments.poisson_ratio >= 0) options.poisson_ratio = arguments.poisson_ratio;
+  const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),
+                                    [&](const lab::BuiltInObject& row) { return row.name == arguments.object; });
+  if (built_in || !std::filesystem::exists(arguments.object)) return lab::make_object(arguments.object, options);
+  return lab::object_from_surface(io::read_tri_mesh(arguments.object), std::filesystem::path(arguments.object).filename().string(), options);
+}
+
+nlohmann::json truth_json(const lab::LabRobot& robot) {
+  const lab::LabObject& object = robot.object();
+  nlohmann::json json = {{"object", object.name},
+                         {"young_modulus_pa", object.young_modulus_pa},
+                         {"poisson_ratio", object.poisson_ratio},
+                         {"material", object.material},
+                         {"extra", object.extra},
+                         {"force_scale", robot.true_force_scale()},
+                         {"steps", nlohmann::json::array()}};
+  return json;
+}
+
+void write_json(const nlohmann::json& json, const std::filesystem::path& path) {
+  std::ofstream file(path);
+  file << json.dump(2) << '\n';
+  if (!file) throw Error("cannot be written", path.string());
+}
+
+// Runs the protocol at every site; every finished step is on the disk before the next one begins.
+int record_pushes(Session& session, const RecordArguments& arguments) {
+  std::filesystem::path folder = arguments.output;
+  if (!folder.has_filename()) folder = folder.parent_path();  // written with a slash at its end
   const bool exists = std::filesystem::exists(folder) && !std::filesystem::is_empty(folder);
   if (exists && !arguments.resume)
     throw Error("is there already; say --resume to go on, or choose another folder", folder.string());
   lab::LabOptions options;
   options.seed = session.seed;
-  if (arguments.young_modulus_pa != 0) options.object.young_modulus_pa = arguments.young_modulus_pa;
-  if (arguments.poisson_ratio >= 0) options.object.poisson_ratio = arguments.poisson_ratio;
-  lab::LabRobot robot(options);
+  options.depth = lab::depth_sensor(arguments.depth_sensor);
+  options.force = lab::force_sensor(arguments.force_sensor);
+  lab::LabRobot robot(options, object_of(arguments, session.seed));
+  const lab::LabObject& object = robot.object();
+  acquisition::PushOptions protocol = arguments.push;
+  if (!(protocol.travel_limit_m > 0)) protocol.travel_limit_m = object.travel_limit_m;
   Recording recording = robot.scene();
+  nlohmann::json truth = truth_json(robot);
+  const std::filesystem::path truth_file =
+      std::filesystem::path(arguments.truth.empty() ? folder.string() + ".truth.json" : arguments.truth);
   if (exists) {
     recording = io::read_recording_unchecked(folder);
+    std::ifstream file(truth_file);
+    const nlohmann::json before = nlohmann::json::parse(file, nullptr, false);
+    if (before.is_object() && before.contains("steps")) truth["steps"] = before["steps"];
     // The recording's clock goes on from its last step.
     if (!recording.pushes.empty() && !recording.pushes.back().steps.empty())
       robot.wait(recording.pushes.back().steps.back().time_s + 1);
   }
-  const acquisition::PushPlan plan = robot.plan();
-  const Push* so_far = nullptr;
-  for (const Push& push : recording.pushes)
-    if (push.name == plan.name) so_far = &push;
+  const std::vector<Push> recorded = recording.pushes;
   io::RecordingWriter writer(folder, recording);
   LoggedRobot logged(robot, recording.joint_names);
-  bool begun = so_far != nullptr;
-  const acquisition::PushReport report = acquisition::run_push(
-      logged, plan, arguments.push,
-      [&](const Push& push, const Step& step) {
-        if (!begun) writer.begin_push(push);
-        begun = true;
-        writer.add_step(step);
-        const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
-        session.say(fmt::format("step at {:.1f} s: {:.2f} N{}", step.time_s, force, step.unloading ? ", going back" : ""));
-      },
-      [] { return !Session::interrupted(); }, so_far);
-  for (const int step : report.unsettled) session.warn(fmt::format("step {} had not settled when it was recorded", step));
-  session.say(fmt::format("stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps in {}", acquisition::to_words(report.stop),
-                          report.message, report.highest_force_n, 1000 * report.deepest_m, report.steps, arguments.output));
+  nlohmann::json told = nlohmann::json::array();
+  int steps = 0;
+  bool fine = true;
+  for (std::size_t site = 0; site < object.sites.size() && !Session::interrupted(); ++site) {
+    const acquisition::PushPlan plan = robot.plan(site);
+    if (!(arguments.push.force_step_n > 0)) protocol.force_step_n = object.force_step_at(object.sites[site]);
+    const Push* so_far = nullptr;
+    bool finished = false;
+    for (std::size_t p = 0; p < recorded.size(); ++p)
+      if (recorded[p].name == plan.name) {
+        so_far = &recorded[p];
+        finished = p + 1 < recorded.size();  // a later one was begun
+      }
+    if (finished) continue;
+    bool begun = so_far != nullptr;
+    const acquisition::PushReport report = acquisition::run_push(
+        logged, plan, protocol,
+        [&](const Push& push, const Step& step) {
+          if (!begun) writer.begin_push(push);
+          begun = true;
+          writer.add_step(step);
+          truth["steps"].push_back({{"push", push.name},
+                                    {"time_s", step.time_s},
+                                    {"force_n", robot.true_force_n()},
+                                    {"travel_m", robot.true_travel_m()}});
+          const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
+          session.say(fmt::format("{} ({}), {:.1f} s: {:.2f} N{}", push.name, plan.site, step.time_s, force,
+                                  step.unloading ? ", going back" : ""));
+        },
+        [] { return !Session::interrupted(); }, so_far);
+    for (const int step : report.unsettled)
+      session.warn(fmt::format("step {} of {} had not settled when it was recorded", step, plan.name));
+    session.say(fmt::format("{} stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps", plan.name, acquisition::to_words(report.stop),
+                            report.message, report.highest_force_n, 1000 * report.deepest_m, report.steps));
+    told.push_back({{"push", plan.name},
+                    {"site", plan.site},
+                    {"stop", acquisition::to_words(report.stop)},
+                    {"message", report.message},
+                    {"steps", report.steps},
+                    {"highest_force_n", report.highest_force_n},
+                    {"deepest_m", report.deepest_m},
+                    {"unsettled", report.unsettled}});
+    steps += report.steps;
+    fine = fine && (report.stop == acquisition::StopReason::force_limit || report.stop == acquisition::StopReason::travel_limit ||
+                    report.stop == acquisition::StopReason::slip || report.stop == acquisition::StopReason::contact_lost);
+  }
+  write_json(truth, truth_file);
+  session.say(fmt::format("{}: {} steps; the truth is in {}. Next: palpate estimate {} -o RESULT", arguments.output, steps,
+                          truth_file.string(), arguments.output));
   if (!arguments.raw_bag.empty()) {
     Recording scene = robot.scene();
     scene.robot.reset();  // the masks are in the bag
@@ -91,15 +169,12 @@ int record_push(Session& session, const RecordArguments& arguments) {
     session.say(fmt::format("{}: all that the sensors said, as a robot's recorder keeps it", arguments.raw_bag));
   }
   session.result({{"recording", arguments.output},
-                  {"stop", acquisition::to_words(report.stop)},
-                  {"message", report.message},
-                  {"steps", report.steps},
-                  {"highest_force_n", report.highest_force_n},
-                  {"deepest_m", report.deepest_m},
-                  {"unsettled", report.unsettled},
+                  {"truth", truth_file.string()},
+                  {"object", object.name},
+                  {"steps", steps},
+                  {"pushes", told},
                   {"seed", options.seed}});
-  return report.stop == acquisition::StopReason::user || report.stop == acquisition::StopReason::no_contact ? exit_numbers
-                                                                                                            : exit_done;
+  return fine && !Session::interrupted() ? exit_done : exit_numbers;
 }
 
 int record_demo(Session& session, const RecordArguments& arguments) {
@@ -113,9 +188,7 @@ int record_demo(Session& session, const RecordArguments& arguments) {
   const lab::Demo demo = lab::make_demo(options, session.progress());
   io::write_recording(demo.recording, arguments.output);
   if (!arguments.truth.empty()) {
-    std::ofstream file(arguments.truth);
-    file << truth_json(demo.truth).dump(2) << '\n';
-    if (!file) throw Error("cannot be written", arguments.truth);
+    write_json(truth_json(demo.truth), arguments.truth);
   }
   std::size_t steps = 0;
   for (const Push& push : demo.recording.pushes) steps += push.steps.size();
@@ -130,20 +203,36 @@ int record_demo(Session& session, const RecordArguments& arguments) {
 
 Run verbs::record(CLI::App& app) {
   auto arguments = std::make_shared<RecordArguments>();
-  // The lab's foam caves in beyond what a soft pad can press: less than the paper's 50 N and 10 cm.
-  arguments->push.force_limit_n = 8;
-  arguments->push.travel_limit_m = 0.013;
+  // The object says how deep a soft pad can press it and in which steps: less than the paper's 10 cm.
+  arguments->push.travel_limit_m = arguments->push.force_step_n = 0;
+  std::string objects;
+  for (const auto& row : lab::built_in_objects()) objects += fmt::format("\n{}: {}", row.name, row.summary);
+  std::string laws;
+  for (const auto* law : fem::material_table()) laws += (laws.empty() ? "" : ", ") + std::string(law->name());
+  app.add_option("--object", arguments->object,
+                 "what the lab's robot pushes: a mesh file (closed, metres), or one of" + objects)
+      ->capture_default_str();
+  app.add_option("--material", arguments->material, "law of the true object: " + laws + " (default neo_hookean)");
+  const auto rows = [](const auto& table) {
+    std::string text;
+    for (const auto& row : table) text += fmt::format("\n{}: {}", row.name, row.source);
+    return text;
+  };
+  app.add_option("--depth-sensor", arguments->depth_sensor, "one of" + rows(lab::depth_sensors()))->capture_default_str();
+  app.add_option("--force-sensor", arguments->force_sensor, "one of" + rows(lab::force_sensors()))->capture_default_str();
   app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
   app.add_option("-o,--output", arguments->output, "folder to write; must not exist or be empty")->required();
-  app.add_option("--truth", arguments->truth, "also write what the simulation knows and the recording does not (JSON)");
+  app.add_option("--truth", arguments->truth,
+                 "file for what the simulation knows and the recording does not (default: beside the recording, OUTPUT.truth.json; "
+                 "with --demo: not written)");
   app.add_option("--young-modulus", arguments->young_modulus_pa,
-                 "of the true object, Pa (drawn from the seed: 10 to 40 kPa)")
+                 "of the true object, Pa (default: drawn from the seed, 10 to 40 kPa; bar: ten times that)")
       ->check(CLI::PositiveNumber);
   app.add_option("--poisson-ratio", arguments->poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
   app.add_option("--force-limit", arguments->push.force_limit_n, "stop at this force, N")->check(CLI::PositiveNumber);
-  app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m")->check(CLI::PositiveNumber);
-  app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N")->check(CLI::PositiveNumber);
+  app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m (default: of the object)")->check(CLI::PositiveNumber);
+  app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N (default: of the object)")->check(CLI::PositiveNumber);
   app.add_option("--bag", arguments->bag, "also write a bag (rosbag2: MCAP) with its mapping into this folder");
   app.add_option("--raw-bag", arguments->raw_bag,
                  "also write what the sensors said all the while (MCAP), as a robot's own recorder does");
@@ -156,7 +245,7 @@ Run verbs::record(CLI::App& app) {
     }
     if (arguments->demo && !arguments->raw_bag.empty())
       throw Error("the built-in recording is made without a robot; leave --demo out", "--raw-bag");
-    const int outcome = arguments->demo ? record_demo(session, *arguments) : record_push(session, *arguments);
+    const int outcome = arguments->demo ? record_demo(session, *arguments) : record_pushes(session, *arguments);
     if (!arguments->bag.empty()) {
       io::write_bag(io::read_recording_unchecked(arguments->output), arguments->bag);
       session.say(fmt::format("{}: the same as a bag of ROS 2", arguments->bag));

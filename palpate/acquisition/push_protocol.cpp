@@ -108,6 +108,7 @@ class PushRun {
       const auto contact = sensing::find_contact(samples, plan_.direction, free_air_std_n_, options_.contact);
       if (!contact) continue;
       report_.contact_m = samples[*contact].tip_m;
+      noticed_n_ = along(samples[*contact].force_n);
       history_.assign(samples.begin() + std::ptrdiff_t(*contact), samples.end());
       return;
     }
@@ -153,7 +154,10 @@ class PushRun {
   }
 
   void watch_out() const {
-    const sensing::PushEvent event = sensing::watch(history_, plan_.direction, lost_n(), options_.slip);
+    // Below the first step, the arm's own repeat error moves the force of a soft object by more than slip would.
+    sensing::SlipOptions slip = options_.slip;
+    slip.least_force_n = std::max(slip.least_force_n, options_.force_step_n);
+    const sensing::PushEvent event = sensing::watch(history_, plan_.direction, lost_n(), slip);
     if (event == sensing::PushEvent::none) return;
     throw Stopped{event == sensing::PushEvent::contact_lost ? StopReason::contact_lost : StopReason::slip,
                   sensing::to_words(event)};
@@ -185,7 +189,20 @@ class PushRun {
     const double sigma = std::sqrt(std::max(variance.mean(), free_air_std_n_ * free_air_std_n_ * 0.01) / count);
     history_.insert(history_.end(), samples.begin(), samples.end());
     if (!unloading) watch_out();
+    begin_where_the_force_began(last, along(mean));
     record(last, mean, sigma, unloading);
+  }
+
+  // Contact is noticed late, by what the threshold needs: the line through the force then and at the first settled step says
+  // where it began. Travel counts from there.
+  void begin_where_the_force_began(const RobotState& state, double settled_n) {
+    if (!(noticed_n_ > 0)) return;
+    const double slope = (settled_n - noticed_n_) / travel(state);
+    if (travel(state) > options_.increment_m && slope > 0) {
+      const double late_m = noticed_n_ / slope;
+      if (late_m < travel(state)) report_.contact_m -= late_m * plan_.direction;
+    }
+    noticed_n_ = 0;
   }
 
   void record(const RobotState& state, const std::optional<Vec3>& force_n, double sigma_n, bool unloading) {
@@ -251,6 +268,7 @@ class PushRun {
   PushReport report_;
   std::vector<sensing::ContactSample> history_;  // since contact
   double free_air_std_n_ = 0;
+  double noticed_n_ = 0;  // force at which contact was noticed, until the contact point is corrected for it
   double at_m_ = 0;  // commanded, along the push from the expected contact
   int next_index_ = 0;
   double recorded_force_n_ = 0, recorded_travel_m_ = 0;

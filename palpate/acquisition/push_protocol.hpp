@@ -38,7 +38,7 @@ struct PushOptions {
   sensing::ContactOptions contact;
   /// The window is long enough for 0.05 N of noise at 50 Hz to leave the slope known to 0.01 N/s.
   sensing::SettlingOptions settling{0.05, 0.005, 2.0};
-  sensing::SlipOptions slip;
+  sensing::SlipOptions slip;  ///< its least_force_n is at least force_step_n
 };
 
 /// @throws Error naming the option that is out of range.
@@ -50,7 +50,7 @@ const char* to_words(StopReason reason);
 struct PushReport {
   StopReason stop = StopReason::user;
   std::string message;            ///< plain words
-  Vec3 contact_m = Vec3::Zero();  ///< where contact began
+  Vec3 contact_m = Vec3::Zero();  ///< where contact began: the force's rise traced back to zero
   double highest_force_n = 0, deepest_m = 0;
   int steps = 0;               ///< recorded now, resumed ones not counted
   std::vector<int> unsettled;  ///< indices (in the push) of steps whose force still crept

@@ -2,7 +2,6 @@
 #include "palpate/lab/built_in.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <exception>
@@ -13,6 +12,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/lab/box_surface.hpp"
 #include "palpate/lab/depth_sensor.hpp"
 #include "palpate/lab/pressed_block.hpp"
 #include "palpate/lab/random.hpp"
@@ -86,56 +86,6 @@ std::vector<TruePush> press_all(const DemoOptions& options, double young_pa, dou
   return pushes;
 }
 
-// The cube as a drawing gives it: what the recording says about the object at rest.
-TriMesh cube_surface(double edge_m, int cells) {
-  TriMesh mesh;
-  const Index side = cells + 1;
-  mesh.vertices_m.resize(Eigen::Index(6) * side * side, 3);
-  mesh.triangles.resize(Eigen::Index(12) * cells * cells, 3);
-  Eigen::Index vertex = 0, triangle = 0;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double sign : {-1.0, 1.0}) {
-      const Index first = Index(vertex);
-      for (Index j = 0; j < side; ++j)
-        for (Index i = 0; i < side; ++i) {
-          Vec3 p;
-          p(axis) = sign;
-          p((axis + 1) % 3) = -1 + 2.0 * i / cells;
-          p((axis + 2) % 3) = -1 + 2.0 * j / cells;
-          mesh.vertices_m.row(vertex++) = cube_centre_m + 0.5 * edge_m * (p + Vec3::UnitZ());
-        }
-      for (Index j = 0; j < cells; ++j)
-        for (Index i = 0; i < cells; ++i) {
-          const Index a = first + j * side + i, b = a + 1, c = a + side, d = c + 1;
-          if (sign > 0) {
-            mesh.triangles.row(triangle++) << a, b, d;
-            mesh.triangles.row(triangle++) << a, d, c;
-          } else {
-            mesh.triangles.row(triangle++) << a, d, b;
-            mesh.triangles.row(triangle++) << a, c, d;
-          }
-        }
-    }
-  // Faces share their edges: equal vertices become one.
-  std::vector<Index> order(std::size_t(mesh.vertices_m.rows())), name(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = Index(i);
-  const auto key = [&](Index v) {
-    const auto p = (mesh.vertices_m.row(v) / (edge_m / cells) * 4).array().round();
-    return std::array<long, 3>{std::lround(p(0)), std::lround(p(1)), std::lround(p(2))};
-  };
-  std::stable_sort(order.begin(), order.end(), [&](Index p, Index q) { return key(p) < key(q); });
-  Points merged(mesh.vertices_m.rows(), 3);
-  Index count = 0;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    if (i == 0 || key(order[i]) != key(order[i - 1])) merged.row(count++) = mesh.vertices_m.row(order[i]);
-    name[std::size_t(order[i])] = count - 1;
-  }
-  mesh.vertices_m = merged.topRows(count);
-  for (Eigen::Index i = 0; i < mesh.triangles.size(); ++i)
-    mesh.triangles.data()[i] = name[std::size_t(mesh.triangles.data()[i])];
-  return mesh;
-}
-
 // Pad and stick in one surface; the tip's frame has its origin in the pad's face and z along the push.
 TriMesh stick(double pad_radius_m) {
   const TriMesh pad = cylinder(pad_radius_m, 0.008), rod = cylinder(0.005, 0.4);
@@ -205,7 +155,8 @@ Demo make_demo(const DemoOptions& options, const OnProgress& on_progress) {
   recording.description = "Simulated: a foam cube of " + std::to_string(int(std::lround(options.edge_m * 1000))) +
                           " mm on a table, pressed by a stick with a round soft pad; made by palpate's own lab, seed " +
                           std::to_string(options.seed);
-  recording.rest.surface = cube_surface(options.edge_m, 10);
+  const Vec3 half(0.5 * options.edge_m, 0.5 * options.edge_m, 0);
+  recording.rest.surface = box_surface(cube_centre_m - half, cube_centre_m + half + options.edge_m * Vec3::UnitZ(), 10);
   recording.rest.state = RestState::stress_free;
   Support table;
   table.kind = SupportKind::plane;

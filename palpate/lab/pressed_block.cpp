@@ -61,8 +61,9 @@ struct PressedBlock::Impl {
   void press(double force_n) {
     const VectorX coefficient = VectorX::Constant(1, 0.5 * force_n);
     const VectorX start = displacement_m_.size() ? VectorX(force_n / force_n_ * displacement_m_) : VectorX();
+    const VectorX extra = Eigen::Map<const VectorX>(options_.extra.data(), Eigen::Index(options_.extra.size()));
     fem::Equilibrium state = statics_->solve(options_.young_modulus_pa, options_.poisson_ratio, coefficient, VectorX(0),
-                                             start.size() ? &start : nullptr);
+                                             start.size() ? &start : nullptr, extra);
     if (!state.converged)
       throw Error("the true cube found no equilibrium under " + std::to_string(force_n) + " N (" + state.reason +
                       "): press less deep",

@@ -4,8 +4,10 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "palpate/core/mesh.hpp"
+#include "palpate/lab/pressed.hpp"
 
 namespace palpate::lab {
 
@@ -17,28 +19,23 @@ struct PressedBlockOptions {
   int cells_in_radius = 3;
   std::string material = "neo_hookean";
   double young_modulus_pa = 15e3, poisson_ratio = 0.3;
+  std::vector<double> extra;  ///< further parameters of the material, in its table's order
 };
 
 /// Solved on half of the cube: the contact lies on its plane of symmetry, so the other half is a mirror image. Quadratic
 /// elements on a mesh of the lab's own.
-class PressedBlock {
+class PressedBlock : public Pressed {
  public:
   explicit PressedBlock(const PressedBlockOptions& options);
-  ~PressedBlock();
+  ~PressedBlock() override;
   PressedBlock(PressedBlock&&) noexcept;
   PressedBlock& operator=(PressedBlock&&) noexcept;
 
-  /// Deforms the cube by a force (newton, downwards). Starts from the last state, extrapolated.
-  /// @throws Error when it finds no equilibrium (a Neo-Hookean solid under a dead pressure beyond about 0.4 E caves in).
-  void press(double force_n);
-
-  double force_n() const;
-  /// Mean motion of the pad's face into the cube.
-  double travel_m() const;
-  /// Both halves, deformed, in the base frame; the same triangles in every state.
-  TriMesh surface() const;
-  /// Of the half that is solved.
-  const TetMesh& mesh() const;
+  void press(double force_n) override;
+  double force_n() const override;
+  double travel_m() const override;
+  TriMesh surface() const override;      ///< both halves
+  const TetMesh& mesh() const override;  ///< of the half that is solved
 
  private:
   struct Impl;

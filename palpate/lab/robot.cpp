@@ -8,18 +8,13 @@
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/lab/arm.hpp"
+#include "palpate/lab/box_surface.hpp"
 #include "palpate/lab/random.hpp"
 #include "palpate/lab/scene.hpp"
 #include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate::lab {
 namespace {
-
-Mat3 downwards() {
-  Mat3 rotation;
-  rotation << 1, 0, 0, 0, -1, 0, 0, 0, -1;
-  return rotation;
-}
 
 ArmOptions arm_with_pad(double pad_radius_m) {
   ArmOptions options;
@@ -30,11 +25,12 @@ ArmOptions arm_with_pad(double pad_radius_m) {
 // Equilibria at rising forces, solved when they are first needed; between two of them everything is interpolated.
 class ForceCurve {
  public:
-  explicit ForceCurve(const PressedBlockOptions& options)
-      : block_(options), step_n_(0.06 * options.young_modulus_pa * options.pad_radius_m * options.pad_radius_m * M_PI / 2) {
+  /// @param first_n  the first step of force; later ones follow the object's own stiffness, for about `step_m` of travel each
+  ForceCurve(std::unique_ptr<Pressed> object, double first_n, double step_m)
+      : object_(std::move(object)), step_n_(first_n), step_m_(step_m) {
     forces_.push_back(0);
     travels_.push_back(0);
-    surfaces_.push_back(block_.surface());
+    surfaces_.push_back(object_->surface());
   }
 
   struct Place {
@@ -43,10 +39,13 @@ class ForceCurve {
   };
   Place at(double travel_m) {
     while (travels_.back() < travel_m) {
-      block_.press(forces_.back() + step_n_);
-      forces_.push_back(block_.force_n());
-      travels_.push_back(block_.travel_m());
-      surfaces_.push_back(block_.surface());
+      object_->press(forces_.back() + step_n_);
+      forces_.push_back(object_->force_n());
+      travels_.push_back(object_->travel_m());
+      surfaces_.push_back(object_->surface());
+      const double gained_m = travels_.back() - travels_[travels_.size() - 2];
+      if (!(gained_m > 0)) throw Error("the true object does not give way under the pad", "LabRobot");
+      step_n_ *= std::clamp(step_m_ / gained_m, 0.25, 2.0);
     }
     if (travel_m <= 0) return {};
     std::size_t k = 1;
@@ -63,11 +62,43 @@ class ForceCurve {
   }
 
  private:
-  PressedBlock block_;
-  double step_n_;
+  std::unique_ptr<Pressed> object_;
+  double step_n_, step_m_;
   std::vector<double> forces_, travels_;
   std::vector<TriMesh> surfaces_;
 };
+
+// The cube of the options as an object with one site.
+LabObject cube_of(const PressedBlockOptions& block) {
+  LabObject object;
+  object.name = "cube";
+  object.description = "a foam cube";
+  const Vec3 half(0.5 * block.edge_m, 0.5 * block.edge_m, 0);
+  object.surface = box_surface(block.base_centre_m - half, block.base_centre_m + half + block.edge_m * Vec3::UnitZ(), 1);
+  Support table;
+  table.kind = SupportKind::plane;
+  table.name = "table";
+  table.plane.point_m = block.base_centre_m;
+  object.supports.push_back(table);
+  object.sites.push_back({"top", block.base_centre_m + Vec3(block.site_m, 0, block.edge_m), -Vec3::UnitZ()});
+  object.pad_radius_m = block.pad_radius_m;
+  object.material = block.material;
+  object.young_modulus_pa = block.young_modulus_pa;
+  object.poisson_ratio = block.poisson_ratio;
+  object.extra = block.extra;
+  object.press = [block](const PushSite&) { return std::make_unique<PressedBlock>(block); };
+  return object;
+}
+
+// The tip's z along the push; its x as near to the robot's forward as that allows.
+Mat3 facing(const Vec3& direction) {
+  Mat3 rotation;
+  const Vec3 x = (Vec3::UnitX() - direction.x() * direction).norm() > 0.1 ? Vec3::UnitX() : Vec3::UnitY();
+  rotation.col(2) = direction;
+  rotation.col(0) = (x - x.dot(direction) * direction).normalized();
+  rotation.col(1) = direction.cross(rotation.col(0));
+  return rotation;
+}
 
 }  // namespace
 
@@ -76,27 +107,30 @@ void check(const LabOptions& o) {
     if (!good) throw Error(rule, std::string("LabOptions.") + field);
   };
   need(o.joint_std_rad >= 0, "joint_std_rad", "must not be negative");
-  need(o.force_sigma_n >= 0, "force_sigma_n", "must not be negative");
-  need(o.force_unit_n >= 0, "force_unit_n", "must not be negative");
-  need(o.force_bias_n >= 0, "force_bias_n", "must not be negative");
-  need(o.force_drift_n_s >= 0, "force_drift_n_s", "must not be negative");
+  need(o.camera_std_m >= 0, "camera_std_m", "must not be negative");
+  need(o.camera_std_rad >= 0, "camera_std_rad", "must not be negative");
   need(o.relaxation >= 0 && o.relaxation < 1, "relaxation", "must be in [0, 1)");
   need(o.relaxation_s > 0, "relaxation_s", "must be positive");
+  check(o.force);
   check(o.depth);
 }
 
 struct LabRobot::Impl {
-  explicit Impl(const LabOptions& given)
+  Impl(const LabOptions& given, LabObject object_in)
       : options(given),
-        mask(arm(arm_with_pad(given.object.pad_radius_m))),
+        object(std::move(object_in)),
+        mask(arm(arm_with_pad(object.pad_radius_m))),
         tip(mask.kinematics().link("tip")),
-        curve(given.object),
         joint_random(given.seed, 1),
         force_random(given.seed, 2),
         depth_random(given.seed, 3) {
+    if (object.sites.empty() || !object.press) throw Error("needs a site and a truth", "LabObject");
+    curves.resize(object.sites.size());
     Random once(options.seed, 0);
-    bias_n = options.force_bias_n * once.normal3();
-    drift_n_s = options.force_drift_n_s * once.normal3();
+    wrist = std::make_unique<ForceSensor>(options.force, once);
+    const Vec3 turn = options.camera_std_rad * once.normal3();
+    T_true_stated.pretranslate(options.camera_std_m * once.normal3());
+    if (turn.norm() > 0) T_true_stated.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
     commanded = true_joints = {0, 0.3, 1.2, 0, 1.6, 0, 0.05};
     for (std::size_t i = 0; i < mask.kinematics().robot().links.size(); ++i)
       for (const RobotShape& shape : mask.kinematics().robot().links[i].visual) {
@@ -110,43 +144,59 @@ struct LabRobot::Impl {
     camera.fx_px = camera.fy_px = 606;
     camera.cx_px = 322.4;
     camera.cy_px = 238.1;
-    const Vec3& base = options.object.base_centre_m;
-    T_base_camera = options.T_base_camera.value_or(
-        look_at(base + Vec3(-0.20, -0.42, 0.42), base + Vec3(0, 0, 0.55 * options.object.edge_m)));
+    const Vec3 low = object.surface.vertices_m.colwise().minCoeff().transpose(),
+               high = object.surface.vertices_m.colwise().maxCoeff().transpose();
+    table.point_m = Vec3(0.5 * (low(0) + high(0)), 0.5 * (low(1) + high(1)), low(2));
+    T_base_camera = options.T_base_camera.value_or(look_at(table.point_m + Vec3(-0.20, -0.42, 0.42),
+                                                           table.point_m + 0.55 * (high(2) - low(2)) * Vec3::UnitZ()));
   }
 
   Pose tip_of(const std::vector<double>& joints) const {
     return mask.kinematics().link_poses(mask.kinematics().free_joints(), joints)[std::size_t(tip)];
   }
-  // The pad's face is level with the top of the untouched cube at travel 0.
+  const PushSite& site() const { return object.sites[active]; }
+  // The pad's face touches the object at rest at travel 0; negative before that.
   double travel() const {
-    const Pose pose = tip_of(true_joints);
-    const Vec3 offset = pose.translation() - options.object.base_centre_m;
-    const bool above = std::abs(offset.x() - options.object.site_m) < 0.01 && std::abs(offset.y()) < 0.01;
-    return above ? options.object.edge_m - offset.z() : 0;
+    const Vec3 offset = tip_of(true_joints).translation() - site().contact_m;
+    const double along = offset.dot(site().direction);
+    return (offset - along * site().direction).norm() < 0.014 ? along : 0;
+  }
+  ForceCurve& curve() {
+    if (!curves[active]) {
+      const double a = object.pad_radius_m;
+      curves[active] =
+          std::make_unique<ForceCurve>(object.press(site()), 0.06 * object.young_modulus_pa * a * a * M_PI / 2, 0.06 * a);
+    }
+    return *curves[active];
   }
   bool slipped() const { return travel() > options.slip_at_m; }
   double force() {
-    const double steady = slipped() ? 0.4 * curve.force_n(curve.at(travel())) : curve.force_n(curve.at(travel()));
-    return steady;
+    const double travelled = travel();
+    if (travelled <= 0) return 0;  // nothing has to be solved before contact
+    const double steady = curve().force_n(curve().at(travelled));
+    return slipped() ? 0.4 * steady : steady;
   }
 
   LabOptions options;
+  LabObject object;
   sensing::RobotMask mask;
   Index tip;
-  ForceCurve curve;
+  std::vector<std::unique_ptr<ForceCurve>> curves;  // a site
+  std::size_t active = 0;
+  std::unique_ptr<ForceSensor> wrist;
+  Plane table;
   Random joint_random, force_random, depth_random;
-  Vec3 bias_n, drift_n_s;
   std::vector<double> commanded, true_joints;
   std::vector<std::pair<std::size_t, TriMesh>> bodies;  // link, mesh in its frame
   Camera camera;
-  Pose T_base_camera;
+  Pose T_base_camera, T_true_stated = Pose::Identity();
   double clock_s = 0, moved_s = -1e3, fading_n = 0;
 };
 
-LabRobot::LabRobot(const LabOptions& options) {
+LabRobot::LabRobot(const LabOptions& options) : LabRobot(options, cube_of(options.object)) {}
+LabRobot::LabRobot(const LabOptions& options, LabObject object) {
   check(options);
-  impl_ = std::make_unique<Impl>(options);
+  impl_ = std::make_unique<Impl>(options, std::move(object));
 }
 LabRobot::~LabRobot() = default;
 
@@ -156,14 +206,10 @@ acquisition::RobotState LabRobot::read() {
   state.time_s = lab.clock_s;
   state.joints_rad = lab.commanded;
   state.T_base_tip = lab.tip_of(lab.commanded);
-  if (lab.slipped()) state.T_base_tip.translation() += Vec3(0, 0.005, 0);
+  if (lab.slipped()) state.T_base_tip.translation() += 0.005 * state.T_base_tip.linear().col(1);
   const double steady = lab.force();
   const double fading = steady > 0 ? lab.fading_n * std::exp(-(lab.clock_s - lab.moved_s) / lab.options.relaxation_s) : 0;
-  Vec3 force = lab.bias_n + lab.drift_n_s * lab.clock_s + Vec3(0, 0, -steady - fading) +
-               lab.options.force_sigma_n * lab.force_random.normal3();
-  if (lab.options.force_unit_n > 0)
-    for (int k = 0; k < 3; ++k) force(k) = lab.options.force_unit_n * std::round(force(k) / lab.options.force_unit_n);
-  state.force_n = force;
+  state.force_n = lab.wrist->read((steady + fading) * lab.site().direction, lab.clock_s, lab.force_random);
   return state;
 }
 
@@ -198,10 +244,12 @@ DepthFrame LabRobot::take_depth_image() {
   frame.time_s = lab.clock_s;
   frame.camera = lab.camera;
   frame.T_base_camera = lab.T_base_camera;
+  frame.pose_std_m = lab.options.camera_std_m;
+  frame.pose_std_rad = lab.options.camera_std_rad;
   frame.noise = lab.options.depth.noise;
   const auto& names = lab.mask.kinematics().free_joints();
   const auto poses = lab.mask.kinematics().link_poses(names, lab.true_joints);
-  const geometry::TriangleTree object(lab.curve.surface(lab.curve.at(lab.travel())));
+  const geometry::TriangleTree object(lab.travel() > 0 ? lab.curve().surface(lab.curve().at(lab.travel())) : lab.object.surface);
   std::vector<std::unique_ptr<geometry::TriangleTree>> arm_trees;
   Scene scene;
   scene.bodies.push_back(&object);
@@ -212,54 +260,52 @@ DepthFrame LabRobot::take_depth_image() {
     arm_trees.push_back(std::make_unique<geometry::TriangleTree>(std::move(posed)));
     scene.bodies.push_back(arm_trees.back().get());
   }
-  scene.planes.push_back(Plane{lab.options.object.base_centre_m, Vec3::UnitZ()});
-  frame.depth_m =
-      sense_depth(cast_view(scene, frame.camera, frame.T_base_camera), frame.camera, lab.options.depth, lab.depth_random);
+  scene.planes.push_back(lab.table);
+  frame.depth_m = sense_depth(cast_view(scene, frame.camera, frame.T_base_camera * lab.T_true_stated), frame.camera,
+                              lab.options.depth, lab.depth_random);
   frame.mask = lab.mask.mask(frame, names, lab.commanded);
   return frame;
 }
 
 Recording LabRobot::scene() const {
   const Impl& lab = *impl_;
-  const PressedBlockOptions& object = lab.options.object;
   Recording recording;
-  recording.name = "lab";
-  recording.description = "Simulated: palpate's software arm presses a foam cube with a round soft pad";
-  RobotShape cube;
-  cube.kind = RobotShape::Kind::box;
-  cube.size_m = Vec3::Constant(object.edge_m);
-  recording.rest.surface = sensing::shape_mesh(cube);
-  recording.rest.surface->vertices_m.rowwise() += (object.base_centre_m + 0.5 * object.edge_m * Vec3::UnitZ()).transpose();
+  recording.name = lab.object.name;
+  recording.description = "Simulated: palpate's software arm presses " + lab.object.description + " with a round soft pad";
+  recording.rest.surface = lab.object.surface;
   recording.rest.state = RestState::stress_free;
-  Support table;
-  table.kind = SupportKind::plane;
-  table.name = "table";
-  table.plane.point_m = object.base_centre_m;
-  recording.supports.push_back(table);
-  recording.environment.planes.push_back(table.plane);
+  recording.supports = lab.object.supports;
+  recording.environment.planes.push_back(lab.table);
+  recording.force_scale_std = lab.options.force.scale_std;
   Tool pad;
   pad.name = "stick";
   pad.shape = ToolShape::disc;
-  pad.radius_m = object.pad_radius_m;
+  pad.radius_m = lab.object.pad_radius_m;
   recording.tools.push_back(pad);
   recording.joint_names = lab.mask.kinematics().free_joints();
   recording.robot = lab.mask.kinematics().robot();
-  recording.model.material = object.material;
+  recording.model.material = lab.object.material;
   return recording;
 }
 
-acquisition::PushPlan LabRobot::plan() const {
-  const PressedBlockOptions& object = impl_->options.object;
+acquisition::PushPlan LabRobot::plan(std::size_t site) {
+  Impl& lab = *impl_;
+  if (site >= lab.object.sites.size())
+    throw Error("the object has " + std::to_string(lab.object.sites.size()) + " sites", "site " + std::to_string(site));
+  lab.active = site;
   acquisition::PushPlan plan;
-  plan.name = "push 1";
+  plan.name = "push " + std::to_string(site + 1);
+  plan.site = lab.site().name;
   plan.tool = "stick";
-  plan.contact_m = object.base_centre_m + Vec3(object.site_m, 0, object.edge_m);
-  plan.direction = -Vec3::UnitZ();
-  plan.R_base_tip = downwards();
+  plan.contact_m = lab.site().contact_m;
+  plan.direction = lab.site().direction;
+  plan.R_base_tip = facing(plan.direction);
   return plan;
 }
 
 double LabRobot::true_force_n() const { return impl_->force(); }
 double LabRobot::true_travel_m() const { return std::max(0.0, impl_->travel()); }
+double LabRobot::true_force_scale() const { return impl_->wrist->scale(); }
+const LabObject& LabRobot::object() const { return impl_->object; }
 
 }  // namespace palpate::lab

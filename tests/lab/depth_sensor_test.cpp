@@ -50,6 +50,79 @@ TEST(DepthSensor, AxialNoiseIsThatOfEveryModelAtEveryRange) {
     }
 }
 
+TEST(DepthSensor, EveryRowOfTheTableWorks) {
+  for (const DepthSensor& row : depth_sensors()) {
+    const DepthSensorOptions options = depth_sensor(row.name);
+    EXPECT_NO_THROW(check(options)) << row.name;
+    EXPECT_FALSE(row.source.empty());
+    Random random(3);
+    EXPECT_GT((sense_depth(wall(0.7F, 0.4F), camera(), options, random).array() > 0).count(), 19000) << row.name;
+  }
+  EXPECT_THROW(depth_sensor("eye"), Error);
+}
+
+TEST(DepthSensor, PassiveStereoLosesWhatHasNoTexture) {
+  DepthSensorOptions options = depth_sensor("bumblebee");
+  for (const double texture : {0.0, 0.3, 0.8, 1.0}) {
+    options.looks = {Look{}, Look{0.5, texture}};
+    double share = 0;
+    for (std::uint64_t seed = 0; seed < 8; ++seed) {
+      Random random(seed);
+      share += double((sense_depth(wall(0.7F), camera(), options, random).array() > 0).count()) / 19200 / 8;
+    }
+    // Patches of 6 pixels: some 170 independent ones an image.
+    EXPECT_NEAR(share, texture, 0.06) << texture;
+  }
+}
+
+// sigma = c / (4 sqrt(2) pi f) sqrt(A + B) / (K A): a quarter of the albedo takes the light of both to a quarter, twice the sigma.
+TEST(DepthSensor, TimeOfFlightIsNoisierOnDarkThingsAndInBrightLight) {
+  DepthSensorOptions options = depth_sensor("time_of_flight");
+  options.lens_scatter = 0;
+  const auto spread_of = [&](double albedo, double ambient) {
+    options.looks = {Look{}, Look{albedo, 1}};
+    options.ambient_light = ambient;
+    Random random(5);
+    return spread(sense_depth(wall(1.0F), camera(), options, random), 1.0);
+  };
+  const double usual = spread_of(0.5, 1);
+  EXPECT_NEAR(usual / sensing::depth_noise_model("time_of_flight").axial_sigma_m({1.0, 0, 300}), 1, 0.02);
+  EXPECT_NEAR(spread_of(0.125, 1) / usual, 2, 0.04);
+  EXPECT_NEAR(spread_of(0.5, 7) / usual, 2, 0.04);  // sqrt(A + 7 A) over sqrt(A + A)
+}
+
+// A dark wall in front of a bright one: light scattered in the lens draws the dark one back, by what adding phasors says.
+TEST(DepthSensor, LensScatterDrawsDarkThingsTowardsBrightOnes) {
+  PerfectView view = wall(2.0F);
+  view.depth_m.leftCols(40).setConstant(1.0F);
+  view.label.leftCols(40).setConstant(2);
+  DepthSensorOptions options = depth_sensor("time_of_flight");
+  options.looks = {Look{}, Look{0.9, 1}, Look{0.05, 1}};
+  options.flying_pixel_share = 0;
+  const auto mean_near = [&](double scatter) {
+    options.lens_scatter = scatter;
+    Random random(9);
+    const DepthImage seen = sense_depth(view, camera(), options, random);
+    return double(seen.block(50, 15, 20, 15).mean());
+  };
+  const double moved = mean_near(0.02) - mean_near(0);
+  EXPECT_GT(moved, 0.01);
+  // At the middle of that block, with both walls seen almost along the axis: phases of 1 m and 2 m.
+  const double k = 4 * M_PI * 20e6 / 299792458.0;
+  double re = 0, im = 0;
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      const double stretch = std::sqrt(1 + std::pow((column - 79.5) / 300, 2) + std::pow((row - 59.5) / 300, 2));
+      const double z = column < 40 ? 1.0 : 2.0, light = (column < 40 ? 0.05 : 0.9) / (z * z) / 19200;
+      re += light * std::cos(k * z * stretch);
+      im += light * std::sin(k * z * stretch);
+    }
+  const double stretch = std::sqrt(1 + std::pow((22 - 79.5) / 300, 2));
+  const double dark_re = 0.05 * std::cos(k * stretch), dark_im = 0.05 * std::sin(k * stretch);
+  const double predicted = (std::atan2(dark_im + 0.02 * im, dark_re + 0.02 * re) - k * stretch) / k / stretch;
+  EXPECT_NEAR(moved / predicted, 1, 0.03);
+}
+
 TEST(DepthSensor, CorrelatedPartHasItsVarianceAndLength) {
   DepthSensorOptions options;
   options.noise = {"constant", 1e-7, 0};

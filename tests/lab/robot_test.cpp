@@ -118,10 +118,10 @@ TEST(LabRobot, BadOptionsAreRefused) {
   using O = LabOptions;
   EXPECT_FALSE(refused([](O&) {}));
   EXPECT_TRUE(refused([](O& o) { o.joint_std_rad = -1; }));
-  EXPECT_TRUE(refused([](O& o) { o.force_sigma_n = -1; }));
-  EXPECT_TRUE(refused([](O& o) { o.force_unit_n = -1; }));
-  EXPECT_TRUE(refused([](O& o) { o.force_bias_n = -1; }));
-  EXPECT_TRUE(refused([](O& o) { o.force_drift_n_s = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.camera_std_m = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.force.sigma_n = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.force.range_n = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.force.cross_talk_std = 1; }));
   EXPECT_TRUE(refused([](O& o) { o.relaxation = 1; }));
   EXPECT_TRUE(refused([](O& o) { o.relaxation_s = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.depth.noise.model = "eye"; }));

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Wrist force sensors: what they make of a true force.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "palpate/core/math.hpp"
+#include "palpate/lab/random.hpp"
+
+namespace palpate::lab {
+
+struct ForceSensorOptions {
+  double sigma_n = 0.05;        ///< noise of one reading, per axis
+  double unit_n = 0.01;         ///< quantisation; 0 = none
+  double range_n = 300;         ///< readings end there
+  double bias_n = 1.0;          ///< standard deviation of the untared bias, per axis
+  double drift_n_s = 0.0002;    ///< standard deviation of the drift a second, per axis (about 0.7 N an hour)
+  double scale_std = 0.01;      ///< of the common scale error, which a recording states
+  double cross_talk_std = 0;    ///< of each entry beside the diagonal
+  double tool_mass_kg = 0.3;    ///< what hangs on it: a constant force in the base frame, part of the tare
+};
+
+struct ForceSensorModel {
+  std::string_view name;
+  std::string_view source;
+  ForceSensorOptions options;
+};
+
+/// The table that --help and the tests loop over.
+std::span<const ForceSensorModel> force_sensors();
+
+/// @throws Error listing the names when there is none of that name.
+ForceSensorOptions force_sensor(std::string_view name);
+
+/// @throws Error naming the option that is out of range.
+void check(const ForceSensorOptions& options);
+
+/// One sensor as it came out of the box: bias, drift, scale and cross-talk are drawn once.
+class ForceSensor {
+ public:
+  ForceSensor(const ForceSensorOptions& options, Random& once);
+  Vec3 read(const Vec3& true_force_n, double time_s, Random& noise) const;
+  double scale() const { return scale_; }
+
+ private:
+  ForceSensorOptions options_;
+  Vec3 bias_n_, drift_n_s_;
+  double scale_ = 1;
+  Mat3 gain_ = Mat3::Identity();
+};
+
+}  // namespace palpate::lab

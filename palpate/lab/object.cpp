@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/lab/object.hpp"
+
+#include <array>
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/materials.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/lab/box_surface.hpp"
+#include "palpate/lab/implicit_surface.hpp"
+#include "palpate/lab/pressed_block.hpp"
+#include "palpate/lab/pressed_object.hpp"
+#include "palpate/lab/random.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr double surface_cell_m = 0.003;  // chords of a sphere of 60 mm then lie within 0.02 mm of it
+
+// Truth from options and seed; `stiffer` raises the range that E is drawn from.
+LabObject draw(const std::string& name, const ObjectOptions& o, double stiffer = 1) {
+  const auto need = [](bool good, const char* field, const char* rule) {
+    if (!good) throw Error(rule, std::string("ObjectOptions.") + field);
+  };
+  need(!o.young_modulus_pa || *o.young_modulus_pa > 0, "young_modulus_pa", "must be positive");
+  need(!o.poisson_ratio || (*o.poisson_ratio >= 0 && *o.poisson_ratio < 0.4999), "poisson_ratio", "must be in [0, 0.4999)");
+  need(o.tetrahedra >= 200, "tetrahedra", "must be at least 200");
+  need(o.cells_in_radius >= 1, "cells_in_radius", "must be at least 1");
+  const auto& parameters = fem::material_law(o.material).extra_parameters();
+  need(o.extra.empty() || o.extra.size() == parameters.size(), "extra", "must have one value a further parameter of the law");
+  Random random(o.seed);
+  const double young = 10e3 * stiffer * std::exp(random.uniform() * std::log(4.0)), poisson = random.uniform(0.1, 0.45);
+  LabObject object;
+  object.name = name;
+  object.material = o.material;
+  object.young_modulus_pa = o.young_modulus_pa.value_or(std::round(young / 10) * 10);
+  object.poisson_ratio = o.poisson_ratio.value_or(std::round(poisson * 1000) / 1000);
+  object.extra = o.extra;
+  if (object.extra.empty())
+    for (const auto& parameter : parameters) object.extra.push_back(parameter.initial);
+  return object;
+}
+
+Support table(const Vec3& base_centre_m) {
+  Support support;
+  support.kind = SupportKind::plane;
+  support.name = "table";
+  support.plane.point_m = base_centre_m;
+  return support;
+}
+
+// Where a straight push along `direction` through `aim_m` (relative to the foot) first meets the surface.
+PushSite site(const LabObject& object, const ObjectOptions& o, const std::string& name, const Vec3& aim_m, const Vec3& direction,
+              double stiffness = 1) {
+  const geometry::TriangleTree tree(object.surface);
+  const Vec3 along = direction.normalized(), start = o.base_centre_m + aim_m - along;
+  const auto hit = tree.cast(start, along);
+  if (!hit) throw Error("passes the object by", "site " + name);
+  return {name, start + hit->range_m * along, along, stiffness};
+}
+
+// Pad, depth and force of a push on a body that is large against the pad.
+void size_pushes(LabObject& object, double pad_radius_m) {
+  object.pad_radius_m = pad_radius_m;
+  object.travel_limit_m = 0.5 * pad_radius_m;
+  // A punch on a half space: F = 2 a E d / (1 - nu^2); two digits, as a person would choose.
+  const double force =
+      2 * pad_radius_m * object.young_modulus_pa * object.travel_limit_m / (1 - object.poisson_ratio * object.poisson_ratio);
+  const double digit = std::pow(10.0, std::floor(std::log10(0.25 * force)) - 1);
+  object.force_step_n = std::max(0.1, std::round(0.25 * force / digit) * digit);
+}
+
+void make_pressable(LabObject& object, const ObjectOptions& o) {
+  PressedObjectOptions pressed;
+  pressed.surface = object.surface;
+  pressed.supports = object.supports;
+  pressed.pad_radius_m = object.pad_radius_m;
+  pressed.material = object.material;
+  pressed.young_modulus_pa = object.young_modulus_pa;
+  pressed.poisson_ratio = object.poisson_ratio;
+  pressed.extra = object.extra;
+  pressed.tetrahedra = o.tetrahedra;
+  pressed.cells_in_radius = o.cells_in_radius;
+  object.press = [pressed](const PushSite& at) {
+    PressedObjectOptions here = pressed;
+    here.contact_m = at.contact_m;
+    here.direction = at.direction;
+    return std::make_unique<PressedObject>(here);
+  };
+}
+
+LabObject shaped(const std::string& name, const ObjectOptions& o, const Implicit& body, const Vec3& min_m, const Vec3& max_m,
+                 double stiffer = 1) {
+  LabObject object = draw(name, o, stiffer);
+  object.surface = implicit_surface(body, {min_m, max_m, surface_cell_m});
+  object.surface.vertices_m.rowwise() += o.base_centre_m.transpose();
+  object.supports.push_back(table(o.base_centre_m));
+  return object;
+}
+
+LabObject cube(const ObjectOptions& o) {
+  LabObject object = draw("cube", o);
+  constexpr double edge_m = 0.15;
+  object.description = "a foam cube of 150 mm, glued to the table";
+  object.surface = box_surface(o.base_centre_m - Vec3(0.5 * edge_m, 0.5 * edge_m, 0), o.base_centre_m + Vec3(0.5 * edge_m, 0.5 * edge_m, edge_m), 30);
+  object.supports.push_back(table(o.base_centre_m));
+  size_pushes(object, 0.025);
+  for (const double x : {-0.02, 0.03})
+    object.sites.push_back(site(object, o, x < 0 ? "top" : "top aside", {x, 0, edge_m}, -Vec3::UnitZ()));
+  PressedBlockOptions block;
+  block.edge_m = edge_m;
+  block.pad_radius_m = object.pad_radius_m;
+  block.base_centre_m = o.base_centre_m;
+  block.cells_in_radius = std::max(1, o.cells_in_radius - 1);  // its mesh is made for the round pad
+  block.material = object.material;
+  block.young_modulus_pa = object.young_modulus_pa;
+  block.poisson_ratio = object.poisson_ratio;
+  block.extra = object.extra;
+  object.press = [block](const PushSite& at) {
+    PressedBlockOptions here = block;
+    here.site_m = at.contact_m.x() - block.base_centre_m.x();
+    return std::make_unique<PressedBlock>(here);
+  };
+  return object;
+}
+
+LabObject ball(const ObjectOptions& o) {
+  const Vec3 centre(0, 0, 0.052);
+  LabObject object = shaped("ball", o, [&](const Vec3& p) { return (p - centre).norm() - 0.06; }, {-0.07, -0.07, 0}, {0.07, 0.07, 0.12});
+  object.description = "a ball of 120 mm, flattened and glued to the table at its foot";
+  size_pushes(object, 0.018);
+  object.sites = {site(object, o, "top", centre, -Vec3::UnitZ()), site(object, o, "slanted", centre, {0.5, 0, -0.866})};
+  make_pressable(object, o);
+  return object;
+}
+
+LabObject bar(const ObjectOptions& o) {
+  LabObject object = draw("bar", o, 10);
+  object.description = "an upright bar of 60 x 60 x 180 mm, glued to the table with one end";
+  object.surface = box_surface(o.base_centre_m - Vec3(0.03, 0.03, 0), o.base_centre_m + Vec3(0.03, 0.03, 0.18), 20);
+  object.supports.push_back(table(o.base_centre_m));
+  size_pushes(object, 0.015);
+  object.sites = {site(object, o, "side", {-0.03, 0, 0.14}, {0.866, 0, -0.5}, 0.06),
+                  site(object, o, "end", {0.005, 0, 0.18}, -Vec3::UnitZ(), 0.4)};
+  make_pressable(object, o);
+  return object;
+}
+
+// A sitting plush bear that faces -y.
+double bear_body(const Vec3& p) {
+  const Vec3 mirrored(std::abs(p.x()), p.y(), p.z());
+  double d = ellipsoid(p, {0, 0, 0.058}, {0.058, 0.052, 0.066});
+  d = smooth_union(d, ellipsoid(p, {0, -0.004, 0.155}, {0.047, 0.043, 0.042}), 0.03);
+  d = smooth_union(d, ellipsoid(p, {0, -0.045, 0.147}, {0.018, 0.016, 0.015}), 0.012);                        // snout
+  d = smooth_union(d, ellipsoid(mirrored, {0.036, 0, 0.19}, {0.016, 0.01, 0.016}), 0.01);                      // ears
+  d = smooth_union(d, capsule(mirrored, {0.05, -0.005, 0.1}, {0.082, -0.03, 0.06}, 0.018), 0.015);             // arms
+  return smooth_union(d, capsule(mirrored, {0.035, -0.025, 0.02}, {0.052, -0.085, 0.02}, 0.024), 0.02);        // legs
+}
+
+LabObject bear(const ObjectOptions& o) {
+  LabObject object = shaped("bear", o, bear_body, {-0.12, -0.13, 0}, {0.12, 0.08, 0.22});
+  object.description = "a sitting plush bear of 200 mm, glued to the table";
+  size_pushes(object, 0.015);
+  object.sites = {site(object, o, "head", {0, -0.004, 0.155}, -Vec3::UnitZ(), 0.7),
+                  site(object, o, "belly", {0, 0, 0.075}, {0, 0.866, -0.5}),
+                  site(object, o, "back", {0, 0.02, 0.08}, {0, -0.5, -0.866})};
+  make_pressable(object, o);
+  return object;
+}
+
+// A four-legged animal that looks along -x.
+double animal_body(const Vec3& p) {
+  const Vec3 mirrored(p.x(), std::abs(p.y()), p.z());
+  double d = capsule(p, {-0.05, 0, 0.1}, {0.06, 0, 0.1}, 0.042);
+  for (const double x : {-0.058, 0.064}) d = smooth_union(d, capsule(mirrored, {x, 0.026, 0.09}, {x, 0.03, -0.03}, 0.017), 0.02);
+  d = smooth_union(d, capsule(p, {-0.07, 0, 0.115}, {-0.105, 0, 0.145}, 0.024), 0.025);
+  d = smooth_union(d, ellipsoid(p, {-0.125, 0, 0.15}, {0.034, 0.024, 0.024}), 0.015);
+  return smooth_union(d, ellipsoid(mirrored, {-0.105, 0.024, 0.172}, {0.008, 0.016, 0.012}), 0.008);  // ears
+}
+
+LabObject animal(const ObjectOptions& o) {
+  LabObject object = shaped("animal", o, animal_body, {-0.18, -0.07, 0}, {0.13, 0.07, 0.21});
+  object.description = "a soft animal of 280 mm on four legs, glued to the table with its feet";
+  size_pushes(object, 0.015);
+  object.sites = {site(object, o, "back", {0.0, 0, 0.1}, -Vec3::UnitZ(), 0.6), site(object, o, "flank", {0.03, 0, 0.1}, {0, 0.5, -0.866}, 0.4)};
+  make_pressable(object, o);
+  return object;
+}
+
+constexpr std::array<BuiltInObject, 5> table_of_objects{{
+    {"cube", "foam cube of 150 mm, pressed from above at two sites", cube},
+    {"ball", "ball of 120 mm, from above and slanted", ball},
+    {"bar", "upright bar of 60 x 60 x 180 mm and ten times the stiffness, at its side and its end", bar},
+    {"bear", "sitting plush bear of 200 mm: head, belly, back", bear},
+    {"animal", "animal of 280 mm on four legs: back, flank", animal},
+}};
+
+}  // namespace
+
+std::span<const BuiltInObject> built_in_objects() { return table_of_objects; }
+
+LabObject make_object(std::string_view name, const ObjectOptions& options) {
+  std::string names;
+  for (const BuiltInObject& row : table_of_objects) {
+    if (row.name == name) return row.make(options);
+    names += (names.empty() ? "" : ", ") + std::string(row.name);
+  }
+  throw Error("is no object of the lab (there are: " + names + ") and no mesh file", "object " + std::string(name));
+}
+
+LabObject object_from_surface(const TriMesh& surface, const std::string& name, const ObjectOptions& options) {
+  const auto check = geometry::check_surface(surface);
+  if (!check.watertight()) throw Error("must be closed and consistently oriented; `palpate model` repairs a surface", name);
+  const Vec3 extent = check.max_m - check.min_m;
+  if (!(extent.minCoeff() > 0.02 && extent.maxCoeff() < 0.5))
+    throw Error("must be between 2 cm and 50 cm large; are its units metres?", name);
+  LabObject object = draw(name, options);
+  object.description = "the surface " + name + ", glued to the table at its foot";
+  object.surface = surface;
+  const Vec3 foot(0.5 * (check.min_m.x() + check.max_m.x()), 0.5 * (check.min_m.y() + check.max_m.y()), check.min_m.z());
+  object.surface.vertices_m.rowwise() += (options.base_centre_m - foot).transpose();
+  Support glue;  // what lies lower than a fifteenth of its height: few shapes stand on a plane
+  glue.kind = SupportKind::box;
+  glue.name = "table";
+  glue.box_min_m = options.base_centre_m - Vec3(extent.x(), extent.y(), 0.01);
+  glue.box_max_m = options.base_centre_m + Vec3(extent.x(), extent.y(), extent.z() / 15);
+  object.supports.push_back(glue);
+  size_pushes(object, 0.12 * extent.minCoeff());
+  object.sites = {site(object, options, "top", {0, 0, 0.5 * extent.z()}, -Vec3::UnitZ())};
+  make_pressable(object, options);
+  return object;
+}
+
+}  // namespace palpate::lab

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Objects that the lab makes by itself, standing on its table, each with places to push; and any closed surface of a user's.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "palpate/core/mesh.hpp"
+#include "palpate/lab/pressed.hpp"
+
+namespace palpate::lab {
+
+struct PushSite {
+  std::string name;
+  Vec3 contact_m = Vec3::Zero();  ///< on the surface at rest, base frame
+  Vec3 direction = -Vec3::UnitZ();
+  double stiffness = 1;  ///< about, over that of a half space of the same stuff: thin parts give way as a whole
+};
+
+/// What the truth is made of; what is not given is drawn from the seed.
+struct ObjectOptions {
+  std::uint64_t seed = 1;
+  std::optional<double> young_modulus_pa;            ///< drawn log-uniformly from 10 to 40 kPa
+  std::optional<double> poisson_ratio;               ///< drawn uniformly from 0.1 to 0.45
+  std::string material = "neo_hookean";              ///< a law of the solver's table
+  std::vector<double> extra;                         ///< its further parameters, in the table's order; empty = their initial values
+  Vec3 base_centre_m = Vec3(0.6, 0.0, 0.0);          ///< of the object's foot on the table, base frame
+  Index tetrahedra = 5000;                           ///< of the true mesh, before refinement under the pad
+  int cells_in_radius = 4;                           ///< edges across the pad's radius
+};
+
+struct LabObject {
+  std::string name, description;
+  TriMesh surface;  ///< what the recording says about its shape at rest, base frame
+  std::vector<Support> supports;
+  std::vector<PushSite> sites;
+  double pad_radius_m = 0.02;
+  double travel_limit_m = 0.01;  ///< as deep as its own truth bears under a soft pad
+  double force_step_n = 1;       ///< a quarter of about the force that this takes at a site of stiffness 1, ...
+  /// ... and at another: what a first trial push would tell.
+  double force_step_at(const PushSite& site) const { return site.stiffness * force_step_n; }
+  // The truth; nothing that estimates reads it.
+  std::string material;
+  double young_modulus_pa = 0, poisson_ratio = 0;
+  std::vector<double> extra;
+  std::function<std::unique_ptr<Pressed>(const PushSite&)> press;
+};
+
+struct BuiltInObject {
+  std::string_view name;
+  std::string_view summary;
+  LabObject (*make)(const ObjectOptions&);
+};
+
+/// The table that --help and the tests loop over.
+std::span<const BuiltInObject> built_in_objects();
+
+/// @throws Error listing the names when there is none of that name, or naming the option that is out of range.
+LabObject make_object(std::string_view name, const ObjectOptions& options = {});
+
+/// A user's closed surface (metres), put with its lowest point and middle at the table's place and bonded there where it
+/// touches; pushed from above at its top.
+/// @throws Error when it is not closed or not between 2 cm and 50 cm large.
+LabObject object_from_surface(const TriMesh& surface, const std::string& name, const ObjectOptions& options = {});
+
+}  // namespace palpate::lab

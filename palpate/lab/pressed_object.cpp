@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/lab/pressed_object.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/fem/statics.hpp"
+#include "palpate/geometry/embedding.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/tetrahedralise.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr std::array<std::array<int, 2>, 6> edges{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
+
+// Smallest determinant of an element's map at its corners and middle, over that of the straight element.
+double worst_bend(const TetMesh& mesh, Index e) {
+  const auto node = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(e, k))); };
+  const double straight = (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0));
+  double worst = 1;
+  for (int at = 0; at < 5; ++at) {
+    Eigen::Vector4d l = Eigen::Vector4d::Constant(0.25);
+    if (at < 4) l = Eigen::Vector4d::Unit(at);
+    Eigen::Matrix<double, 3, 4> d = Eigen::Matrix<double, 3, 4>::Zero();  // dx / dl
+    for (int k = 0; k < 4; ++k) d.col(k) += (4 * l(k) - 1) * node(k);
+    for (int m = 0; m < 6; ++m) {
+      const int a = edges[std::size_t(m)][0], b = edges[std::size_t(m)][1];
+      d.col(a) += 4 * l(b) * node(4 + m);
+      d.col(b) += 4 * l(a) * node(4 + m);
+    }
+    const Vec3 u = d.col(1) - d.col(0), v = d.col(2) - d.col(0), w = d.col(3) - d.col(0);
+    worst = std::min(worst, u.cross(v).dot(w) / straight);
+  }
+  return worst;
+}
+
+// Midpoints of boundary edges go onto the surface where that bends no element much; straight facets would make the truth
+// smaller than the thing that it stands for.
+void curve_boundary(TetMesh& mesh, const TriMesh& surface, const std::vector<char>& held) {
+  const geometry::TriangleTree tree(surface);
+  const Tetrahedra faces = fem::boundary_faces(mesh);
+  std::map<Index, std::array<Index, 2>> midpoints;
+  for (Index f = 0; f < faces.rows(); ++f)
+    for (int k = 0; k < 3; ++k) midpoints[faces(f, 3 + k)] = {faces(f, k), faces(f, (k + 1) % 3)};
+  const Points straight = mesh.nodes_m;
+  for (const auto& [node, ends] : midpoints) {
+    if (held[std::size_t(node)]) continue;
+    const Vec3 p = mesh.nodes_m.row(node);
+    const double edge = (straight.row(ends[0]) - straight.row(ends[1])).norm();
+    const Vec3 onto = tree.closest(p).point_m;
+    if ((onto - p).norm() < 0.15 * edge) mesh.nodes_m.row(node) = onto;
+  }
+  for (int pass = 0; pass < 5; ++pass) {
+    bool fine = true;
+    for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
+      if (worst_bend(mesh, e) > 0.3) continue;
+      fine = false;
+      for (int k = 4; k < 10; ++k) mesh.nodes_m.row(mesh.tetrahedra(e, k)) = straight.row(mesh.tetrahedra(e, k));
+    }
+    if (fine) return;
+  }
+  mesh.nodes_m = straight;
+}
+
+// The mesher keeps flat faces flat to within a small share of the edges that are there (far from the pad they are long).
+bool holds(const Support& support, const TetMesh& mesh, const Tetrahedra& faces, Index f) {
+  const auto corner = [&](int k) { return Vec3(mesh.nodes_m.row(faces(f, k))); };
+  const Vec3 a = corner(0), b = corner(1), c = corner(2);
+  if (support.kind == SupportKind::box) {
+    for (const Vec3& p : {a, b, c})
+      if (((p - support.box_min_m).array() < 0).any() || ((support.box_max_m - p).array() < 0).any()) return false;
+    return true;
+  }
+  const Vec3& normal = support.plane.normal;
+  const double tolerance_m = 0.2 * std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+  for (const Vec3& p : {a, b, c})
+    if (std::abs(normal.dot(p - support.plane.point_m)) > tolerance_m) return false;
+  return (b - a).cross(c - a).normalized().dot(normal) < -0.9;
+}
+
+}  // namespace
+
+struct PressedObject::Impl {
+  explicit Impl(const PressedObjectOptions& given) : options(given) {
+    if (std::abs(options.direction.norm() - 1) > 1e-6) throw Error("must have unit length", "PressedObjectOptions.direction");
+    if (options.supports.empty()) throw Error("the object must be held", "PressedObjectOptions.supports");
+    if (!(options.pad_radius_m > 0)) throw Error("must be positive", "PressedObjectOptions.pad_radius_m");
+    if (options.cells_in_radius < 1) throw Error("must be at least 1", "PressedObjectOptions.cells_in_radius");
+    geometry::TetrahedraliseOptions filling;
+    filling.tetrahedra = options.tetrahedra;
+    filling.finer.push_back(
+        {options.contact_m, 1.5 * options.pad_radius_m, options.pad_radius_m / options.cells_in_radius});
+    const TetMesh linear = geometry::tetrahedralise(options.surface, filling).mesh;
+    mesh = fem::to_quadratic(linear);
+
+    std::vector<char> held(std::size_t(mesh.nodes_m.rows()), 0);
+    fem::Boundary boundary;
+    const Tetrahedra faces = fem::boundary_faces(mesh);
+    for (Index f = 0; f < faces.rows(); ++f)
+      for (const Support& support : options.supports)
+        if (holds(support, mesh, faces, f))
+          for (int k = 0; k < 6; ++k) held[std::size_t(faces(f, k))] = 1;
+    for (Index n = 0; n < Index(held.size()); ++n)
+      if (held[std::size_t(n)]) boundary.constraints.push_back({n, Mat3::Identity(), 3});
+    if (boundary.constraints.empty()) throw Error("no support touches the object", "PressedObjectOptions.supports");
+    curve_boundary(mesh, options.surface, held);
+
+    const Eigen::SparseMatrix<double> columns = fem::spread_over_patch(mesh, options.contact_m, options.pad_radius_m);
+    const VectorX along = columns * options.direction;  // per newton
+    share = VectorX::Zero(mesh.nodes_m.rows());
+    for (int k = 0; k < columns.outerSize(); ++k)
+      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, k); it; ++it)
+        if (k == 0 && it.row() % 3 == 0) share(it.row() / 3) = it.value();
+    boundary.forces = MatrixX(along).sparseView();
+
+    fem::StaticsOptions statics_options;
+    statics_options.residual_tolerance = 1e-7;  // far below the sensors' errors
+    if (options.poisson_ratio > 0.45) statics_options.dilatation = fem::Dilatation::averaged;
+    statics = std::make_unique<fem::Statics>(mesh, options.material, std::move(boundary), statics_options);
+    TetMesh corners{mesh.nodes_m, mesh.tetrahedra.leftCols(4)};
+    embedding = geometry::embed(options.surface.vertices_m, corners);
+  }
+
+  void press(double force_n) {
+    const VectorX coefficient = VectorX::Constant(1, force_n), none(0);
+    const VectorX extra = Eigen::Map<const VectorX>(options.extra.data(), Eigen::Index(options.extra.size()));
+    const VectorX start = displacement_m.size() ? VectorX(force_n / at_n * displacement_m) : VectorX();
+    fem::Equilibrium state = statics->solve(options.young_modulus_pa, options.poisson_ratio, coefficient, none,
+                                            start.size() ? &start : nullptr, extra);
+    if (!state.converged)
+      throw Error("the true object found no equilibrium under " + std::to_string(force_n) + " N (" + state.reason +
+                      "): press less deep",
+                  "PressedObject");
+    displacement_m = std::move(state.displacement_m);
+    at_n = force_n;
+  }
+
+  double travel_m() const {
+    double travel = 0;
+    for (Eigen::Index n = 0; n < share.size(); ++n)
+      if (share(n) != 0) travel += share(n) * displacement_m.segment<3>(3 * n).dot(options.direction);
+    return travel;
+  }
+
+  TriMesh surface() const {
+    TriMesh moved = options.surface;
+    if (displacement_m.size() == 0) return moved;
+    for (Eigen::Index v = 0; v < moved.vertices_m.rows(); ++v) {
+      const Index e = embedding.element(v);
+      const Eigen::Vector4d l = embedding.weights.row(v);
+      Vec3 u = Vec3::Zero();
+      const auto add = [&](int k, double weight) { u += weight * displacement_m.segment<3>(3 * mesh.tetrahedra(e, k)); };
+      for (int k = 0; k < 4; ++k) add(k, l(k) * (2 * l(k) - 1));
+      for (int m = 0; m < 6; ++m) add(4 + m, 4 * l(edges[std::size_t(m)][0]) * l(edges[std::size_t(m)][1]));
+      moved.vertices_m.row(v) += u;
+    }
+    return moved;
+  }
+
+  PressedObjectOptions options;
+  TetMesh mesh;
+  VectorX share;           // of the pad's force, a node
+  VectorX displacement_m;  // empty = at rest
+  double at_n = 0;
+  SurfaceEmbedding embedding;
+  std::unique_ptr<fem::Statics> statics;
+};
+
+PressedObject::PressedObject(const PressedObjectOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+PressedObject::~PressedObject() = default;
+void PressedObject::press(double force_n) { impl_->press(force_n); }
+double PressedObject::force_n() const { return impl_->at_n; }
+double PressedObject::travel_m() const { return impl_->displacement_m.size() ? impl_->travel_m() : 0.0; }
+TriMesh PressedObject::surface() const { return impl_->surface(); }
+const TetMesh& PressedObject::mesh() const { return impl_->mesh; }
+
+}  // namespace palpate::lab

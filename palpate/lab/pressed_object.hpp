@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// A true object of the lab of any shape: held by its supports, pressed at one site along one direction by a round soft pad.
+// Solved on the lab's own mesh: quadratic, curved to the surface, fine under the pad; no estimator is given it.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "palpate/core/mesh.hpp"
+#include "palpate/lab/pressed.hpp"
+
+namespace palpate::lab {
+
+struct PressedObjectOptions {
+  TriMesh surface;                ///< base frame, closed
+  std::vector<Support> supports;  ///< bonded planes and boxes; their tolerances are the lab's own business
+  Vec3 contact_m = Vec3::Zero();  ///< on the surface
+  Vec3 direction = -Vec3::UnitZ();
+  double pad_radius_m = 0.02;
+  std::string material = "neo_hookean";
+  double young_modulus_pa = 15e3, poisson_ratio = 0.3;
+  std::vector<double> extra;                         ///< further parameters of the material, in its table's order
+  Index tetrahedra = 5000;                           ///< before refinement under the pad
+  int cells_in_radius = 4;                           ///< edges across the pad's radius
+};
+
+class PressedObject : public Pressed {
+ public:
+  /// @throws Error when the surface cannot be filled, or no support holds it.
+  explicit PressedObject(const PressedObjectOptions& options);
+  ~PressedObject() override;
+  void press(double force_n) override;
+  double force_n() const override;
+  double travel_m() const override;
+  TriMesh surface() const override;
+  const TetMesh& mesh() const override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::lab

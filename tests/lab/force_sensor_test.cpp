@@ -1,0 +1,60 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/lab/force_sensor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::lab {
+namespace {
+
+TEST(ForceSensor, ReadingsShowTheFiguresOfEveryRow) {
+  for (const ForceSensorModel& row : force_sensors()) {
+    const ForceSensorOptions& o = row.options;
+    EXPECT_NO_THROW(check(o)) << row.name;
+    EXPECT_FALSE(row.source.empty());
+    Random once(7), noise(8);
+    const ForceSensor sensor(o, once);
+    Vec3 mean = Vec3::Zero(), square = Vec3::Zero();
+    constexpr int count = 20000;
+    for (int i = 0; i < count; ++i) {
+      const Vec3 f = sensor.read(Vec3(1, 2, -10), 0, noise);
+      mean += f / count;
+      square += f.cwiseAbs2() / count;
+      for (int k = 0; k < 3; ++k) ASSERT_NEAR(f(k) / o.unit_n, std::round(f(k) / o.unit_n), 1e-6);
+    }
+    // Quantisation adds a twelfth of its square.
+    const double expected = std::sqrt(o.sigma_n * o.sigma_n + o.unit_n * o.unit_n / 12);
+    EXPECT_NEAR(std::sqrt((square - mean.cwiseAbs2()).mean()) / expected, 1, 0.02) << row.name;
+    EXPECT_EQ(sensor.read(Vec3(0, 0, 1e4), 0, noise).z(), o.range_n);
+  }
+  EXPECT_THROW(force_sensor("scales"), Error);
+}
+
+// Over many sensors out of the box: bias, drift, scale and cross-talk have the spread that the row states.
+TEST(ForceSensor, EveryBoxHoldsAnother) {
+  ForceSensorOptions o = force_sensor("schunk_ftcl_050");
+  o.sigma_n = o.unit_n = o.tool_mass_kg = 0;
+  constexpr int boxes = 4000;
+  double bias = 0, drift = 0, scale = 0, cross = 0;
+  for (std::uint64_t seed = 0; seed < boxes; ++seed) {
+    Random once(seed), noise(1);
+    const ForceSensor sensor(o, once);
+    const Vec3 zero = sensor.read(Vec3::Zero(), 0, noise), later = sensor.read(Vec3::Zero(), 1000, noise),
+               pushed = sensor.read(Vec3(0, 0, -100), 0, noise);
+    bias += zero.squaredNorm() / 3 / boxes;
+    drift += ((later - zero) / 1000).squaredNorm() / 3 / boxes;
+    scale += std::pow((pushed - zero).z() / -100 - 1, 2) / boxes;
+    cross += ((pushed - zero).head<2>() / 100).squaredNorm() / 2 / boxes;
+  }
+  EXPECT_NEAR(std::sqrt(bias) / o.bias_n, 1, 0.05);
+  EXPECT_NEAR(std::sqrt(drift) / o.drift_n_s, 1, 0.05);
+  EXPECT_NEAR(std::sqrt(scale) / o.scale_std, 1, 0.05);
+  EXPECT_NEAR(std::sqrt(cross) / o.cross_talk_std, 1, 0.05);
+}
+
+}  // namespace
+}  // namespace palpate::lab

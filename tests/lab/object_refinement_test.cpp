@@ -1,0 +1,46 @@
+// label: statistics
+// SPDX-License-Identifier: Apache-2.0
+// How far the lab's own mesh moves the truth: travel goes with 1/E. docs/lab.md holds the figures.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "palpate/lab/object.hpp"
+
+namespace palpate::lab {
+namespace {
+
+class Refinement : public testing::TestWithParam<std::string> {};
+
+TEST_P(Refinement, MovesTheTruthLittle) {
+  ObjectOptions options;
+  options.material = "linear";  // one solve a mesh; the error of the mesh is that of small strains
+  options.young_modulus_pa = 15e3;
+  options.poisson_ratio = 0.3;
+  const auto travel_of = [&](Index tetrahedra, int cells, std::size_t site) {
+    options.tetrahedra = tetrahedra;
+    options.cells_in_radius = cells;
+    const LabObject object = make_object(GetParam(), options);
+    const auto pressed = object.press(object.sites[site]);
+    pressed->press(1.0);
+    std::printf("%s %s: %d nodes, %.5f mm per N\n", GetParam().c_str(), object.sites[site].name.c_str(),
+                int(pressed->mesh().nodes_m.rows()), 1e3 * pressed->travel_m());
+    return pressed->travel_m();
+  };
+  for (std::size_t site = 0; site < make_object(GetParam(), options).sites.size(); ++site) {
+    const double usual = travel_of(ObjectOptions{}.tetrahedra, ObjectOptions{}.cells_in_radius, site),
+                 fine = travel_of(12000, 6, site);
+    EXPECT_LT(std::abs(usual / fine - 1), 0.03) << "site " << site;
+  }
+}
+
+std::vector<std::string> names() {
+  std::vector<std::string> all;
+  for (const BuiltInObject& row : built_in_objects()) all.emplace_back(row.name);
+  return all;
+}
+INSTANTIATE_TEST_SUITE_P(Objects, Refinement, testing::ValuesIn(names()), [](const auto& name) { return name.param; });
+
+}  // namespace
+}  // namespace palpate::lab

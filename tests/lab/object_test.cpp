@@ -1,0 +1,130 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/lab/object.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/lab/implicit_surface.hpp"
+#include "palpate/lab/robot.hpp"
+
+namespace palpate::lab {
+namespace {
+
+TEST(ImplicitSurface, SphereHasItsVolumeAndLiesOnItself) {
+  const Vec3 centre(0.01, -0.02, 0.06);
+  const double radius = 0.05;
+  const TriMesh mesh = implicit_surface([&](const Vec3& p) { return (p - centre).norm() - radius; },
+                                        {{-0.06, -0.09, 0}, {0.08, 0.05, 0.13}, 0.004});
+  const auto check = geometry::check_surface(mesh);
+  EXPECT_TRUE(check.watertight());
+  EXPECT_EQ(check.components, 1);
+  ASSERT_TRUE(check.volume_m3);
+  EXPECT_NEAR(*check.volume_m3 / (4.0 / 3 * M_PI * std::pow(radius, 3)), 1, 0.002);
+  for (Eigen::Index v = 0; v < mesh.vertices_m.rows(); ++v)
+    ASSERT_NEAR((Vec3(mesh.vertices_m.row(v)) - centre).norm(), radius, 1e-7);
+}
+
+TEST(ImplicitSurface, IsCutFlatAtItsFoot) {
+  const TriMesh mesh = implicit_surface([](const Vec3& p) { return (p - Vec3(0, 0, 0.03)).norm() - 0.05; },
+                                        {{-0.06, -0.06, 0}, {0.06, 0.06, 0.1}, 0.003});
+  const auto check = geometry::check_surface(mesh);
+  EXPECT_TRUE(check.watertight());
+  ASSERT_TRUE(check.volume_m3);
+  const double height = 0.08, cap = M_PI * height * height * (3 * 0.05 - height) / 3;
+  EXPECT_NEAR(*check.volume_m3 / cap, 1, 0.002);
+  double foot = 0;
+  for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(mesh.vertices_m.row(mesh.triangles(t, k))); };
+    if (corner(0).z() > 1e-12 || corner(1).z() > 1e-12 || corner(2).z() > 1e-12) continue;
+    foot += 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+  }
+  EXPECT_NEAR(foot / (M_PI * 0.04 * 0.04), 1, 0.01);
+  EXPECT_THROW(implicit_surface([](const Vec3& p) { return p.norm() - 1; }, {{-0.1, -0.1, 0}, {0.1, 0.1, 0.1}, 0.01}), Error);
+  EXPECT_THROW(implicit_surface([](const Vec3&) { return 1.0; }, {{-0.1, -0.1, 0}, {0.1, 0.1, 0.1}, 0.01}), Error);
+}
+
+class Objects : public testing::TestWithParam<std::string> {};
+
+TEST_P(Objects, AreClosedStandOnTheTableAndCanBeReached) {
+  ObjectOptions options;
+  options.seed = 4;
+  const LabObject object = make_object(GetParam(), options);
+  const auto check = geometry::check_surface(object.surface);
+  EXPECT_TRUE(check.watertight()) << check.boundary_edges << " " << check.non_manifold_edges << " " << check.inconsistent_edges;
+  EXPECT_EQ(check.components, 1);
+  ASSERT_TRUE(check.volume_m3);
+  EXPECT_GT(*check.volume_m3, 1e-4);
+  EXPECT_NEAR(check.min_m.z(), options.base_centre_m.z(), 1e-9);
+  EXPECT_GE(object.young_modulus_pa, 10e3);
+  const geometry::TriangleTree tree(object.surface);
+  ASSERT_FALSE(object.sites.empty());
+  LabOptions lab;
+  LabRobot robot(lab, object);
+  for (std::size_t s = 0; s < object.sites.size(); ++s) {
+    const PushSite& site = object.sites[s];
+    EXPECT_LT((tree.closest(site.contact_m).point_m - site.contact_m).norm(), 1e-9);
+    // From the start of the approach to beyond the deepest travel, with the force still zero before contact.
+    const acquisition::PushPlan plan = robot.plan(s);
+    for (const double along : {-0.05, -0.01}) {
+      Pose pose = Pose::Identity();
+      pose.linear() = plan.R_base_tip;
+      pose.translation() = plan.contact_m + along * plan.direction;
+      EXPECT_EQ(robot.move(pose, 0.1), acquisition::Motion::done) << site.name;
+      EXPECT_EQ(robot.true_force_n(), 0) << site.name;
+    }
+  }
+}
+
+std::vector<std::string> names() {
+  std::vector<std::string> all;
+  for (const BuiltInObject& row : built_in_objects()) all.emplace_back(row.name);
+  return all;
+}
+INSTANTIATE_TEST_SUITE_P(Table, Objects, testing::ValuesIn(names()), [](const auto& name) { return name.param; });
+
+TEST(Object, SeedDrawsTheTruthAndOptionsFixIt) {
+  ObjectOptions options;
+  options.seed = 1;
+  const LabObject a = make_object("cube", options), b = make_object("cube", options);
+  EXPECT_EQ(a.young_modulus_pa, b.young_modulus_pa);
+  options.seed = 2;
+  EXPECT_NE(make_object("cube", options).young_modulus_pa, a.young_modulus_pa);
+  options.young_modulus_pa = 12345;
+  options.poisson_ratio = 0.2;
+  EXPECT_EQ(make_object("cube", options).young_modulus_pa, 12345);
+  EXPECT_EQ(make_object("cube", options).poisson_ratio, 0.2);
+  EXPECT_THROW(make_object("jelly", options), Error);
+  options.material = "jelly";
+  EXPECT_THROW(make_object("cube", options), Error);
+  options.material = "linear";
+  options.poisson_ratio = 0.5;
+  EXPECT_THROW(make_object("cube", options), Error);
+}
+
+TEST(Object, AnySurfaceOfAUserStandsOnTheTable) {
+  const TriMesh egg = implicit_surface([](const Vec3& p) { return ellipsoid(p, {1, 2, 3.05}, {0.04, 0.05, 0.05}); },
+                                       {{0.95, 1.94, 2.99}, {1.05, 2.06, 3.11}, 0.006});
+  ObjectOptions options;
+  const LabObject object = object_from_surface(egg, "egg", options);
+  EXPECT_NEAR(object.surface.vertices_m.col(2).minCoeff(), options.base_centre_m.z(), 1e-9);
+  EXPECT_NEAR(object.surface.vertices_m.col(0).mean(), options.base_centre_m.x(), 1e-3);
+  ASSERT_EQ(object.sites.size(), 1u);
+  auto pressed = object.press(object.sites[0]);
+  pressed->press(0.2 * object.force_step_n);
+  EXPECT_GT(pressed->travel_m(), 1e-4);
+  EXPECT_LT(pressed->travel_m(), 1e-2);
+  TriMesh open = egg;
+  open.triangles.conservativeResize(open.triangles.rows() - 1, 3);
+  EXPECT_THROW(object_from_surface(open, "open", options), Error);
+  TriMesh huge = egg;
+  huge.vertices_m *= 1000;
+  EXPECT_THROW(object_from_surface(huge, "huge", options), Error);
+}
+
+}  // namespace
+}  // namespace palpate::lab
