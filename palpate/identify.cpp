@@ -8,6 +8,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/version.hpp"
+#include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/geometry/embedding.hpp"
@@ -255,10 +256,12 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   Recording recording = with_overrides(given, options);
   const estimation::Inputs observed = observe(recording);                          // sec. IV-B: point clouds, robot masked
   const estimation::SimulatedObject object = build_simulated_object(recording, progress);  // sec. IV-C: tetrahedral model
+  std::optional<estimation::FinerModel> finer;
+  if (options.method != "paper" && recording.model.refine == "auto") finer = estimation::finer_model(recording, object);
   Identified out;
   out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
                    ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
-                   : estimation::fit(recording, object, observed, options.fit, progress);
+                   : estimation::fit(recording, object, observed, options.fit, progress, finer ? &*finer : nullptr);
   out.answer.method = options.method;
   out.answer.provenance.merge(provenance(recording, options));
   out.volume = object.mesh;

@@ -9,6 +9,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/error_budget.hpp"
+#include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
 #include "palpate/estimation/verdicts.hpp"
@@ -158,7 +159,7 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 }
 
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
-                   const OnProgress& progress) {
+                   const OnProgress& progress, const FinerModel* finer) {
   check(options);
   Unknowns unknowns;
   ForwardModel model(recording, object, unknowns, statics_options(recording, object, options));
@@ -240,11 +241,21 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   answer.steps = steps_from(objective, model);
   answer.budget = error_budget(unknowns, hessian, moving);
 
-  const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
+  std::optional<AnswerShift> mesh;
+  if (finer != nullptr && optimum.termination == Termination::converged) {
+    mesh = mesh_shift(recording, objective, optimum, loss, *finer, options, progress);
+  }
+  Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;
     answer.message = "stopped by the caller";
     return answer;
+  }
+  if (mesh) {
+    widen(posterior, *mesh, unknowns[poisson].lower, unknowns[poisson].upper);
+    answer.budget.push_back({"mesh", 100 * std::abs(mesh->log_young), std::abs(mesh->poisson)});
+    std::stable_sort(answer.budget.begin(), answer.budget.end(),
+                     [](const auto& a, const auto& b) { return a.young_modulus_percent > b.young_modulus_percent; });
   }
   answer.parameters = parameters_from(posterior, unknowns[poisson]);
   answer.covariance = posterior.covariance;

@@ -23,6 +23,8 @@ struct FitOptions {
   int threads = 1;
 };
 
+struct FinerModel;
+
 /// @throws Error naming the option that is out of range.
 void check(const FitOptions& options);
 
@@ -34,9 +36,11 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 
 /// @param recording  loads, supports, priors; recording.model gives nu's prior range and whether it is fixed
 /// @param inputs     one list a step
+/// @param finer      the same object on a finer mesh, nullptr where the mesh is to be taken as it is: what the mesh does to the
+///                   answer then widens the intervals (mesh_error.hpp)
 /// @throws Error when no answer can exist (no observation, supports that hold nothing, ...). Numbers that did not work out
 ///         are said in `termination`, `message` and `verdicts`.
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
-                   const OnProgress& progress = {});
+                   const OnProgress& progress = {}, const FinerModel* finer = nullptr);
 
 }  // namespace palpate::estimation

@@ -75,6 +75,7 @@ class Objective {
   /// Keeps nu where it is in the fits that follow (conditional optima of the quadrature).
   void hold_poisson(bool held) { unknowns_[poisson].fixed = held; }
   ForwardModel& model() { return model_; }
+  const ForwardModel& model() const { return model_; }
   /// Median over robust terms of |residual| in standard deviations, of the last evaluation (closest points).
   double residual_scale() const;
 

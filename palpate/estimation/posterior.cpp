@@ -63,6 +63,12 @@ VectorX spline(const VectorX& x, const VectorX& y, const VectorX& at) {
 void finish(Posterior& posterior, const VectorX& log_density) {
   posterior.weight = (log_density.array() - log_density.maxCoeff()).exp();
   posterior.weight /= posterior.weight.sum();
+  update_covariance(posterior);
+}
+
+}  // namespace
+
+void update_covariance(Posterior& posterior) {
   const double nu = posterior.weight.dot(posterior.poisson);
   const double log_e = posterior.weight.dot(posterior.log_young_mean);
   const VectorX off_nu = posterior.poisson.array() - nu, off_e = posterior.log_young_mean.array() - log_e;
@@ -72,7 +78,6 @@ void finish(Posterior& posterior, const VectorX& log_density) {
   posterior.covariance(0, 1) = posterior.covariance(1, 0) = posterior.weight.dot(off_e.cwiseProduct(off_nu));
 }
 
-}  // namespace
 
 double Posterior::poisson_quantile(double probability) const {
   if (poisson.size() == 1) return poisson(0);

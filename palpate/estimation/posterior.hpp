@@ -28,6 +28,9 @@ struct Posterior {
 Posterior explore_posterior(Objective& objective, const Optimum& optimum, const Loss& loss, double information_factor,
                             const OnProgress& progress);
 
+/// Covariance from grid, weights and conditional moments.
+void update_covariance(Posterior& posterior);
+
 PosteriorGrid posterior_grid(const Posterior& posterior);
 
 }  // namespace palpate::estimation

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/mesh_error.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "palpate/fem/boundary.hpp"
+#include "palpate/fem/discretisation.hpp"
+#include "palpate/geometry/embedding.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr Index most_uniform = 5000;     // tetrahedra of a mesh that is halved everywhere
+constexpr Index most_growth = 4;         // of the number of nodes, where it is not
+constexpr std::size_t most_steps = 3;    // that are solved on the finer mesh: the highest load of as many pushes
+constexpr double order = 1.5;
+
+double longest_edge_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m) {
+  double longest = 0;
+  for (Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
+    for (int a = 0; a < 4; ++a) {
+      for (int b = a + 1; b < 4; ++b) {
+        const Vec3 from = mesh.nodes_m.row(mesh.tetrahedra(t, a)), to = mesh.nodes_m.row(mesh.tetrahedra(t, b));
+        if ((0.5 * (from + to) - centre_m).norm() < radius_m) longest = std::max(longest, (to - from).norm());
+      }
+    }
+  }
+  return longest;
+}
+
+/// Places and radii of round tools.
+std::vector<std::pair<Vec3, double>> round_contacts(const Recording& recording) {
+  std::vector<std::pair<Vec3, double>> contacts;
+  for (const auto& push : recording.pushes) {
+    for (const auto& step : push.steps) {
+      for (const auto& load : step.loads) {
+        for (const auto& tool : recording.tools) {
+          if (tool.name != load.tool || !(tool.radius_m > 0) || !load.force_n || load.force_n->norm() == 0) continue;
+          const bool known = std::any_of(contacts.begin(), contacts.end(),
+                                         [&](const auto& each) { return (each.first - load.contact_m).norm() < 1e-6; });
+          if (!known) contacts.emplace_back(load.contact_m, tool.radius_m);
+        }
+      }
+    }
+  }
+  return contacts;
+}
+
+/// Highest load of each push; where gravity alone loads, its first step.
+std::vector<char> steps_that_matter(const ForwardModel& model, const std::vector<std::vector<TermRows>>& rows) {
+  std::map<std::size_t, std::pair<double, std::size_t>> highest;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    if (rows[s].empty()) continue;
+    double load_n = 1e-12;
+    for (const auto& load : model.step(s).loads) load_n += load.force_n.value_or(Vec3::Zero()).norm();
+    auto& [most, at] = highest[model.index(s).push];
+    if (load_n > most) {
+      most = load_n;
+      at = s;
+    }
+  }
+  std::vector<char> chosen(model.step_count(), 0);
+  std::size_t count = 0;
+  for (const auto& [push, best] : highest) {
+    if (best.first > 0 && count++ < most_steps) chosen[best.second] = 1;
+  }
+  return chosen;
+}
+
+}  // namespace
+
+std::optional<FinerModel> finer_model(const Recording& recording, const SimulatedObject& object) {
+  if (!recording.rest.volume || recording.rest.volume->tetrahedra.cols() != 4 || object.mesh.tetrahedra.cols() != 10) {
+    return std::nullopt;
+  }
+  FinerModel finer{recording, {}};
+  TetMesh& volume = *finer.recording.rest.volume;
+  const auto lists_nodes = [](const auto& part) { return !part.vertices.empty(); };
+  const bool by_place = std::none_of(recording.supports.begin(), recording.supports.end(), lists_nodes) &&
+                        std::none_of(recording.tools.begin(), recording.tools.end(), lists_nodes);
+  if (by_place && volume.tetrahedra.rows() <= most_uniform) {
+    volume = fem::refine_uniform(volume);
+  } else {
+    const auto contacts = round_contacts(recording);
+    if (contacts.empty()) return std::nullopt;
+    const Index node_limit = most_growth * static_cast<Index>(volume.nodes_m.rows());
+    for (const auto& [contact_m, radius_m] : contacts) {
+      const double edge_m = longest_edge_near(*recording.rest.volume, contact_m, 1.2 * radius_m);
+      const fem::RefinedMesh refined = fem::refine_near(volume, contact_m, radius_m, 0.5 * edge_m, 1.0, node_limit);
+      for (auto& support : finer.recording.supports) support.vertices = fem::extend_nodes(support.vertices, refined);
+      for (auto& tool : finer.recording.tools) tool.vertices = fem::extend_nodes(tool.vertices, refined);
+      volume = refined.mesh;
+    }
+  }
+  finer.object.mesh = fem::to_quadratic(volume);
+  finer.object.material = object.material;
+  const TriMesh& surface = object.surface.rest();  // the same vertices on both meshes
+  finer.object.surface =
+      SimulatedSurface::embedded(finer.object.mesh, surface, geometry::embed(surface.vertices_m, finer.object.mesh));
+  return finer;
+}
+
+std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objective& objective, const Optimum& optimum,
+                                      const Loss& loss, const FinerModel& finer, const FitOptions& options,
+                                      const OnProgress& progress) {
+  Loss highest = loss;
+  highest.every = 1;
+  highest.steps = steps_that_matter(objective.model(), objective.last_rows());
+  const auto small_strains = [&](Recording copy, SimulatedObject object) {
+    copy.model.poisson_fixed = optimum.unknowns(poisson);
+    copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
+    object.material = "linear";
+    const auto statics = statics_options(recording, object, options);
+    Unknowns unknowns;
+    auto held = std::make_unique<Recording>(std::move(copy));
+    ForwardModel model(*held, std::move(object), unknowns, statics);
+    std::vector<StepPrediction> predicted(model.step_count());
+    for (std::size_t s = 0; s < model.step_count(); ++s) {
+      if (highest.steps[s] != 0) predicted[s] = model.predict(s, optimum.unknowns);
+    }
+    return predicted;
+  };
+  if (progress && !progress("mesh error", 0)) return std::nullopt;
+  const auto coarse = small_strains(recording, objective.model().object());
+  const auto fine = small_strains(finer.recording, finer.object);
+  if (progress && !progress("mesh error", 1)) return std::nullopt;
+
+  std::vector<std::vector<TermRows>> changed(coarse.size());
+  for (std::size_t s = 0; s < coarse.size(); ++s) {
+    if (highest.steps[s] == 0) continue;
+    StepPrediction moved = objective.last_predictions()[s];
+    const Points change_m = fine[s].surface_m - coarse[s].surface_m;
+    moved.surface_m += change_m;
+    if (moved.field != nullptr) moved.material_m += change_m;
+    moved.travel_m += fine[s].travel_m - coarse[s].travel_m;
+    changed[s] = objective.rows_of(s, moved, optimum.unknowns, loss.along_rays);
+  }
+  const Evaluation before = objective.assemble(objective.last_rows(), optimum.unknowns, highest);
+  const Evaluation after = objective.assemble(changed, optimum.unknowns, highest);
+  const std::vector<int> moving = free_unknowns(objective.unknowns());
+  const VectorX change = MatrixX(before.hessian(moving, moving))
+                             .ldlt()
+                             .solve(VectorX(before.gradient(moving)) - VectorX(after.gradient(moving)));
+  if (!change.allFinite()) return std::nullopt;
+  const double whole = 1 / (1 - std::pow(2.0, -order));
+  AnswerShift shift;
+  for (std::size_t k = 0; k < moving.size(); ++k) {
+    if (moving[k] == log_young) shift.log_young = whole * change(static_cast<Index>(k));
+    if (moving[k] == poisson) shift.poisson = whole * change(static_cast<Index>(k));
+  }
+  return shift;
+}
+
+void widen(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper) {
+  const double sd = std::abs(shift.poisson);
+  const double variance = posterior.covariance(1, 1);
+  const double slope = variance > 0 ? posterior.covariance(0, 1) / variance : 0;
+  const Index old_size = static_cast<Index>(posterior.poisson.size());
+  if (old_size > 1 && sd > 1e-3 * std::sqrt(variance)) {
+    // Widen the grid, spread every node's weight over it, and keep the ridge log E(nu), turned as far as the error turns it.
+    const double from = std::max(poisson_lower, posterior.poisson(0) - 5 * sd);
+    const double to = std::min(poisson_upper, posterior.poisson(old_size - 1) + 5 * sd);
+    const double centre = posterior.weight.dot(posterior.poisson);
+    const double wider_slope = (posterior.covariance(0, 1) + shift.log_young * shift.poisson) / (variance + sd * sd);
+    const double left = std::pow(shift.log_young, 2) + slope * slope * variance - wider_slope * wider_slope * (variance + sd * sd);
+    const VectorX grid = VectorX::LinSpaced(old_size, from, to);
+    VectorX weight = VectorX::Zero(old_size), mean(old_size), std_dev(old_size);
+    const double step = (posterior.poisson(old_size - 1) - posterior.poisson(0)) / static_cast<double>(old_size - 1);
+    for (Index i = 0; i < old_size; ++i) {
+      weight(i) = posterior.weight.dot(((posterior.poisson.array() - grid(i)) / sd).square().unaryExpr([](double z2) {
+        return std::exp(-0.5 * z2);
+      }).matrix());
+      const double at = std::clamp((grid(i) - posterior.poisson(0)) / step, 0.0, static_cast<double>(old_size - 1));
+      const Index k = std::min<Index>(static_cast<Index>(at), old_size - 2);
+      const double share = at - static_cast<double>(k);
+      const double inside = posterior.poisson(0) + at * step;
+      mean(i) = (1 - share) * posterior.log_young_mean(k) + share * posterior.log_young_mean(k + 1) +
+                slope * (grid(i) - inside) + (wider_slope - slope) * (grid(i) - centre);
+      const double own = (1 - share) * posterior.log_young_std(k) + share * posterior.log_young_std(k + 1);
+      std_dev(i) = std::sqrt(std::max(own * own + left, 0.01 * own * own));
+    }
+    posterior.poisson = grid;
+    posterior.weight = weight / weight.sum();
+    posterior.log_young_mean = mean;
+    posterior.log_young_std = std_dev;
+  } else {
+    posterior.log_young_std = (posterior.log_young_std.array().square() + shift.log_young * shift.log_young).sqrt();
+  }
+  update_covariance(posterior);
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the simulated mesh itself does to the answer: where the fit would end on a mesh twice as fine under the tools.
+#pragma once
+
+#include <optional>
+
+#include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/posterior.hpp"
+
+namespace palpate::estimation {
+
+/// The same object on a finer mesh; supports and tools name its nodes.
+struct FinerModel {
+  Recording recording;
+  SimulatedObject object;
+};
+
+/// Halves every edge where the mesh has up to 5000 tetrahedra and supports and tools are found by their place; else those
+/// under round tools (within the radius, growing away from it), where most of the error is made.
+/// @param recording  with rest.volume as the fit uses it: linear tetrahedra, of which `object` has the quadratic ones
+/// @returns nothing where the volume is not linear, or there is neither
+std::optional<FinerModel> finer_model(const Recording& recording, const SimulatedObject& object);
+
+/// Change of an answer.
+struct AnswerShift {
+  double log_young = 0, poisson = 0;
+};
+
+/// What the change of the simulated surfaces and travels between the two meshes, at the highest loads, does to the optimum: one
+/// step of Gauss and Newton. Small strains are used for the change, one factorisation each. Where the error falls with the
+/// power p of the edge length, the coarse mesh is off by the change over 1 - 2^-p; p = 1.5 lies between the first order at the
+/// rim of a tool and the second of smooth regions (fem.discretisation).
+/// The objective's last evaluation must be the optimum's. @returns nothing when the caller asked to stop.
+std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objective& objective, const Optimum& optimum,
+                                      const Loss& loss, const FinerModel& finer, const FitOptions& options,
+                                      const OnProgress& progress);
+
+/// Adds an error of known direction and normally distributed size (one standard deviation: `shift`) to a posterior. Exact for
+/// normal posteriors; bounds of nu are kept.
+void widen(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper);
+
+}  // namespace palpate::estimation

@@ -1,0 +1,90 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// What the mesh does to the answer is estimated to the right size, and widens the interval exactly where that can be known.
+#include "palpate/estimation/mesh_error.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+TEST(MeshError, IsHalfToFourTimesTheBiasThatAFinerTruthShows) {
+  Recording recording = pushed_block_recording();
+  const TetMesh linear = kuhn_block(4, 3, 2, block_size_m);
+  recording.rest.volume = linear;
+  recording.rest.surface = SimulatedSurface::boundary_of(linear, nullptr).rest();
+  const SimulatedObject coarse = coarse_block();
+  PushedBlock truth;
+  truth.sigma_m = 1e-5;
+  truth.points = 1500;
+  const Inputs inputs = clouds_of(truth);
+  const auto finer = finer_model(recording, coarse);
+  ASSERT_TRUE(finer);
+  EXPECT_GT(finer->object.mesh.nodes_m.rows(), 1.3 * static_cast<double>(coarse.mesh.nodes_m.rows()));
+  const Identification plain = fit(recording, coarse, inputs, {});
+  const Identification widened = fit(recording, coarse, inputs, {}, {}, &*finer);
+  const double bias = std::abs(std::log(plain.parameters[0].value / truth.young_pa));
+  EXPECT_NEAR(widened.parameters[0].value, plain.parameters[0].value, 1e-6 * truth.young_pa) << "it widens, it does not move";
+  ASSERT_FALSE(widened.budget.empty());
+  EXPECT_EQ(widened.budget.front().input, "mesh");  // there is hardly any noise
+  const double estimated = widened.budget.front().young_modulus_percent / 100;
+  EXPECT_GT(estimated, 0.5 * bias);
+  EXPECT_LT(estimated, 4 * bias);
+  EXPECT_LT(widened.parameters[0].lower_95, truth.young_pa);
+  EXPECT_GT(widened.parameters[0].upper_95, truth.young_pa);
+}
+
+TEST(MeshError, NeedsARoundToolAndAMeshThatItMayRefine) {
+  Recording recording = pushed_block_recording();
+  EXPECT_FALSE(finer_model(recording, coarse_block())) << "no volume of its own";
+  recording.rest.volume = kuhn_block(4, 3, 2, block_size_m);
+  EXPECT_FALSE(finer_model(recording, simulated(*recording.rest.volume, "linear"))) << "linear elements as asked for";
+  recording.supports[0].vertices = {0};  // listed nodes: only the edges under tools are halved
+  EXPECT_TRUE(finer_model(recording, coarse_block()));
+  recording.pushes[0].steps.resize(0);
+  EXPECT_FALSE(finer_model(recording, coarse_block())) << "no tool";
+}
+
+/// Normal posterior of (log E, nu) on a grid.
+Posterior normal_posterior(double log_young, double nu, double var_e, double cov, double var_nu) {
+  Posterior p;
+  const Index n = 401;
+  const double sd = std::sqrt(var_nu);
+  p.poisson = VectorX::LinSpaced(n, nu - 5 * sd, nu + 5 * sd);
+  const VectorX off = p.poisson.array() - nu;
+  p.weight = (-0.5 * off.array().square() / var_nu).exp();
+  p.weight /= p.weight.sum();
+  p.log_young_mean = log_young + cov / var_nu * off.array();
+  p.log_young_std = VectorX::Constant(n, std::sqrt(var_e - cov * cov / var_nu));
+  update_covariance(p);
+  return p;
+}
+
+TEST(Widening, AddsTheOuterProductOfTheShiftToANormalPosterior) {
+  for (const AnswerShift shift : {AnswerShift{0.02, 0.01}, AnswerShift{-0.03, 0.004}, AnswerShift{0.01, 0}, AnswerShift{0, 0.02}}) {
+    Posterior p = normal_posterior(9.5, 0.25, 4e-4, -1.2e-4, 1e-4);
+    const MatrixX before = p.covariance;
+    widen(p, shift, 0, 0.4995);
+    Eigen::Matrix2d wanted = before;
+    const Eigen::Vector2d d(shift.log_young, shift.poisson);
+    wanted += d * d.transpose();
+    EXPECT_LT((p.covariance - wanted).cwiseAbs().maxCoeff(), 2e-3 * wanted.cwiseAbs().maxCoeff())
+        << shift.log_young << " " << shift.poisson << "\n" << p.covariance << "\nwanted\n" << wanted;
+    EXPECT_NEAR(p.poisson_quantile(0.5), 0.25, 1e-4);
+    EXPECT_NEAR(p.log_young_quantile(0.5), 9.5, 1e-4);
+  }
+}
+
+TEST(Widening, KeepsTheBoundsOfNu) {
+  Posterior p = normal_posterior(9.5, 0.45, 4e-4, -1.2e-4, 1e-4);
+  widen(p, {0.02, 0.03}, 0, 0.4995);
+  EXPECT_LE(p.poisson_quantile(0.999), 0.4995);
+  EXPECT_LT(p.poisson_quantile(0.025), 0.42);
+}
+
+}  // namespace
+}  // namespace palpate::estimation
