@@ -20,6 +20,22 @@ double mean_edge(const TriMesh& m) {
   return m.triangles.rows() > 0 ? sum / double(3 * m.triangles.rows()) : 0;
 }
 
+/// Longest edge of the boundary faces that lie along a plane, within half of it: under a tool faces are small and so is their
+/// mean, but a support is held by the large ones.
+double longest_edge_along(const TriMesh& m, const Plane& plane) {
+  double longest = 0;
+  for (Index t = 0; t < m.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(m.vertices_m.row(m.triangles(t, k))); };
+    const double edge =
+        std::max({(corner(1) - corner(0)).norm(), (corner(2) - corner(1)).norm(), (corner(0) - corner(2)).norm()});
+    const Vec3 normal = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+    bool along = std::abs(normal.dot(plane.normal)) > 0.7;
+    for (int k = 0; k < 3; ++k) along = along && std::abs(plane.normal.dot(corner(k) - plane.point_m)) < 0.5 * edge;
+    if (along) longest = std::max(longest, edge);
+  }
+  return longest;
+}
+
 bool found_by_place(SupportKind kind) {
   return kind == SupportKind::plane || kind == SupportKind::box || kind == SupportKind::table || kind == SupportKind::wall;
 }
@@ -95,9 +111,13 @@ BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& sup
   out.model.supports = supports;
   out.model.unseen_share = filled.unseen_share;
   add_warnings(out.model, filled.warnings);
-  const double edge = mean_edge(geometry::boundary_surface(out.model.volume).surface);
-  for (Support& s : out.model.supports)
-    if (found_by_place(s.kind)) s.tolerance_m = std::max(s.tolerance_m, 0.1 * edge);
+  const TriMesh boundary = geometry::boundary_surface(out.model.volume).surface;
+  const double edge = mean_edge(boundary);
+  for (Support& s : out.model.supports) {
+    if (!found_by_place(s.kind)) continue;
+    const double along = s.kind == SupportKind::box ? 0 : longest_edge_along(boundary, s.plane);
+    s.tolerance_m = std::max({s.tolerance_m, 0.1 * edge, 0.15 * along});
+  }
   out.check = std::move(filled.check);
   out.volume_error = filled.volume_error;
   out.surface_rms_m = filled.surface_rms_m;

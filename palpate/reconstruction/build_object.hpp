@@ -29,7 +29,8 @@ struct BuiltObject {
 };
 
 /// Fills a surface and ties it to the volume. Supports that are found by their place (plane, table, wall, box) get a
-/// tolerance of a tenth of the boundary's mean edge at least, because the boundary follows the surface only that well.
+/// tolerance of a tenth of the boundary's mean edge at least, and of 0.15 of the longest edge of the faces along a plane, because
+/// the boundary follows the surface only that well.
 /// @throws Error as geometry::tetrahedralise.
 BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options = {},
                          const OnProgress& progress = {});
