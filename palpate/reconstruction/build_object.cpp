@@ -2,7 +2,10 @@
 #include "palpate/reconstruction/build_object.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
@@ -20,20 +23,50 @@ double mean_edge(const TriMesh& m) {
   return m.triangles.rows() > 0 ? sum / double(3 * m.triangles.rows()) : 0;
 }
 
-/// Longest edge of the boundary faces that lie along a plane, within half of it: under a tool faces are small and so is their
-/// mean, but a support is held by the large ones.
-double longest_edge_along(const TriMesh& m, const Plane& plane) {
-  double longest = 0;
-  for (Index t = 0; t < m.triangles.rows(); ++t) {
-    const auto corner = [&](int k) { return Vec3(m.vertices_m.row(m.triangles(t, k))); };
+bool is_plane(SupportKind kind) {
+  return kind == SupportKind::plane || kind == SupportKind::table || kind == SupportKind::wall;
+}
+
+double signed_volume(const TetMesh& mesh, Index t) {
+  const auto node = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(t, k))); };
+  return (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6;
+}
+
+/// Lays the boundary faces that run along a plane, within 0.15 of their longest edge, flat on it, so that a support holds whole
+/// faces whatever the size of the elements; but never an element below a fifth of its volume.
+void lay_on(const Plane& plane, TetMesh& volume) {
+  constexpr double reach = 0.15, least_volume = 0.2;
+  const TriMesh boundary = geometry::boundary_surface(volume).surface;  // in the volume's numbering or its own: matched by place
+  std::map<std::array<double, 3>, Index> node_at;
+  for (Index i = 0; i < volume.nodes_m.rows(); ++i) {
+    node_at[{volume.nodes_m(i, 0), volume.nodes_m(i, 1), volume.nodes_m(i, 2)}] = i;
+  }
+  std::set<Index> laid;
+  for (Index t = 0; t < boundary.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(boundary.vertices_m.row(boundary.triangles(t, k))); };
     const double edge =
         std::max({(corner(1) - corner(0)).norm(), (corner(2) - corner(1)).norm(), (corner(0) - corner(2)).norm()});
-    const Vec3 normal = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
-    bool along = std::abs(normal.dot(plane.normal)) > 0.7;
-    for (int k = 0; k < 3; ++k) along = along && std::abs(plane.normal.dot(corner(k) - plane.point_m)) < 0.5 * edge;
-    if (along) longest = std::max(longest, edge);
+    bool along = std::abs((corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized().dot(plane.normal)) > 0.7;
+    for (int k = 0; k < 3; ++k) along = along && std::abs(plane.normal.dot(corner(k) - plane.point_m)) < reach * edge;
+    for (int k = 0; along && k < 3; ++k) laid.insert(node_at.at({corner(k).x(), corner(k).y(), corner(k).z()}));
   }
-  return longest;
+  const Points before = volume.nodes_m;
+  for (Index i : laid) {
+    const Vec3 node = before.row(i);
+    volume.nodes_m.row(i) -= plane.normal.dot(node - plane.point_m) * plane.normal.transpose();
+  }
+  for (bool again = true; again;) {
+    again = false;
+    const TetMesh old{before, volume.tetrahedra};
+    for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
+      if (signed_volume(volume, t) >= least_volume * signed_volume(old, t)) continue;
+      for (int k = 0; k < 4; ++k) {
+        const Index i = volume.tetrahedra(t, k);
+        again = again || volume.nodes_m.row(i) != before.row(i);
+        volume.nodes_m.row(i) = before.row(i);
+      }
+    }
+  }
 }
 
 bool found_by_place(SupportKind kind) {
@@ -107,18 +140,18 @@ BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& sup
   BuiltObject out;
   out.model.surface = surface;
   out.model.volume = std::move(filled.mesh);
+  for (const Support& s : supports)
+    if (is_plane(s.kind)) lay_on(s.plane, out.model.volume);
   out.model.embedding = geometry::embed(surface.vertices_m, out.model.volume);
   out.model.supports = supports;
   out.model.unseen_share = filled.unseen_share;
   add_warnings(out.model, filled.warnings);
-  const TriMesh boundary = geometry::boundary_surface(out.model.volume).surface;
-  const double edge = mean_edge(boundary);
+  const double edge = mean_edge(geometry::boundary_surface(out.model.volume).surface);
   for (Support& s : out.model.supports) {
-    if (!found_by_place(s.kind)) continue;
-    const double along = s.kind == SupportKind::box ? 0 : longest_edge_along(boundary, s.plane);
-    s.tolerance_m = std::max({s.tolerance_m, 0.1 * edge, 0.15 * along});
+    if (is_plane(s.kind)) s.tolerance_m = std::max(s.tolerance_m, 1e-3 * edge);
+    else if (found_by_place(s.kind)) s.tolerance_m = std::max(s.tolerance_m, 0.1 * edge);
   }
-  out.check = std::move(filled.check);
+  out.check = geometry::check_volume(out.model.volume);
   out.volume_error = filled.volume_error;
   out.surface_rms_m = filled.surface_rms_m;
   out.hausdorff_m = filled.hausdorff_m;

@@ -28,9 +28,9 @@ struct BuiltObject {
       view_correction;  ///< applied to each view on the left before fusing; empty when poses were taken as known
 };
 
-/// Fills a surface and ties it to the volume. Supports that are found by their place (plane, table, wall, box) get a
-/// tolerance of a tenth of the boundary's mean edge at least, and of 0.15 of the longest edge of the faces along a plane, because
-/// the boundary follows the surface only that well.
+/// Fills a surface and ties it to the volume. Boundary faces that run along a support's plane (plane, table, wall) are laid flat
+/// on it, so that it holds whole faces; boxes get a tolerance of a tenth of the boundary's mean edge at least, because the
+/// boundary follows the surface only that well.
 /// @throws Error as geometry::tetrahedralise.
 BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options = {},
                          const OnProgress& progress = {});
