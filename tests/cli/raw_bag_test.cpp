@@ -27,12 +27,14 @@ TEST(RawBag, GivesTheStepsOfTheProtocol) {
   const SensorStreams streams = read_streams(read_bag(folder.path() / "raw"), mapping);
   const Recording found = acquisition::recording_from(mapping.plan, streams).recording;
   EXPECT_TRUE(check_recording(found).empty());
-  ASSERT_EQ(found.pushes.size(), 1u);
+  ASSERT_EQ(found.pushes.size(), protocol.pushes.size());
   std::vector<const Step*> expected, steps;
-  for (const Step& step : protocol.pushes.at(0).steps)
-    if (!step.loads.empty()) expected.push_back(&step);
-  for (const Step& step : found.pushes[0].steps)
-    if (!step.loads.empty()) steps.push_back(&step);
+  for (const Push& push : protocol.pushes)
+    for (const Step& step : push.steps)
+      if (!step.loads.empty()) expected.push_back(&step);
+  for (const Push& push : found.pushes)
+    for (const Step& step : push.steps)
+      if (!step.loads.empty()) steps.push_back(&step);
   ASSERT_GE(expected.size(), 3u);
   ASSERT_EQ(steps.size(), expected.size());
   const auto travel_of = [](const Step& step) {
@@ -43,8 +45,10 @@ TEST(RawBag, GivesTheStepsOfTheProtocol) {
   for (std::size_t i = 0; i < steps.size(); ++i) {
     // The sensor's noise is 0.05 N: means over 0.5 s of 50 Hz and tares over a second differ by a few hundredths.
     EXPECT_LT((*steps[i]->loads[0].force_n - *expected[i]->loads[0].force_n).norm(), 0.06) << i;
-    EXPECT_LT((steps[i]->loads[0].contact_m - expected[i]->loads[0].contact_m).norm(), 0.0008) << "an increment is 0.5 mm";
-    EXPECT_NEAR(travel_of(*steps[i]), travel_of(*expected[i]), 0.0008);
+    // The protocol traces contact back to zero force, the bag's steps start where the force leaves its noise: up to two
+    // increments of 0.5 mm later.
+    EXPECT_LT((steps[i]->loads[0].contact_m - expected[i]->loads[0].contact_m).norm(), 0.0012);
+    EXPECT_NEAR(travel_of(*steps[i]), travel_of(*expected[i]), 0.0012);
     EXPECT_EQ(steps[i]->unloading, expected[i]->unloading);
     bool seen = false;
     for (const Observation& one : steps[i]->observations) seen |= std::holds_alternative<DepthFrame>(one);

@@ -292,6 +292,7 @@ TEST(ReadRecording, EveryExampleOfTheDocumentationIsUnderstood) {
   int examples = 0;
   for (std::size_t at = page.find("```yaml\n"); at != std::string::npos; at = page.find("```yaml\n", at + 1)) {
     const std::size_t start = at + 8, end = page.find("```", start);
+    if (page.compare(start, 27, "format: palpate-recording/1") != 0) continue;  // a bag's mapping has a test of its own
     const TemporaryFolder folder("documentation");
     folder.put("recording.yaml", page.substr(start, end - start));
     ++examples;
