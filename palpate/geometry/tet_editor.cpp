@@ -330,17 +330,17 @@ bool TetEditor::remove_edge(Index a, Index b, const Accept& accept) {
     const std::vector<Tri> before{{b, a, f}, {a, b, l}}, after{{a, f, l}, {b, l, f}};
     if (!accept(before, after)) return false;
   }
-  std::vector<std::array<int, 2>> todo{{0, m - 1}};
+  std::vector<std::array<int, 2>> pending{{0, m - 1}};
   for (const Index id : around) remove(id);
-  while (!todo.empty()) {
-    const auto [i, j] = todo.back();
-    todo.pop_back();
+  while (!pending.empty()) {
+    const auto [i, j] = pending.back();
+    pending.pop_back();
     if (j < i + 2) continue;
     const int k = cut[i][j];
     add({a, ring[i], ring[k], ring[j]});
     add({b, ring[i], ring[j], ring[k]});
-    todo.push_back({i, k});
-    todo.push_back({k, j});
+    pending.push_back({i, k});
+    pending.push_back({k, j});
   }
   return true;
 }
@@ -418,17 +418,17 @@ TetEditor::Pieces TetEditor::pieces() const {
     if (!alive[seed] || out.of[seed] >= 0) continue;
     const auto id = static_cast<Index>(out.volume_m3.size());
     out.volume_m3.push_back(0);
-    std::vector<Index> todo{seed};
+    std::vector<Index> pending{seed};
     out.of[seed] = id;
-    while (!todo.empty()) {
-      const Tet& t = tets[todo.back()];
-      todo.pop_back();
+    while (!pending.empty()) {
+      const Tet& t = tets[pending.back()];
+      pending.pop_back();
       out.volume_m3.back() += (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]]) / 6;
       for (const auto& f : faces)
         for (const Index n : star[t[f[0]]])
           if (out.of[n] < 0 && has(tets[n], t[f[1]]) && has(tets[n], t[f[2]])) {
             out.of[n] = id;
-            todo.push_back(n);
+            pending.push_back(n);
           }
     }
   }

@@ -153,10 +153,10 @@ class Improver {
   }
 
   void smooth(double below) {
-    std::vector<Index> todo;
+    std::vector<Index> pending;
     for (std::size_t v = 0; v < m_.x.size(); ++v)
-      if (!m_.star[v].empty() && m_.star_quality(static_cast<Index>(v)) < below) todo.push_back(static_cast<Index>(v));
-    for (const Index v : todo) smooth_vertex(v);
+      if (!m_.star[v].empty() && m_.star_quality(static_cast<Index>(v)) < below) pending.push_back(static_cast<Index>(v));
+    for (const Index v : pending) smooth_vertex(v);
   }
 
   /// Gradient by differences of the soft minimum of the star's quality; elements well above the worst weigh nothing in it.

@@ -75,7 +75,7 @@ class McapParser {
   bool record_of(std::uint8_t opcode, ByteFields fields, bool in_chunk) {
     if (opcode == op_header) {
       file_.profile = fields.text();
-      file_.library = fields.text();
+      file_.written_by = fields.text();
       has_header_ = true;
     } else if (opcode == op_schema) {
       const auto id = fields.number<std::uint16_t>();

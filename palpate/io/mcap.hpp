@@ -32,7 +32,7 @@ class McapFile {
   /// written; `warnings` says what was lost. Throws Error when it is no MCAP file at all.
   static McapFile parse(std::string bytes, const std::string& name);
 
-  std::string profile, library;
+  std::string profile, written_by;
   std::map<std::uint16_t, McapChannel> channels;
   std::vector<McapMessage> messages;
   std::vector<std::string> warnings;

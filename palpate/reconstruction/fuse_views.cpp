@@ -159,14 +159,14 @@ std::vector<Facet> down_to(const Plane& plane, const std::vector<Facet>& facets,
         Square{s.first + 1, s.second}, {s.first - 1, s.second}, {s.first, s.second + 1}, {s.first, s.second - 1}};
   };
   std::set<Square> outside{{low.first - 1, low.second - 1}};
-  std::vector<Square> todo(outside.begin(), outside.end());
-  while (!todo.empty()) {
-    const Square s = todo.back();
-    todo.pop_back();
+  std::vector<Square> pending(outside.begin(), outside.end());
+  while (!pending.empty()) {
+    const Square s = pending.back();
+    pending.pop_back();
     for (const Square& n : neighbours(s))
       if (n.first >= low.first - 1 && n.first <= high.first + 1 && n.second >= low.second - 1 &&
           n.second <= high.second + 1 && !lowest.contains(n) && outside.insert(n).second)
-        todo.push_back(n);
+        pending.push_back(n);
   }
   const auto seen_below = [&](const Square& s) {
     const auto it = lowest.find(s);

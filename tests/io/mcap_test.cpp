@@ -90,7 +90,7 @@ TEST(Mcap, AFileOfAnotherWriterIsRead) {
   const std::string path = std::string(PALPATE_SOURCE_DIR) + "/tests/io/files/peer_lz4.mcap";
   const McapFile file = McapFile::parse(read_file(path), path);
   EXPECT_TRUE(file.warnings.empty());
-  EXPECT_EQ(file.library, "peer");
+  EXPECT_EQ(file.written_by, "peer");
   ASSERT_EQ(file.messages.size(), 12u);
   EXPECT_EQ(file.messages[7].log_time_ns, 1007u);
   const RosWrench wrench = decode_wrench(file.messages[7].data, path);
