@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+// Loads and supports of a step as columns of the solver, and their coefficients with derivatives.
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/forward_model_parts.hpp"
+#include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/load_columns.hpp"
+#include "palpate/fem/boundary.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+std::string body_key(const Push& push) {
+  std::string key;
+  for (const auto& name : driven_tools(push)) key += name + "\n";
+  return key;
+}
+
+/// Force on the object along the push that a sensor read in this step; 0 where none did.
+double read_force_n(const Step& step, const Load& load) {
+  for (const auto& observation : step.observations) {
+    const auto* wrench = std::get_if<Wrench>(&observation);
+    if (wrench != nullptr && (wrench->tool.empty() || wrench->tool == load.tool)) {
+      return wrench->force_n.dot(load.direction.normalized());
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string key_of(const Load& load) {
+  std::string key = load.tool;
+  for (int d = 0; d < 3; ++d) key += "," + std::to_string(load.contact_m(d));
+  return key;
+}
+
+std::set<std::string> driven_tools(const Push& push) {
+  std::set<std::string> names;
+  for (const auto& step : push.steps) {
+    for (const auto& load : step.loads) {
+      if (load.travel_m) names.insert(load.tool);
+    }
+  }
+  return names;
+}
+
+bool has_place(const Recording& recording, const Load& load) {
+  const auto tool = std::find_if(recording.tools.begin(), recording.tools.end(), [&](const Tool& t) { return t.name == load.tool; });
+  return tool != recording.tools.end() && tool->shape != ToolShape::vertices && tool->shape != ToolShape::platen;
+}
+
+ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) {
+  auto& bodies = bodies_[linear_ ? 0 : worker];
+  const auto known = bodies.find(body_key(push));
+  if (known != bodies.end()) return *known->second;
+  auto& body = bodies[body_key(push)];
+  body = std::make_unique<Body>();
+
+  std::vector<const Tool*> platens;
+  for (const auto& tool : recording_->tools) {
+    if (driven_tools(push).count(tool.name) == 0) continue;
+    if (tool.shape != ToolShape::platen) {
+      throw Error("only a platen's motion can be imposed; give the force of this tool and its travel as an observation",
+                  "tools." + tool.name);
+    }
+    body->motion_column[tool.name] = static_cast<int>(platens.size());
+    platens.push_back(&tool);
+  }
+
+  // Columns of every contact of the pushes that share this body.
+  std::vector<Eigen::SparseMatrix<double>> parts;
+  for (const auto& other : recording_->pushes) {
+    if (body_key(other) != body_key(push)) continue;
+    for (const auto& step : other.steps) {
+      for (const auto& load : step.loads) {
+        if (load.travel_m || load.force_n.value_or(Vec3::Zero()).norm() + load.force_std_n == 0) continue;
+        if (!body->force_column.emplace(key_of(load), static_cast<int>(3 * parts.size())).second) continue;
+        const Tool& tool = this->tool(load.tool);
+        parts.push_back(load_columns(object_.mesh, tool, load));
+        if (!(load.contact_std_m > 0) || !has_place(*recording_, load)) continue;
+        for (const Vec3& tangent : tangents(load.direction)) parts.push_back(shifted_columns(object_.mesh, tool, load, tangent));
+      }
+    }
+  }
+  if (recording_->rest.state == RestState::stress_free && recording_->environment.gravity_m_s2.norm() > 0) {
+    body->gravity_column = static_cast<int>(3 * parts.size());
+    parts.push_back(fem::body_force(object_.mesh));
+  }
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t part = 0; part < parts.size(); ++part) {
+    for (int c = 0; c < 3; ++c) {
+      for (Eigen::SparseMatrix<double>::InnerIterator it(parts[part], c); it; ++it) {
+        entries.emplace_back(static_cast<int>(it.row()), static_cast<int>(3 * part) + c, it.value());
+      }
+    }
+  }
+
+  fem::Boundary boundary;
+  boundary.forces.resize(3 * object_.mesh.nodes_m.rows(), static_cast<Index>(3 * parts.size()));
+  boundary.forces.setFromTriplets(entries.begin(), entries.end());
+  boundary.inertia_relief = recording_->free;
+  if (recording_->free) {
+    boundary.motions.resize(3 * object_.mesh.nodes_m.rows(), 0);
+  } else {
+    HeldBody held = hold(object_.mesh, recording_->supports, platens);
+    boundary.constraints = std::move(held.constraints);
+    boundary.motions = std::move(held.motions);
+    body->free_motions = std::move(held.free_motions);
+  }
+  body->forces = boundary.forces;
+  body->statics = std::make_unique<fem::Statics>(object_.mesh, object_.material, std::move(boundary), options_);
+  if (linear_) {
+    Eigen::SparseMatrix<double, Eigen::RowMajor> watched =
+        object_.surface.rows(static_cast<Index>(object_.mesh.nodes_m.rows()));
+    const Index vertices = static_cast<Index>(watched.rows());
+    watched.conservativeResize(vertices + body->forces.cols(), watched.cols());
+    watched.bottomRows(body->forces.cols()) = Eigen::SparseMatrix<double, Eigen::RowMajor>(body->forces.transpose());
+    fem::LinearResponse::Options options;
+    options.poisson_lower = poisson_lower_;
+    options.poisson_upper = poisson_upper_;
+    body->response = std::make_unique<fem::LinearResponse>(*body->statics, watched, options);
+  }
+  return *body;
+}
+
+RigidOffset ForwardModel::clamp_offset(std::size_t s, const VectorX& unknowns) const {
+  RigidOffset offset;
+  offset.pivot_m = clamp_pivot_m_;
+  if (clamp_[s] >= 0) {
+    offset.translation_m = unknowns.segment<3>(clamp_[s]);
+    offset.rotation_rad = unknowns.segment<3>(clamp_[s] + 3);
+  }
+  return offset;
+}
+
+ForwardModel::LoadParts ForwardModel::load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const {
+  LoadParts parts;
+  const auto found = body.force_column.find(key_of(step(s).loads[l]));
+  if (found == body.force_column.end()) return parts;
+  parts.first = found->second;
+  parts.shift_unknown = contact_shift_[s][l];
+  for (int k = 0; parts.shift_unknown >= 0 && k < 2; ++k) parts.weight.push_back(unknowns(parts.shift_unknown + k));
+  return parts;
+}
+
+ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const {
+  Coefficients c;
+  c.force = VectorX::Zero(body.forces.cols());
+  c.motion = VectorX::Zero(static_cast<Index>(body.motion_column.size()));
+  c.d_force.resize(c.force.size(), 0);
+  c.d_motion.resize(c.motion.size(), 0);
+  std::map<int, int> column_of;
+  const auto column = [&](int unknown) {
+    const auto [it, fresh] = column_of.emplace(unknown, static_cast<int>(c.columns.size()));
+    if (fresh) {
+      c.columns.push_back(unknown);
+      c.d_force.conservativeResize(c.force.size(), static_cast<Index>(c.columns.size()));
+      c.d_motion.conservativeResize(c.motion.size(), static_cast<Index>(c.columns.size()));
+      c.d_force.rightCols<1>().setZero();
+      c.d_motion.rightCols<1>().setZero();
+    }
+    return it->second;
+  };
+  const RigidOffset clamp = clamp_offset(s, unknowns);
+  const Mat3 into_object = clamp.rotation().transpose();
+  const auto add_vector = [&](int first, const Vec3& base) {
+    c.force.segment<3>(first) += into_object * base;
+    if (clamp_[s] < 0) return;
+    const Mat3 d = clamp.inverse_rotation_derivative(base);
+    for (int k = 0; k < 3; ++k) {
+      const int at = column(clamp_[s] + 3 + k);
+      c.d_force.block<3, 1>(first, at) += d.col(k);
+    }
+  };
+
+  const std::size_t p = steps_[s].push;
+  const Step& now = step(s);
+  for (std::size_t l = 0; l < now.loads.size(); ++l) {
+    const Load& load = now.loads[l];
+    if (load.travel_m) {
+      const int at = body.motion_column.at(load.tool);
+      c.motion(at) = *load.travel_m - tool(load.tool).compliance_m_per_n * read_force_n(now, load);
+      if (travel_offset_[p] >= 0) {
+        c.motion(at) += unknowns(travel_offset_[p]);
+        const int offset = column(travel_offset_[p]);
+        c.d_motion(at, offset) = 1;
+      }
+      continue;
+    }
+    const LoadParts parts = load_parts(s, l, body, unknowns);
+    if (parts.first < 0) continue;
+    const int error = force_error_[s][l];
+    Vec3 measured = load.force_n.value_or(Vec3::Zero());
+    if (error >= 0) measured += unknowns.segment<3>(error);
+    const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
+    Vec3 tare = Vec3::Zero();
+    if (tare_[p] >= 0) tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
+    const Vec3 force = scale * measured + tare;
+    for (std::size_t part = 0; part < parts.weight.size(); ++part) {
+      const int first = parts.first + static_cast<int>(3 * part);
+      const double weight = parts.weight[part];
+      add_vector(first, weight * force);
+      const auto add_derivative = [&](int unknown, const Vec3& d) {
+        const int at = column(unknown);
+        c.d_force.block<3, 1>(first, at) += weight * (into_object * d);
+      };
+      for (int k = 0; error >= 0 && k < 3; ++k) add_derivative(error + k, scale * Vec3::Unit(k));
+      if (force_scale_ >= 0) add_derivative(force_scale_, measured);
+      const bool one_axis = tare_axis_[p].norm() > 0;
+      for (int k = 0; tare_[p] >= 0 && k < (one_axis ? 1 : 3); ++k) {
+        add_derivative(tare_[p] + k, one_axis ? tare_axis_[p] : Vec3(Vec3::Unit(k)));
+      }
+      if (part > 0) {
+        const int at = column(parts.shift_unknown + static_cast<int>(part) - 1);
+        c.d_force.block<3, 1>(first, at) += into_object * force;
+      }
+    }
+  }
+  if (body.gravity_column >= 0) {
+    const double density = density_ >= 0 ? unknowns(density_) : recording_->density_kg_m3;
+    const Vec3& gravity = recording_->environment.gravity_m_s2;
+    add_vector(body.gravity_column, density * gravity);
+    if (density_ >= 0) {
+      const int at = column(density_);
+      c.d_force.block<3, 1>(body.gravity_column, at) += into_object * gravity;
+    }
+  }
+  // The clamp moves the surface, whether or not a load depends on it.
+  if (clamp_[s] >= 0) {
+    for (int k = 0; k < 6; ++k) column(clamp_[s] + k);
+  }
+  return c;
+}
+
+}  // namespace palpate::estimation
