@@ -71,7 +71,7 @@ TEST_F(Browser, HostileNamesNeitherRunNorBreakTheLayout) {
   EXPECT_EQ(check("hostile", id, &recording), 0);
 }
 
-TEST_F(Browser, LargeRecordingStaysAboveTwentyFramesASecond) {
+TEST_F(Browser, LargeRecordingIsThinnedWithAWordAndTurns) {
   EXPECT_EQ(check("speed", pressed_block::identification({.cells = 92, .pushes = 1, .steps = 10, .points = 30000}), nullptr),
             0);
 }
