@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Implicit function theorem with the tangent's factor at an equilibrium.
+#include "palpate/core/error.hpp"
+#include "palpate/fem/statics/static_system.hpp"
+
+namespace palpate::fem {
+
+SensitivityAlong StaticSystem::sensitivity(const Equilibrium& at, const MatrixX& along_force, const MatrixX& along_motion) {
+  const StaticProblem p =
+      problem(at.young_modulus_pa, at.poisson_ratio, at.force_coefficients, at.motion_coefficients, at.extra);
+  const VectorX& u = at.displacement_m;
+  if (u.size() != 3 * assembly.node_count()) throw Error("is not a state of this mesh", "sensitivity.at");
+  double scale = 1;
+  if (law.is_linear()) {
+    factorise_linear(at.poisson_ratio, nullptr);
+    scale = at.young_modulus_pa;
+  } else {
+    const bool same = factored_u.size() == u.size() && factored_u == u && factored_moduli.young_pa == p.m.young_pa &&
+                      factored_moduli.poisson == p.m.poisson && factored_moduli.extra == p.m.extra;
+    if (!same) {
+      factored_u.resize(0);
+      assembly.tangent(law, p.m, u, blocks);
+      if (system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots())) {
+        factored_u = u;
+        factored_moduli = p.m;
+      } else if (!system.factorise_indefinite(assembly.pattern(), blocks)) {
+        throw Error("the tangent is singular at this state: it has no derivatives", "sensitivity.at");
+      }
+    }
+  }
+  const Index m = static_cast<Index>(motions.cols()), x = static_cast<Index>(p.m.extra.size());
+  const Index along = static_cast<Index>(along_force.cols());
+  if (along_force.rows() != boundary.forces.cols() || along_motion.rows() != m || along_motion.cols() != along)
+    throw Error("needs one row a coefficient, and as many columns for forces as for motions", "sensitivity_along");
+  // K du = -df/dtheta (material), F a' - K M b' (a direction a', b')
+  MatrixX rhs(3 * assembly.node_count(), 2 + x + along);
+  VectorX internal;
+  assembly.energy_and_forces(law, p.m, u, internal);
+  rhs.col(0) = -internal;
+  rhs.col(1) = -assembly.forces_d_poisson(law, p.m, u);
+  for (Index i = 0; i < x; ++i) rhs.col(2 + i) = -assembly.forces_d_extra(law, p.m, u, static_cast<int>(i));
+  rhs.rightCols(along) = boundary.forces * along_force;
+  const MatrixX imposed = motions * along_motion;
+  for (Index j = 0; j < along; ++j)
+    if (!imposed.col(j).isZero(0)) rhs.col(2 + x + j) -= scale * assembly.multiply(blocks, imposed.col(j));
+  MatrixX du = system.solve(rhs) / scale;
+  // Reactions: M' (K du - rhs), with K du of the whole displacement.
+  MatrixX reaction(m, du.cols());
+  for (Index j = 0; m > 0 && j < du.cols(); ++j)
+    reaction.col(j) = motions.transpose() * (scale * assembly.multiply(blocks, du.col(j)) - rhs.col(j));
+  du.rightCols(along) += imposed;
+  SensitivityAlong out;
+  out.d_log_young = du.col(0);
+  out.d_poisson = du.col(1);
+  out.d_extra = du.middleCols(2, x);
+  out.d_along = du.rightCols(along);
+  out.reaction_d_log_young = reaction.col(0);
+  out.reaction_d_poisson = reaction.col(1);
+  out.reaction_d_extra = reaction.middleCols(2, x);
+  out.reaction_d_along = reaction.rightCols(along);
+  return out;
+}
+
+}  // namespace palpate::fem

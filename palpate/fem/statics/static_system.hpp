@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// What Statics is made of: one state of the body, its residual and tangent, Newton's method, continuation, superposition of
+// a linear material, sensitivities. Each has its own file.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "palpate/fem/assembly.hpp"
+#include "palpate/fem/materials.hpp"
+#include "palpate/fem/reduced_system.hpp"
+#include "palpate/fem/statics.hpp"
+
+namespace palpate::fem {
+
+/// Of one set of parameters and coefficients.
+struct StaticProblem {
+  Moduli m;
+  VectorX external;    // F a
+  VectorX prescribed;  // P_c M b
+};
+
+struct StaticState {
+  VectorX u, internal;
+  double energy = 0;    // strain energy minus work of the dead loads
+  double residual = 0;  // relative
+  VectorX unbalanced;   // free part of f_int - F a
+  int inverted = 0;
+};
+
+class StaticSystem {
+ public:
+  StaticSystem(const TetMesh& mesh, const std::string& material, Boundary boundary, StaticsOptions options);
+
+  Equilibrium solve(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX* start,
+                    const VectorX& extra);
+  Equilibrium solve_stepwise(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra);
+  bool is_stable(const Equilibrium& at);
+  SensitivityAlong sensitivity(const Equilibrium& at, const MatrixX& along_force, const MatrixX& along_motion);
+  std::vector<Equilibrium> solve_linear(double young, double poisson, const MatrixX& a, const MatrixX& b);
+  UnitResponses unit_responses(double poisson, const Eigen::SparseMatrix<double>& watched);
+
+  TetMesh mesh;
+  const MaterialLaw& law;
+  StaticsOptions options;
+  Assembly assembly;
+  Boundary boundary;
+  bool free;
+  ReducedSystem system;
+  MatrixX motions;  // along prescribed directions only
+  double diameter_m = 0;
+  VectorX node_area_m2;  // of the boundary, 0 inside
+  // Scratch that const calls share (a Statics is not thread-safe).
+  BlockValues blocks, blocks_lambda, blocks_mu;
+  VectorX factored_u;  // where the factor is the exact tangent; empty: nowhere
+  Moduli factored_moduli;
+  double linear_poisson = std::numeric_limits<double>::quiet_NaN();
+
+ private:
+  /// False where the law does not exist.
+  bool evaluate(const StaticProblem& p, StaticState& s) const;
+  bool factorise_tangent(const StaticProblem& p, const VectorX& u, int& factorisations, bool* shifted = nullptr);
+  /// A step with the last factor; false: it does not bring the residual down enough, and s is as it was.
+  bool stale_step(const StaticProblem& p, const VectorX& jump, bool at_target, StaticState& s, StaticState& trial) const;
+  /// From s (evaluated) towards p; the reason why it did not converge, or nothing. @param near  s is close to a state that
+  /// the last factor belongs to
+  std::string newton(const StaticProblem& p, StaticState& s, Equilibrium& out, int max_steps, bool near);
+  /// Steps the loads from rest to p, shrinking the step when Newton fails.
+  std::string continuation(const StaticProblem& p, StaticState& s, Equilibrium& out);
+  /// Finds the shape where volume is cheap, and corrects it.
+  std::string by_way_of_compressible(const StaticProblem& p, const VectorX* start, StaticState& s, Equilibrium& out);
+  StaticProblem problem(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const;
+  Equilibrium blank(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const;
+  void finish(const StaticProblem& p, StaticState& s, Equilibrium& out) const;
+  void factorise_linear(double poisson, int* factorisations);
+};
+
+}  // namespace palpate::fem
