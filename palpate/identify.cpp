@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <sstream>
 #include <utility>
 
 #include "palpate/core/error.hpp"
@@ -16,6 +17,7 @@
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/sensing/back_projection.hpp"
+#include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/observe.hpp"
 #include "palpate/sensing/plane_mask.hpp"
 #include "palpate/sensing/robot_mask.hpp"
@@ -24,6 +26,7 @@ namespace palpate {
 namespace {
 
 constexpr Index default_tetrahedra = 3000;
+constexpr Index masked_a_step = 1500;  // points under the masks that are kept for figures
 constexpr double rays_a_frame = 6000;  // beyond that, noise is not what limits E: neighbouring pixels err together
 
 /// Every n-th row and column of an image, so that some thousand rays are left.
@@ -32,6 +35,17 @@ RayCloud thinned_rays(const DepthFrame& frame) {
   RayCloud rays = sensing::back_project(frame, options);
   options.stride_px = static_cast<int>(std::floor(std::sqrt(static_cast<double>(rays.range_m.size()) / rays_a_frame)));
   return options.stride_px > 1 ? sensing::back_project(frame, options) : rays;
+}
+
+/// The object's surroundings: its rest shape and half its size around, where there is a shape.
+std::pair<Vec3, Vec3> surroundings(const Recording& recording) {
+  const Points* rest_m = recording.rest.surface  ? &recording.rest.surface->vertices_m
+                         : recording.rest.volume ? &recording.rest.volume->nodes_m
+                                                 : nullptr;
+  if (rest_m == nullptr || rest_m->rows() == 0) return {Vec3::Constant(-1e3), Vec3::Constant(1e3)};
+  const Vec3 low = rest_m->colwise().minCoeff(), high = rest_m->colwise().maxCoeff();
+  const Vec3 margin = Vec3::Constant(0.5 * (high - low).maxCoeff());
+  return {low - margin, high + margin};
 }
 
 bool has_shapes(const RobotModel& robot) {
@@ -164,7 +178,21 @@ std::map<std::string, std::string> provenance(const Recording& recording, const 
                                           {"method", options.method},
                                           {"material", recording.model.material},
                                           {"element", recording.model.element},
+                                          {"refine", recording.model.refine},
+                                          {"iterations at most", std::to_string(options.fit.max_iterations)},
                                           {"threads", std::to_string(options.fit.threads)}};
+  std::ostringstream prior;
+  if (recording.model.poisson_fixed) {
+    prior << "known: " << *recording.model.poisson_fixed;
+  } else {
+    prior << "uniform from " << recording.model.poisson_lower << " to " << recording.model.poisson_upper;
+  }
+  said["prior of the Poisson ratio"] = prior.str();
+  if (options.fit.young_start_pa) {
+    std::ostringstream start;
+    start << *options.fit.young_start_pa << " Pa";
+    said["start of Young's modulus"] = start.str();
+  }
   for (const auto& [file, hash] : recording.input_hashes) said["sha256 " + file] = hash;
   return said;
 }
@@ -195,18 +223,24 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
   return recording;
 }
 
-estimation::Inputs observe(const Recording& recording) {
+estimation::Inputs observe(const Recording& recording, std::vector<Points>* masked_m) {
   estimation::Inputs inputs;
+  const auto [low_m, high_m] = surroundings(recording);
+  if (masked_m != nullptr) masked_m->clear();
   std::optional<sensing::RobotMask> robot;  // a robot that was recorded without shapes cannot be masked
   if (recording.robot && has_shapes(*recording.robot)) robot.emplace(*recording.robot);
   for (const auto& push : recording.pushes) {
     for (const auto& step : push.steps) {
       auto& terms = inputs.emplace_back();
+      if (masked_m != nullptr) masked_m->emplace_back(0, 3);
       for (const auto& observation : step.observations) {
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
           auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
           if (robot && !step.joints_rad.empty()) {
             masked = sensing::with_mask(masked, robot->mask(*frame, recording.joint_names, step.joints_rad));
+          }
+          if (masked_m != nullptr && masked_m->back().rows() == 0) {
+            masked_m->back() = sensing::masked_points(masked, low_m, high_m, masked_a_step);
           }
           terms.push_back(
               estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad, frame->noise.bias_std_m});
@@ -254,7 +288,8 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
 
 Identified identify(const Recording& given, const IdentifyOptions& options, const OnProgress& progress) {
   Recording recording = with_overrides(given, options);
-  const estimation::Inputs observed = observe(recording);                          // sec. IV-B: point clouds, robot masked
+  std::vector<Points> masked_m;
+  const estimation::Inputs observed = observe(recording, &masked_m);               // sec. IV-B: point clouds, robot masked
   const estimation::SimulatedObject object = build_simulated_object(recording, progress);  // sec. IV-C: tetrahedral model
   std::optional<estimation::FinerModel> finer;
   if (options.method != "paper" && recording.model.refine == "auto") finer = estimation::finer_model(recording, object);
@@ -262,6 +297,9 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
                    ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
                    : estimation::fit(recording, object, observed, options.fit, progress, finer ? &*finer : nullptr);
+  for (std::size_t s = 0; s < out.answer.steps.size() && s < masked_m.size(); ++s) {
+    out.answer.steps[s].masked_m = std::move(masked_m[s]);
+  }
   out.answer.method = options.method;
   out.answer.provenance.merge(provenance(recording, options));
   out.volume = object.mesh;

@@ -36,7 +36,8 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options);
 
 /// Stage 1: what the sensors of each step say, in the base frame: depth images become rays, without the pixels that show
 /// planes of the environment or nothing near the object.
-estimation::Inputs observe(const Recording& recording);
+/// @param masked_m  if given: one entry a step, some of what the masks took away near the object, for figures
+estimation::Inputs observe(const Recording& recording, std::vector<Points>* masked_m = nullptr);
 
 /// Stage 2: the object as the solver sees it: volume mesh, element, simulated surface. Says the chosen element in the
 /// recording's model, and what was built (surface, volume, supports with the tolerance that their nodes need) in the recording.

@@ -69,11 +69,13 @@ struct StepFit {
   VectorX residual_m;  ///< per observed point, signed
   Vec3 force_n = Vec3::Zero();
   Vec3 contact_m = Vec3::Zero();
-  double tool_radius_m = 0;                                        ///< 0 = no round tip (vertices, platen)
+  double tool_radius_m = 0;  ///< of the touched patch; 0 = not a round one (edge, platen)
   double travel_m = unknown, travel_predicted_m = unknown;         ///< into the object; NaN = not measured, not predicted
+  double travel_predicted_std_m = unknown;
   double force_measured_n = unknown, force_predicted_n = unknown;  ///< along the push; NaN as above
   double force_predicted_std_n = unknown;
   VectorX von_mises_pa;  ///< per vertex of surface_m; empty = not computed
+  Points masked_m;       ///< what else the depth camera saw near the object (robot, table, depth edges), thinned; never fitted
   bool used = true;
 
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
@@ -89,6 +91,7 @@ struct PosteriorGrid {
 struct FitIteration {
   double young_modulus_pa = 0, poisson_ratio = 0;
   double cost = 0;  ///< half the robust, weighted sum of squares (the paper's method: its error function)
+  int round = 0;    ///< rounds weigh outliers differently: costs compare within one
 };
 
 struct Identification {
@@ -102,6 +105,7 @@ struct Identification {
   HeldOut prediction;
   std::vector<BudgetEntry> budget;
   std::vector<Parameter> per_push;  ///< young_modulus of each push alone (region = push name)
+  std::vector<Parameter> per_site;  ///< of all pushes at one place (region = its name); empty = one site
   Termination termination = Termination::failed;
   std::string message = "identify() was not called.";
   std::map<std::string, std::string> provenance;

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double contact_model_std = 0.02;  // of log E between contacts: patch and pressure are idealised
 constexpr std::size_t most_held_out = 6;    // pushes that are left out in turn
+constexpr double nearby_m = 1e-3;           // contacts of tools without a radius that are one site
 constexpr double nearly = 0.1;              // of log E: one step from the joint optimum gets a part's own to a few per mille
 
 OptimiseOptions few_iterations() {
@@ -38,6 +39,10 @@ class CrossCheck {
 
   CrossChecks run() {
     CrossChecks out;
+    if (progress_ && !progress_("cross-check", 0)) {
+      out.cancelled = true;
+      return out;
+    }
     std::vector<std::vector<char>> pushes;
     for (std::size_t s = 0; s < model_.step_count(); ++s) {
       const std::size_t p = model_.index(s).push;
@@ -47,6 +52,7 @@ class CrossCheck {
     if (pushes.size() > 1) {
       for (std::size_t p = 0; p < pushes.size() && !cancelled_; ++p) out.pushes.push_back(young_of(pushes[p], name_of(pushes[p])));
     }
+    if (!cancelled_) compare_sites(pushes, out);
     compare_levels(out);
     compare_ways(out);
     if (!cancelled_) hold_out(pushes, out);
@@ -105,6 +111,51 @@ class CrossCheck {
     // A part that says nothing about E leaves it where it was: no evidence either way.
     out.usable = std::isfinite(variance) && variance > 0 && out.std < 0.5;
     return out;
+  }
+
+  /// Pushes that name one site, or else touch within one patch of the first push there.
+  void compare_sites(const std::vector<std::vector<char>>& pushes, CrossChecks& out) {
+    struct Site {
+      std::string name;
+      const Load* load = nullptr;
+      std::vector<std::size_t> pushes;
+    };
+    std::vector<Site> sites;
+    const auto first_load = [](const Push& push) -> const Load* {
+      for (const Step& step : push.steps) {
+        if (!step.loads.empty()) return &step.loads.front();
+      }
+      return nullptr;
+    };
+    for (std::size_t p = 0; p < pushes.size(); ++p) {
+      const Push& push = model_.push(static_cast<std::size_t>(std::find(pushes[p].begin(), pushes[p].end(), 1) - pushes[p].begin()));
+      const Load* load = first_load(push);
+      const auto same = std::find_if(sites.begin(), sites.end(), [&](const Site& site) {
+        if (!push.site.empty() || !site.name.empty()) return push.site == site.name;
+        if (load == nullptr || site.load == nullptr) return load == site.load;
+        return load->tool == site.load->tool &&
+               (load->contact_m - site.load->contact_m).norm() <= std::max(model_.tool(load->tool).radius_m, nearby_m);
+      });
+      if (same == sites.end()) {
+        sites.push_back({push.site, load, {p}});
+      } else {
+        same->pushes.push_back(p);
+      }
+    }
+    if (sites.size() < 2) return;
+    for (std::size_t i = 0; i < sites.size() && !cancelled_; ++i) {
+      const std::string name = sites[i].name.empty() ? "site " + std::to_string(i + 1) : sites[i].name;
+      if (sites[i].pushes.size() == 1 && !out.pushes.empty()) {  // it has just been asked
+        out.sites.push_back(out.pushes[sites[i].pushes.front()]);
+        out.sites.back().name = name;
+        continue;
+      }
+      std::vector<char> steps(model_.step_count(), 0);
+      for (const std::size_t p : sites[i].pushes) {
+        for (std::size_t s = 0; s < steps.size(); ++s) steps[s] = static_cast<char>(steps[s] | pushes[p][s]);
+      }
+      out.sites.push_back(young_of(steps, name));
+    }
   }
 
   void compare_levels(CrossChecks& out) {

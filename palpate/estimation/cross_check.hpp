@@ -22,6 +22,7 @@ struct PartialYoung {
 
 struct CrossChecks {
   std::vector<PartialYoung> pushes;             ///< empty where there is one push only
+  std::vector<PartialYoung> sites;              ///< pushes at one place together; empty where there is one place only
   PartialYoung low_loads, high_loads;           ///< usable where pushes have levels
   PartialYoung loading, unloading;              ///< usable where steps were recorded on the way back
   HeldOut held_out;

@@ -12,6 +12,7 @@
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
+#include "palpate/estimation/step_fits.hpp"
 #include "palpate/estimation/verdicts.hpp"
 
 namespace palpate::estimation {
@@ -76,8 +77,8 @@ Nuisance rest_surface_from(const StepPrediction& predicted, const Optimum& optim
   return nuisance;
 }
 
-/// E of each push alone, nu held at the joint optimum.
-std::vector<Parameter> per_push_from(const std::vector<PartialYoung>& parts) {
+/// E of each push (or site) alone, nu held at the joint optimum.
+std::vector<Parameter> young_of_parts(const std::vector<PartialYoung>& parts) {
   std::vector<Parameter> out;
   for (const auto& part : parts) {
     if (!part.usable) continue;
@@ -91,47 +92,23 @@ std::vector<Parameter> per_push_from(const std::vector<PartialYoung>& parts) {
   return out;
 }
 
-/// What figures need of every step.
-std::vector<StepFit> steps_from(const Objective& objective, ForwardModel& model) {
-  std::vector<StepFit> steps;
-  for (std::size_t s = 0; s < model.step_count(); ++s) {
-    const StepPrediction& predicted = objective.last_predictions()[s];
-    StepFit fit;
-    fit.push = model.push(s).name;
-    fit.step = static_cast<int>(model.index(s).step);
-    fit.used = predicted.surface_m.rows() > 0;
-    fit.surface_m = predicted.surface_m;
-    const auto& loads = model.step(s).loads;
-    if (!loads.empty() && fit.used) {
-      const Load& load = loads.front();
-      const Vec3 direction = load.direction.normalized();
-      fit.contact_m = load.contact_m;
-      fit.force_n = load.force_n.value_or(predicted.force_n.front());
-      fit.travel_predicted_m = predicted.travel_m(0);
-      if (load.force_n) fit.force_measured_n = load.force_n->dot(direction);
-      if (load.travel_m) {
-        fit.travel_m = *load.travel_m;
-        fit.force_predicted_n = predicted.force_n.front().dot(direction);
-      }
-      for (const auto& observation : model.step(s).observations) {
-        if (const auto* travel = std::get_if<ToolTravel>(&observation)) fit.travel_m = travel->travel_m;
-        if (const auto* wrench = std::get_if<Wrench>(&observation)) fit.force_measured_n = wrench->force_n.dot(direction);
-      }
-    }
-    Index points = 0;
-    for (const auto& rows : objective.last_rows()[s]) points += rows.robust ? rows.observed_m.rows() : 0;
-    fit.observed_m.resize(points, 3);
-    fit.residual_m.resize(points);
-    Index at = 0;
-    for (const auto& rows : objective.last_rows()[s]) {
-      if (!rows.robust) continue;
-      fit.observed_m.middleRows(at, rows.observed_m.rows()) = rows.observed_m;
-      fit.residual_m.segment(at, rows.residual.size()) = rows.residual.cwiseProduct(rows.sigma);
-      at += rows.observed_m.rows();
-    }
-    steps.push_back(std::move(fit));
-  }
-  return steps;
+/// E and nu where the search stands: no interval yet.
+std::vector<Parameter> parameters_so_far(const VectorX& unknowns) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  return {{"young_modulus", "", "Pa", std::exp(unknowns(log_young)), nan, nan, nan, true},
+          {"poisson_ratio", "", "1", unknowns(poisson), nan, nan, nan, true}};
+}
+
+/// How many evaluations a fit takes is not known beforehand: the share done comes nearer to one with each of them.
+OnProgress paced(const OnProgress& progress) {
+  constexpr double typical_evaluations = 30;
+  if (!progress) return {};
+  return [progress, done = 0.0, last = 0.0](std::string_view stage, double share) mutable {
+    if (stage != "fit") return progress(stage, share);
+    if (share <= last) ++done;
+    last = share;
+    return progress(stage, 1 - std::exp(-(done + share) / typical_evaluations));
+  };
 }
 
 }  // namespace
@@ -159,8 +136,9 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 }
 
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
-                   const OnProgress& progress, const FinerModel* finer) {
+                   const OnProgress& on_progress, const FinerModel* finer) {
   check(options);
+  const OnProgress progress = paced(on_progress);
   Unknowns unknowns;
   ForwardModel model(recording, object, unknowns, statics_options(recording, object, options));
   Objective objective(model, inputs, unknowns);
@@ -179,20 +157,33 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     start = find_start(objective, nu_start);
   }
 
+  Identification answer;
+  answer.material = object.material;
+  answer.surface = object.surface.rest();
+  answer.fit.pushes = recording.pushes.size();
+  answer.fit.steps = model.step_count();
+
   Loss loss;
   loss.tukey = options.tukey_cut;
   OptimiseOptions optimiser;
   optimiser.max_iterations = options.max_iterations;
+  int round = 0;
+  optimiser.on_accepted = [&](const Optimum& at, bool starts) {
+    if (starts) ++round;
+    answer.trace.push_back({std::exp(at.unknowns(log_young)), at.unknowns(poisson), at.evaluation.cost, round});
+    if (!options.on_estimate) return;
+    Identification so_far = answer;
+    so_far.parameters = parameters_so_far(at.unknowns);
+    so_far.steps = step_fits(objective);
+    so_far.fit.iterations = static_cast<int>(answer.trace.size());
+    so_far.fit.solves = model.solves();
+    options.on_estimate(so_far);
+  };
   Optimum optimum = optimise_from_several(objective, start, loss, optimiser, progress);
   loss = optimum.loss;
 
-  Identification answer;
-  answer.material = object.material;
-  answer.surface = object.surface.rest();
   answer.termination = optimum.termination;
   answer.message = optimum.message;
-  answer.fit.pushes = recording.pushes.size();
-  answer.fit.steps = model.step_count();
   if (!optimum.evaluation.usable) {
     answer.fit.solves = model.solves();
     answer.verdicts.push_back({"not_converged", "The simulation found no equilibrium (" + optimum.message +
@@ -238,7 +229,8 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   answer.fit.rms_m = residuals.lengths > 0 ? std::sqrt(residuals.sum_squared_m2 / static_cast<double>(residuals.lengths)) : 0;
   answer.fit.chi2_per_dof =
       (residuals.chi2 + pulls) / std::max(1.0, static_cast<double>(residuals.rows) - static_cast<double>(flat));
-  answer.steps = steps_from(objective, model);
+  answer.steps = step_fits(objective);
+  add_bands(answer.steps, objective, covariance, moving);
   answer.budget = error_budget(unknowns, hessian, moving);
 
   std::optional<AnswerShift> mesh;
@@ -260,17 +252,21 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   answer.parameters = parameters_from(posterior, unknowns[poisson]);
   answer.covariance = posterior.covariance;
   answer.posterior = posterior_grid(posterior);
+  if (options.on_estimate) options.on_estimate(answer);
+  const auto stopped = [&] {
+    answer.termination = Termination::cancelled;
+    answer.message = "stopped by the caller";
+    return answer;
+  };
   objective.evaluate(optimum.unknowns, loss);  // the last evaluation is the optimum again: what follows looks at it
+  if (options.stresses && !add_stresses(answer.steps, model, optimum.unknowns, progress)) return stopped();
   CrossChecks checks;
   if (options.cross_checks && optimum.termination == Termination::converged) {
     checks = cross_check(objective, optimum, loss, factor, progress);
-    if (checks.cancelled) {
-      answer.termination = Termination::cancelled;
-      answer.message = "stopped by the caller";
-      return answer;
-    }
+    if (checks.cancelled) return stopped();
     answer.prediction = checks.held_out;
-    answer.per_push = per_push_from(checks.pushes);
+    answer.per_push = young_of_parts(checks.pushes);
+    answer.per_site = young_of_parts(checks.sites);
   }
   answer.fit.solves = model.solves();
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks});

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,13 +15,19 @@
 
 namespace palpate::estimation {
 
+/// Called by the fit's own thread after every accepted iteration with what is known so far: E and nu (their intervals NaN
+/// until there is a posterior), the trace, and the steps' surfaces and points at this estimate.
+using OnEstimate = std::function<void(const Identification& so_far)>;
+
 struct FitOptions {
   int max_iterations = 60;
   double tukey_cut = 4.685;               ///< standard deviations beyond which a point is an outlier
   std::optional<double> young_start_pa;   ///< nothing: found from the data
   double poisson_start = 0.3;             ///< moved into the prior's range
   bool cross_checks = true;               ///< refit parts of the recording: per push, by load, held-out prediction
+  bool stresses = true;                   ///< von Mises stress of every step, for figures
   int threads = 1;
+  OnEstimate on_estimate;                 ///< for those who watch; empty: nobody does
 };
 
 struct FinerModel;

@@ -75,6 +75,10 @@ class ForwardModel {
   /// Elements whose volume is gone at these unknowns; solves the step in full where the prediction cannot rule them out.
   int inverted_elements(std::size_t s, const VectorX& unknowns);
 
+  /// Von Mises stress at the surface's vertices, Pa; empty without an equilibrium. Solves the step unless it was last solved
+  /// at these very unknowns.
+  VectorX von_mises_pa(std::size_t s, const VectorX& unknowns);
+
   /// Several workers may predict at the same time, each on its own contiguous range of steps: first step of worker w (w ==
   /// workers(): one past the last). Answers depend on the number of workers only through where solves start from.
   std::size_t first_step_of(std::size_t worker) const { return worker * steps_.size() / workers_; }

@@ -40,6 +40,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
     best.message = best.evaluation.reason;
     return best;
   }
+  if (options.on_accepted) options.on_accepted(best, true);
   double damping = 1e-6;
   for (best.iterations = 1; best.iterations <= options.max_iterations; ++best.iterations) {
     // Hold nu where it sits on a bound that the gradient pushes against.
@@ -102,6 +103,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
       const double gain = best.evaluation.cost - trial.cost;
       best.unknowns = next;
       best.evaluation = std::move(trial);
+      if (options.on_accepted) options.on_accepted(best, false);
       // Rays that change triangles leave a floor on which steps of a hundredth of a standard deviation go to and fro.
       if ((largest < options.step_tolerance && gain < 1e-3) || (largest < 0.02 && gain < 1e-4)) {
         best.termination = Termination::converged;

@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
+
 #include "palpate/core/identification.hpp"
 #include "palpate/estimation/objective.hpp"
 
 namespace palpate::estimation {
 
+struct Optimum;
+
 struct OptimiseOptions {
   int max_iterations = 60;
   double step_tolerance = 1e-3;  ///< stop when log E and nu move by less than this share of their standard deviation
+  /// Called where a round starts and after every accepted step; the objective's last evaluation is this one's.
+  std::function<void(const Optimum&, bool starts)> on_accepted;
 };
 
 struct Optimum {

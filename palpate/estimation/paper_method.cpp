@@ -140,6 +140,11 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
     return at;
   };
   const auto value = [&](const Eigen::Vector2d& at) { return error(std::exp(at(0)), at(1)); };
+  const auto found = [&]() -> std::vector<Parameter> {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    return {{"young_modulus", "", "Pa", std::exp(x(0)), nan, nan, nan, true},
+            {"poisson_ratio", "", "1", x(1), nan, nan, nan, true}};
+  };
   Identification answer;
   answer.material = object.material;
   answer.surface = object.surface.rest();
@@ -156,6 +161,10 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
       break;
     }
     answer.trace.push_back({std::exp(x(0)), x(1), here});
+    if (options.on_estimate) {
+      answer.parameters = found();
+      options.on_estimate(answer);
+    }
     Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
     for (int k = 0; k < (nu_moves ? 2 : 1); ++k) {
       Eigen::Vector2d ahead = x, behind = x;
@@ -207,9 +216,7 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
   answer.fit.points_used = error.points();
   answer.fit.steps = error.samples();
   answer.fit.pushes = recording.pushes.size();
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  answer.parameters = {{"young_modulus", "", "Pa", std::exp(x(0)), nan, nan, nan, true},
-                       {"poisson_ratio", "", "1", x(1), nan, nan, nan, true}};
+  answer.parameters = found();
   answer.verdicts.push_back({"no_uncertainty", "The paper's method gives no interval: use the default method for one."});
   if (nu_moves && (x(1) <= nu_low || x(1) >= nu_high)) {
     answer.verdicts.push_back({"nu_at_bound", "The Poisson ratio ended at the end of its range."});

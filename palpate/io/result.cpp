@@ -56,6 +56,7 @@ void write_result(const Identification& answer, const fs::path& folder) {
       put("observed_m", step.observed_m);
       put("residual_m", step.residual_m);
       put("von_mises_pa", step.von_mises_pa);
+      put("masked_m", step.masked_m);
     }
   }
   // Last: who finds a result.json finds all that belongs to it.
@@ -86,6 +87,7 @@ Identification read_result(const fs::path& given) {
     step.observed_m = get("observed_m", 3);
     step.residual_m = get("residual_m", 1);
     step.von_mises_pa = get("von_mises_pa", 1);
+    step.masked_m = get("masked_m", 3);
   }
   return answer;
 }

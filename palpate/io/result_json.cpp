@@ -161,6 +161,7 @@ json from(const StepFit& one) {
           {"tool_radius_m", number(one.tool_radius_m)},
           {"travel_m", number(one.travel_m)},
           {"travel_predicted_m", number(one.travel_predicted_m)},
+          {"travel_predicted_std_m", number(one.travel_predicted_std_m)},
           {"force_measured_n", number(one.force_measured_n)},
           {"force_predicted_n", number(one.force_predicted_n)},
           {"force_predicted_std_n", number(one.force_predicted_std_n)}};
@@ -175,6 +176,7 @@ StepFit step_from(const json& object) {
   step.tool_radius_m = number_at(object, "tool_radius_m");
   step.travel_m = number_at(object, "travel_m");
   step.travel_predicted_m = number_at(object, "travel_predicted_m");
+  if (object.contains("travel_predicted_std_m")) step.travel_predicted_std_m = number_at(object, "travel_predicted_std_m");
   step.force_measured_n = number_at(object, "force_measured_n");
   step.force_predicted_n = number_at(object, "force_predicted_n");
   step.force_predicted_std_n = number_at(object, "force_predicted_std_n");
@@ -184,10 +186,12 @@ StepFit step_from(const json& object) {
 json from(const FitIteration& one) {
   return {{"young_modulus_pa", number(one.young_modulus_pa)},
           {"poisson_ratio", number(one.poisson_ratio)},
-          {"cost", number(one.cost)}};
+          {"cost", number(one.cost)},
+          {"round", one.round}};
 }
 FitIteration iteration_from(const json& object) {
-  return {number_at(object, "young_modulus_pa"), number_at(object, "poisson_ratio"), number_at(object, "cost")};
+  return {number_at(object, "young_modulus_pa"), number_at(object, "poisson_ratio"), number_at(object, "cost"),
+          object.value("round", 0)};
 }
 
 template <typename T>
@@ -218,6 +222,7 @@ json result_json(const Identification& answer) {
   object["prediction"] = from(answer.prediction);
   object["budget"] = array_from(answer.budget);
   object["per_push"] = array_from(answer.per_push);
+  object["per_site"] = array_from(answer.per_site);
   object["termination"] = "failed";
   for (const auto& [name, value] : termination_names) {
     if (value == answer.termination) object["termination"] = name;
@@ -251,6 +256,7 @@ Identification parse_result(const std::string& bytes, const std::string& name) {
     answer.prediction = held_out_from(object.at("prediction"));
     answer.budget = all_of(object.at("budget"), budget_from);
     answer.per_push = all_of(object.at("per_push"), parameter_from);
+    if (object.contains("per_site")) answer.per_site = all_of(object.at("per_site"), parameter_from);
     for (const auto& [word, value] : termination_names) {
       if (object.at("termination") == word) answer.termination = value;
     }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/fem/von_mises.hpp"
 
 namespace palpate::prediction {
 namespace {
@@ -151,7 +152,7 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
   // Stress and stiffness: differences along the exact derivative of the state, over a tenth of a standard deviation.
   const auto stress = [&](double log_step, double nu_step, double sign) {
     const VectorX u = at.displacement_m + sign * (log_step * whole[0] + nu_step * whole[1]);
-    return von_mises(mesh, elasticity.material, e * std::exp(sign * log_step), nu + sign * nu_step, elasticity.extra, u);
+    return fem::von_mises(mesh, elasticity.material, e * std::exp(sign * log_step), nu + sign * nu_step, elasticity.extra, u);
   };
   out.von_mises_pa = stress(0, 0, 1);
   const double log_step = 1e-4, nu_step = 1e-5;

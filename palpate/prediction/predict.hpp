@@ -55,8 +55,4 @@ struct Prediction {
 Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Boundary boundary, const NewPush& push,
                    fem::StaticsOptions options = {});
 
-/// Von Mises stress at the nodes, Pa: Cauchy stress at the elements' quadrature points, averaged by volume.
-VectorX von_mises(const TetMesh& mesh, const std::string& material, double young_modulus_pa, double poisson_ratio,
-                  const VectorX& extra, const VectorX& displacement_m);
-
 }  // namespace palpate::prediction

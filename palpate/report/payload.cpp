@@ -242,9 +242,11 @@ void add_geometry(json& page, const Identification& identification, const Payloa
                                (stress_scale > 0 ? static_cast<double>(shown.size()) : 0.0);  // a vertex, in all steps
   const auto max_vertices =
       std::min(max_vertices_shown, static_cast<std::size_t>(std::max(4.0, 0.55 * raw_bytes / surface_bytes)));
+  const double steps_shown = static_cast<double>(std::max<std::size_t>(1, shown.size()));
+  const auto max_masked = static_cast<std::size_t>(std::max(1.0, 0.05 * raw_bytes / (6.0 * steps_shown)));
   const auto max_points = std::min(
       max_points_shown, static_cast<std::size_t>(std::max(
-                            1.0, 0.45 * raw_bytes / (7.0 * static_cast<double>(std::max<std::size_t>(1, shown.size()))))));
+                            1.0, 0.4 * raw_bytes / (7.0 * steps_shown))));
 
   const TriMesh& surface = identification.surface;
   const ThinnedMesh mesh = thin(surface, max_vertices);
@@ -284,6 +286,11 @@ void add_geometry(json& page, const Identification& identification, const Payloa
     points_shown += rows.size();
     entry["points"] = encode_points(step.observed_m, rows, box);
     entry["residual"] = encode_signed(residuals, scale);
+    std::vector<Index> masked;
+    for (const std::size_t i : spread(static_cast<std::size_t>(step.masked_m.rows()), max_masked)) {
+      if (inside(box, step.masked_m.row(static_cast<Eigen::Index>(i)))) masked.push_back(static_cast<Index>(i));
+    }
+    if (!masked.empty()) entry["masked"] = encode_points(step.masked_m, masked, box);
   }
   if (points_shown < points_total) {
     thinned.push_back(fmt::format("The clouds are drawn with {} of {} points.", points_shown, points_total));
@@ -302,11 +309,12 @@ json payload(const Identification& identification, const Recording* recording, c
   page["format"] = "palpate-report-1";
   page["version"] = version;
   page["title"] = title;
-  page["answer"] = answer(identification);
+  page["answer"] = options.running ? answer_so_far(identification) : answer(identification);
   page["method"] = identification.method;
   page["material"] = identification.material;
   page["parameters"] = list_of(identification.parameters);
   page["per_push"] = list_of(identification.per_push);
+  page["per_site"] = list_of(identification.per_site);
   page["nuisances"] = list_of(identification.nuisances);
   page["verdicts"] = json::array();
   for (const Verdict& v : identification.verdicts) page["verdicts"].push_back({{"code", v.code}, {"message", v.message}});
@@ -319,6 +327,7 @@ json payload(const Identification& identification, const Recording* recording, c
                  {"iterations", fit.iterations},
                  {"solves", fit.solves}};
   page["termination"] = termination_words(identification.termination);
+  page["running"] = options.running;
   page["converged"] = identification.termination == Termination::converged;
   page["message"] = identification.message;
   const HeldOut& held_out = identification.prediction;
@@ -340,7 +349,8 @@ json payload(const Identification& identification, const Recording* recording, c
   for (const FitIteration& iteration : identification.trace) {
     page["trace"].push_back({{"young_modulus_pa", iteration.young_modulus_pa},
                              {"poisson_ratio", iteration.poisson_ratio},
-                             {"cost", iteration.cost}});
+                             {"cost", iteration.cost},
+                             {"round", iteration.round}});
   }
   page["posterior"] = posterior_of(identification.posterior);
   page["scene"] = recording != nullptr ? scene_of(*recording) : json(nullptr);
@@ -356,6 +366,7 @@ json payload(const Identification& identification, const Recording* recording, c
                              {"tool_radius_m", step.tool_radius_m},
                              {"travel_m", step.travel_m},
                              {"travel_predicted_m", step.travel_predicted_m},
+                             {"travel_predicted_std_m", step.travel_predicted_std_m},
                              {"force_measured_n", step.force_measured_n},
                              {"force_predicted_n", step.force_predicted_n},
                              {"force_predicted_std_n", step.force_predicted_std_n},

@@ -14,6 +14,7 @@ namespace palpate::report {
 struct PayloadOptions {
   std::string title;                  ///< empty: the recording's name
   std::size_t max_bytes = 2'000'000;  ///< of meshes and clouds together, as text
+  bool running = false;               ///< the work goes on: the answer is said as what is known so far
 };
 
 /// Everything the page shows, thinned and quantised to `max_bytes`; "thinned" in it says in words what was left out.

@@ -73,21 +73,42 @@ std::string plain_answer(const Identification& identification) {
   return text + "</ul><p>The figures need JavaScript, which this browser does not run.</p></noscript>";
 }
 
+std::size_t place_of(std::string_view mark, const std::string& page) {
+  const std::size_t place = page.find(mark);
+  if (place == std::string::npos) throw Error("the page's template has lost its " + std::string(mark), "report");
+  return place;
+}
+
+/// Names come from files: bytes that are no UTF-8 are replaced. ASCII only, so that no browser can guess a wrong encoding.
+std::string as_text(const nlohmann::json& data) {
+  return data.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace
 
-std::string html(const Identification& identification, const Recording* recording, const ReportOptions& options) {
-  const std::string page = page_template();
-  const std::size_t mark = page.find(data_mark);
-  if (mark == std::string::npos) throw Error("the page's template has lost its place for data", "report::html");
-
+std::string page_data(const Identification& identification, const Recording* recording, const ReportOptions& options) {
   constexpr std::size_t room_for_words = 300'000;  // tables, posterior, names
   PayloadOptions fitted;
   fitted.title = options.title;
-  const std::size_t fixed = page.size() + room_for_words;
+  fitted.running = options.running;
+  const std::size_t fixed = page_template().size() + room_for_words;
   fitted.max_bytes = options.max_bytes > fixed + 100'000 ? options.max_bytes - fixed : 100'000;
-  const auto data = payload(identification, recording, fitted);
-  // Names come from files: bytes that are no UTF-8 are replaced. ASCII only, so that no browser can guess a wrong encoding.
-  const std::string text = data.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  return as_text(payload(identification, recording, fitted));
+}
+
+std::string live_page() {
+  std::string page = page_template();
+  // The page may ask its own server, and nobody else, for data; everything else stays forbidden.
+  constexpr std::string_view policy = "default-src 'none';";
+  page.insert(place_of(policy, page) + policy.size(), " connect-src 'self';");
+  page.replace(place_of(data_mark, page), data_mark.size(), "<meta name=\"palpate-live\" content=\"state\">");
+  return page;
+}
+
+std::string html(const Identification& identification, const Recording* recording, const ReportOptions& options) {
+  const std::string page = page_template();
+  const std::size_t mark = place_of(data_mark, page);
+  const std::string text = page_data(identification, recording, options);
 
   std::string result = page.substr(0, mark);
   result += plain_answer(identification);

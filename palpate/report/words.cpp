@@ -91,6 +91,18 @@ std::string termination_words(Termination termination) {
   return "failed";
 }
 
+std::string answer_so_far(const Identification& identification) {
+  std::string text;
+  for (const Parameter& parameter : identification.parameters) {
+    if (!text.empty()) text += ", ";
+    const bool bounded = std::isfinite(parameter.lower_95) && std::isfinite(parameter.upper_95);
+    const double resolution = bounded ? (parameter.upper_95 - parameter.lower_95) / 30 : 0;
+    text += parameter_title(parameter) + " " + quantity(parameter.value, parameter.unit, resolution);
+    if (bounded) text += " (95 % interval " + interval(parameter.lower_95, parameter.upper_95, parameter.unit) + ")";
+  }
+  return text.empty() ? "There is no estimate yet." : "So far: " + text + ".";
+}
+
 std::string answer(const Identification& identification) {
   if (identification.parameters.empty()) {
     return "There is no answer: the fit " + termination_words(identification.termination) + ". " + identification.message;
@@ -101,7 +113,9 @@ std::string answer(const Identification& identification) {
     const bool article = parameter.name != "young_modulus";
     const std::string title = article ? "The " + parameter_title(parameter) : parameter_title(parameter);
     if (!text.empty()) text += ' ';
-    if (parameter.determined) {
+    if (!std::isfinite(parameter.lower_95) || !std::isfinite(parameter.upper_95)) {
+      text += fmt::format("{} is {} (without an interval).", title, quantity(parameter.value, parameter.unit));
+    } else if (parameter.determined) {
       const double resolution = (parameter.upper_95 - parameter.lower_95) / 30;
       text +=
           fmt::format("{} is {} (95 % interval {}).", title, quantity(parameter.value, parameter.unit, resolution), range);

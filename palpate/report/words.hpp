@@ -22,6 +22,9 @@ std::string parameter_title(const Parameter& parameter);
 /// The answer in one or two sentences, with intervals, honest about what is not determined or did not work out.
 std::string answer(const Identification& identification);
 
+/// The same while the work goes on: "So far: Young's modulus 12.9 kPa, Poisson ratio 0.240."
+std::string answer_so_far(const Identification& identification);
+
 /// "converged", "stopped by the user", ...
 std::string termination_words(Termination termination);
 

@@ -56,6 +56,32 @@ TEST(CrossCheck, PushesOnBodiesOfDifferentStiffnessAreCalledSo) {
   EXPECT_NEAR(answer.prediction.force_error, 0.45, 0.15);  // |2/3 - 1| and |3/2 - 1|
 }
 
+TEST(CrossCheck, SitesHoldAllTheirPushes) {
+  Recording recording = pushed_block_recording();
+  Inputs inputs;
+  for (int p = 0; p < 3; ++p) {
+    if (p > 0) recording.pushes.push_back(recording.pushes[0]);
+    recording.pushes[static_cast<std::size_t>(p)].name = "push " + std::to_string(p + 1);
+    recording.pushes[static_cast<std::size_t>(p)].site = p < 2 ? "soft side" : "stiff side";
+    PushedBlock truth;
+    truth.young_pa = p < 2 ? 2e4 : 3e4;
+    truth.seed = 7 + static_cast<unsigned>(p);
+    for (auto& step : clouds_of(truth)) inputs.push_back(step);
+  }
+  const Identification answer = fit(recording, coarse_block(), inputs, {});
+  ASSERT_EQ(answer.per_push.size(), 3u);
+  ASSERT_EQ(answer.per_site.size(), 2u);
+  EXPECT_EQ(answer.per_site[0].region, "soft side");
+  EXPECT_EQ(answer.per_site[1].region, "stiff side");
+  EXPECT_NEAR(answer.per_site[0].value, 2e4, 0.1 * 2e4);
+  EXPECT_NEAR(answer.per_site[1].value, 3e4, 0.1 * 3e4);
+  EXPECT_LT(answer.per_site[0].std, 0.85 * answer.per_push[0].std);  // two pushes know more than one
+
+  // Without names, contacts within one patch are one place: here all of them.
+  for (auto& push : recording.pushes) push.site.clear();
+  EXPECT_TRUE(fit(recording, coarse_block(), inputs, {}).per_site.empty());
+}
+
 TEST(CrossCheck, MaterialThatStiffensBeyondItsLawIsCalledSo) {
   Recording recording = pushed_block_recording();
   PushedBlock soft, stiff;

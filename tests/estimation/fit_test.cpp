@@ -95,6 +95,70 @@ TEST_P(UniaxialCompression, ClosedFormForcesGiveYoungsModulusExactly) {
   EXPECT_EQ(answer.fit.steps, 6u);
 }
 
+/// The state is homogeneous and uniaxial: von Mises stress is force over area as it is now (the linear law: as it was).
+TEST_P(UniaxialCompression, StressOfEveryStepIsForceOverArea) {
+  const std::string material = GetParam();
+  const double young_pa = 31415, nu = 0.37;
+  Recording recording = pressed_bar(material == "linear" ? linear_force_n : neo_hookean_force_n, young_pa, nu);
+  recording.model.poisson_fixed = nu;
+  const Identification answer = fit(recording, simulated(kuhn_block(2, 1, 2, bar_m), material), wrenches_of(recording), {});
+  ASSERT_EQ(answer.steps.size(), 6u);
+  for (const StepFit& step : answer.steps) {
+    double volume_m3 = 0;  // the bar may have turned, so its width along x says nothing
+    for (Index t = 0; t < answer.surface.triangles.rows(); ++t) {
+      const auto corner = [&](int k) { return Vec3(step.surface_m.row(answer.surface.triangles(t, k))); };
+      volume_m3 += corner(0).dot(corner(1).cross(corner(2))) / 6;
+    }
+    const double area_m2 = material == "linear" ? bar_m.x() * bar_m.y() : volume_m3 / (bar_m.z() - step.travel_m);
+    const double stress_pa = step.force_measured_n / area_m2;
+    ASSERT_EQ(step.von_mises_pa.size(), step.surface_m.rows());
+    EXPECT_LT((step.von_mises_pa.array() - stress_pa).abs().maxCoeff(), 1e-5 * young_pa);
+  }
+}
+
+/// With nu known the force is E times a known number, so its relative band is that of E.
+TEST_P(UniaxialCompression, BandOfTheForceIsThatOfYoungsModulus) {
+  const std::string material = GetParam();
+  Recording recording = pressed_bar(material == "linear" ? linear_force_n : neo_hookean_force_n, 31415, 0.37);
+  recording.model.poisson_fixed = 0.37;
+  const Identification answer = fit(recording, simulated(kuhn_block(1, 1, 1, bar_m), material), wrenches_of(recording), {});
+  const Parameter& young = parameter(answer, "young_modulus");
+  for (const StepFit& step : answer.steps) {
+    EXPECT_NEAR(step.force_predicted_std_n, step.force_predicted_n * young.std / young.value, 1e-3 * step.force_predicted_std_n + 1e-12);
+  }
+}
+
+TEST_P(UniaxialCompression, WatchersSeeEveryAcceptedIterationAndChangeNothing) {
+  const std::string material = GetParam();
+  const Recording recording = pressed_bar(material == "linear" ? linear_force_n : neo_hookean_force_n, 31415, 0.37);
+  const auto object = simulated(kuhn_block(1, 1, 1, bar_m), material);
+  const Identification unwatched = fit(recording, object, wrenches_of(recording), {});
+  std::vector<Identification> seen;
+  FitOptions options;
+  options.on_estimate = [&](const Identification& so_far) { seen.push_back(so_far); };
+  double largest_share = 0;
+  const Identification answer = fit(recording, object, wrenches_of(recording), options, [&](std::string_view stage, double share) {
+    if (stage == "fit") {
+      EXPECT_GE(share, largest_share);
+      EXPECT_LT(share, 1);
+      largest_share = share;
+    }
+    return true;
+  });
+  EXPECT_EQ(parameter(answer, "young_modulus").value, parameter(unwatched, "young_modulus").value);
+  ASSERT_GE(answer.trace.size(), 2u);
+  ASSERT_EQ(seen.size(), answer.trace.size() + 1);  // and once with the posterior
+  for (std::size_t i = 0; i < answer.trace.size(); ++i) {
+    EXPECT_EQ(seen[i].trace.size(), i + 1);
+    EXPECT_EQ(parameter(seen[i], "young_modulus").value, answer.trace[i].young_modulus_pa);
+    EXPECT_TRUE(std::isnan(parameter(seen[i], "young_modulus").lower_95));
+    EXPECT_EQ(seen[i].steps.size(), 6u);
+    if (i == 0 || answer.trace[i].round != answer.trace[i - 1].round) continue;
+    EXPECT_LE(answer.trace[i].cost, answer.trace[i - 1].cost + 1e-6 * std::abs(answer.trace[i - 1].cost) + 1e-9);
+  }
+  EXPECT_EQ(parameter(seen.back(), "young_modulus").lower_95, parameter(answer, "young_modulus").lower_95);
+}
+
 TEST(UniaxialForces, OfTheLinearLawDoNotDetermineNuAndThatIsSaid) {
   const Recording recording = pressed_bar(linear_force_n, 31415, 0.37);
   const Identification answer = fit(recording, simulated(kuhn_block(1, 1, 1, bar_m), "linear"), wrenches_of(recording), {});

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "palpate/core/error.hpp"
+#include "palpate/sensing/masked_points.hpp"
 
 namespace palpate::sensing {
 namespace {
@@ -40,6 +41,23 @@ TEST(PlaneMask, TableGoesAndWhatStandsOnItStays) {
   EXPECT_EQ(mask(0, 1), 1);
   // The corners of what is hardly higher than the margin have more table than object around them.
   EXPECT_EQ(mask.cast<int>().sum(), 30 * 40 - 100 - 1 + 4 * 3);
+}
+
+TEST(MaskedPoints, AreWhereTheCameraSawThemThinnedAndNearTheObjectOnly) {
+  DepthFrame frame = from_above(0.8F);
+  frame.mask = MaskImage::Zero(30, 40);
+  EXPECT_EQ(masked_points(frame, Vec3::Constant(-1e3), Vec3::Constant(1e3), 100).rows(), 0);
+  frame.mask.block(0, 0, 30, 20).setConstant(1);
+  frame.depth_m(3, 3) = 0;  // masked, but nothing was seen there
+  const Points all = masked_points(frame, Vec3::Constant(-1e3), Vec3::Constant(1e3), 1000);
+  ASSERT_EQ(all.rows(), 30 * 20 - 1);
+  // Straight above a table at height 0: pixel (0, 0) sees 19.5 pixels to the side and 14.5 up.
+  EXPECT_NEAR((all.row(0).transpose() - Vec3(0.3 - 19.5 / 60 * 0.8, 0.1 + 14.5 / 60 * 0.8, 0)).norm(), 0, 1e-6);
+  EXPECT_EQ(masked_points(frame, Vec3::Constant(-1e3), Vec3::Constant(1e3), 50).rows(), 50);
+  const Points near = masked_points(frame, Vec3(0.2, 0, -0.1), Vec3(0.4, 0.2, 0.1), 1000);
+  EXPECT_GT(near.rows(), 0);
+  EXPECT_LT(near.rows(), all.rows());
+  EXPECT_GE(near.col(0).minCoeff(), 0.2);
 }
 
 // A steep plane that stands on the table, seen with noise: what the mask leaves of it must not be what noise pulled forward.

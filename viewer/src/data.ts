@@ -37,6 +37,7 @@ interface RawStep {
   tool_radius_m: Num;
   travel_m: Num;
   travel_predicted_m: Num;
+  travel_predicted_std_m: Num;
   force_measured_n: Num;
   force_predicted_n: Num;
   force_predicted_std_n: Num;
@@ -46,14 +47,16 @@ interface RawStep {
   stress?: string;
   points?: string;
   residual?: string;
+  masked?: string;
 }
 
-export interface Step extends Omit<RawStep, "surface" | "stress" | "points" | "residual"> {
+export interface Step extends Omit<RawStep, "surface" | "stress" | "points" | "residual" | "masked"> {
   index: number;
   surface: Float32Array | null; // x y z of every drawn vertex, metres
   stress: Float32Array | null; // Pa
   points: Float32Array | null;
   residual: Float32Array | null; // metres, NaN where not used
+  masked: Float32Array | null; // what the masks of robot and table took away
 }
 
 export interface Posterior {
@@ -71,6 +74,7 @@ interface Raw {
   material: string;
   parameters: Parameter[];
   per_push: Parameter[];
+  per_site: Parameter[];
   nuisances: Nuisance[];
   verdicts: { code: string; message: string }[];
   fit: {
@@ -84,6 +88,7 @@ interface Raw {
   };
   termination: string;
   converged: boolean;
+  running: boolean; // the work goes on: nothing is final
   message: string;
   prediction: {
     available: boolean;
@@ -96,7 +101,7 @@ interface Raw {
   budget: { input: string; young_modulus_percent: Num; poisson_shift: Num }[];
   provenance: Record<string, string>;
   timing_s: Record<string, Num>;
-  trace: { young_modulus_pa: Num; poisson_ratio: Num; cost: Num }[];
+  trace: { young_modulus_pa: Num; poisson_ratio: Num; cost: Num; round: number }[];
   posterior: Posterior | null;
   scene: {
     source: string;
@@ -159,6 +164,7 @@ export function decode(text: string): Report {
     stress: step.stress !== undefined ? unsigned(step.stress, raw.stress_scale_pa) : null,
     points: step.points !== undefined ? positions(step.points) : null,
     residual: step.residual !== undefined ? signed(step.residual, raw.residual_scale_m) : null,
+    masked: step.masked !== undefined ? positions(step.masked) : null,
   }));
   const pushes: Report["pushes"] = [];
   for (const step of steps) {

@@ -130,13 +130,13 @@ function rows(width: number, items: Row[], label: string, title: string, band: [
   return plot.node;
 }
 
-export function perPush(report: Report, width: number): SVGElement | null {
-  const list = report.per_push.filter((p) => known(p.value) && known(p.lower_95) && known(p.upper_95)).slice(0, 60);
-  const regions = report.parameters.filter((p) => p.name === "young_modulus" && p.region !== "" && known(p.value));
-  if (list.length + regions.length < 2) return null;
+/** Young's modulus of parts of the recording, each alone, against that of all together. */
+function youngOfParts(report: Report, width: number, parts: [Parameter[], string][], title: string): SVGElement | null {
+  const list = parts.flatMap(([some, colour]) => some.filter((p) => known(p.value)).map((p) => ({ p, colour })));
+  if (list.length < 2) return null;
   const joint = young(report);
-  const unit = prefix(Math.max(...[...list, ...regions].map((p) => p.value!)), "Pa");
-  const row = (p: Parameter, colour: string): Row => ({
+  const unit = prefix(Math.max(...list.map(({ p }) => p.value!)), "Pa");
+  const row = ({ p, colour }: { p: Parameter; colour: string }): Row => ({
     label: p.region || p.title,
     value: p.value! * unit.factor,
     lower: (p.lower_95 ?? p.value!) * unit.factor,
@@ -146,7 +146,18 @@ export function perPush(report: Report, width: number): SVGElement | null {
   });
   const band: [number, number] | null =
     joint && joint.region === "" && known(joint.lower_95) && known(joint.upper_95) ? [joint.lower_95 * unit.factor, joint.upper_95 * unit.factor] : null;
-  return rows(width, [...list.map((p) => row(p, category(0))), ...regions.map((p) => row(p, category(2)))], `Young's modulus (${unit.unit})`, "Young's modulus of each push alone", band);
+  return rows(width, list.map(row), `Young's modulus (${unit.unit})`, title, band);
+}
+
+export function perPush(report: Report, width: number): SVGElement | null {
+  const pushes = report.per_push.filter((p) => known(p.lower_95) && known(p.upper_95)).slice(0, 60);
+  const regions = report.parameters.filter((p) => p.name === "young_modulus" && p.region !== "");
+  return youngOfParts(report, width, [[pushes, category(0)], [regions, category(2)]], "Young's modulus of each push alone");
+}
+
+export function perSite(report: Report, width: number): SVGElement | null {
+  const sites = report.per_site.filter((p) => known(p.lower_95) && known(p.upper_95)).slice(0, 60);
+  return youngOfParts(report, width, [[sites, category(3)]], "Young's modulus of each site alone");
 }
 
 export function nuisances(report: Report, width: number): SVGElement | null {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Figures of the measurements against the fitted model.
 import { category } from "./colours";
-import type { Report, Step } from "./data";
+import type { Num, Report, Step } from "./data";
 import { Plot, range, svg } from "./plot";
 import { known, prefix, quantity } from "./words";
 
@@ -19,7 +19,8 @@ export function forceTravel(report: Report, width: number, selected: Step | null
     return [s.force_measured_n, s.force_predicted_n, (s.force_predicted_n ?? 0) + spread].filter(known);
   });
   const unit = prefix(Math.max(...complete.map((s) => Math.abs(xOf(s)!))), "m");
-  const x = range(complete.flatMap((s) => [xOf(s), s.travel_predicted_m]).filter(known).map((v) => v * unit.factor), true);
+  const reach = (s: Step): Num => (known(s.travel_predicted_m) ? s.travel_predicted_m + 1.96 * (s.travel_predicted_std_m ?? 0) : null);
+  const x = range(complete.flatMap((s) => [xOf(s), s.travel_predicted_m, reach(s)]).filter(known).map((v) => v * unit.factor), true);
   const plot = new Plot(
     width,
     300,
@@ -37,7 +38,7 @@ export function forceTravel(report: Report, width: number, selected: Step | null
         const [f, sd] = [s.force_predicted_n!, 1.96 * s.force_predicted_std_n!];
         return [xOf(s)! * unit.factor, f - sd, f + sd];
       }),
-      { fill: colour, "fill-opacity": 0.18 },
+      { fill: colour, "fill-opacity": 0.18, class: "band" },
     );
     // When the force was imposed, the model answers with a travel; otherwise with a force.
     const imposed = sorted.every((s) => !known(s.force_predicted_n) || s.force_predicted_n === s.force_measured_n);
@@ -46,6 +47,11 @@ export function forceTravel(report: Report, width: number, selected: Step | null
           .filter((s) => known(s.travel_predicted_m) && known(s.force_measured_n))
           .map((s) => [s.travel_predicted_m! * unit.factor, s.force_measured_n!])
       : sorted.filter((s) => known(s.force_predicted_n)).map((s) => [xOf(s)! * unit.factor, s.force_predicted_n!]);
+    if (imposed) {
+      const sideways = sorted.filter((s) => known(s.travel_predicted_m) && known(s.force_measured_n) && known(s.travel_predicted_std_m));
+      const edge = (s: Step, side: number): [number, number] => [(s.travel_predicted_m! + side * 1.96 * s.travel_predicted_std_m!) * unit.factor, s.force_measured_n!];
+      plot.area([...sideways.map((s) => edge(s, 1)), ...sideways.map((s) => edge(s, -1)).reverse()], { fill: colour, "fill-opacity": 0.18, class: "band" });
+    }
     plot.line(model, { stroke: colour, "stroke-width": 2 });
     for (const step of steps) {
       if (!known(step.force_measured_n)) continue;
@@ -151,9 +157,9 @@ export function convergence(report: Report, width: number): SVGElement | null {
     plot.marker(i, v, 0, { fill: category(0) }, `iteration ${i}: E ${quantity(trace[i].young_modulus_pa, "Pa", 4)}, cost ${costs[i].toPrecision(5)}`);
   });
   if (low > 0 && high > low) {
-    // The cost on its own logarithmic scale, drawn over the same height.
+    // The cost on its own logarithmic scale, drawn over the same height. A round weighs outliers anew: its cost starts afresh.
     const y = (c: number): number => plot.bottom - (plot.bottom - plot.top) * (0.04 + 0.92 * (Math.log(c / low) / Math.log(high / low)));
-    const d = costs.map((c, i) => `${i ? "L" : "M"}${plot.x(i)} ${y(c)}`).join("");
+    const d = costs.map((c, i) => `${i && trace[i].round === trace[i - 1].round ? "L" : "M"}${plot.x(i)} ${y(c)}`).join("");
     plot.node.append(svg("path", { d, fill: "none", class: "cost" }));
   }
   return plot.node;

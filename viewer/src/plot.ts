@@ -132,6 +132,13 @@ export class Plot {
     this.add("path", { d: `M${[...upper, ...lower].join("L")}Z`, stroke: "none", ...attributes });
   }
 
+  /** A closed outline, filled. */
+  area(points: [number, number][], attributes: Record<string, string | number>): void {
+    if (points.length < 3) return;
+    const path = points.map(([x, y]) => `${this.x(x).toFixed(1)} ${this.y(y).toFixed(1)}`).join("L");
+    this.add("path", { d: `M${path}Z`, stroke: "none", ...attributes });
+  }
+
   /** Shapes differ as well as colours, so that categories survive a grey print. */
   marker(x: number, y: number, shape: number, attributes: Record<string, string | number>, hover: string): SVGElement {
     const [px, py] = [this.x(x), this.y(y)];

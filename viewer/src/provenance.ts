@@ -27,12 +27,13 @@ export function recordingFacts(report: Report): HTMLElement {
   return section;
 }
 
-export function provenance(report: Report): HTMLElement {
+export function provenance(report: Report, opened: boolean): HTMLElement {
   const rows: [string, string][] = [["palpate", report.version]];
   for (const [name, value] of Object.entries(report.provenance)) rows.push([name.replaceAll("_", " "), value]);
   for (const [stage, seconds] of Object.entries(report.timing_s)) if (known(seconds)) rows.push([`time: ${stage.replaceAll("_", " ")}`, quantity(seconds, "s")]);
   for (const [file, hash] of Object.entries(report.input_hashes)) rows.push([`SHA-256 of ${file}`, hash]);
   const details = el("details", {}, el("summary", {}, "Versions, options, seeds, hashes"), table(rows));
+  details.open = opened;
   return el("section", { id: "provenance" }, el("h2", {}, "Provenance"), details);
 }
 

@@ -37,7 +37,7 @@ export class View {
   private readonly lamp = new DirectionalLight(0xffffff, 1.7);
   private readonly size: number;
   private readonly centre: Vector3;
-  private readonly largestForce: number;
+  private largestForce = 1;
   private pending = false;
   private frames = 0;
   private lastFrame = 0;
@@ -48,7 +48,7 @@ export class View {
   /** @throws when the browser offers no WebGL */
   constructor(
     private readonly holder: HTMLElement,
-    private readonly report: Report,
+    private report: Report,
   ) {
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
@@ -61,7 +61,7 @@ export class View {
     const box = boundsOf([report.rest, ...report.steps.map((s) => s.surface)]);
     this.centre = box.centre;
     this.size = box.size;
-    this.largestForce = Math.max(1e-12, ...report.steps.map((s) => new Vector3(...s.force_n.map((f) => f ?? 0)).length()));
+    this.use(report);
 
     const index = new BufferAttribute(report.triangles, 1);
     this.surfaceGeometry.setIndex(index);
@@ -92,6 +92,18 @@ export class View {
     this.canvas.addEventListener("keydown", (event) => this.turn(event));
     new ResizeObserver(() => this.fit()).observe(holder);
     this.fit();
+  }
+
+  /** Later data of the same mesh; the camera stays where it is. */
+  use(report: Report): void {
+    this.report = report;
+    this.largestForce = Math.max(1e-12, ...report.steps.map((s) => new Vector3(...s.force_n.map((f) => f ?? 0)).length()));
+  }
+
+  /** Gives the browser its drawing context back: it has few of them. */
+  dispose(): void {
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
   }
 
   private placeCamera(): void {
@@ -169,7 +181,7 @@ export class View {
     this.wire.visible = visible.mesh;
     this.rest.visible = visible.rest;
     this.cloud.visible = visible.cloud;
-    this.masked.visible = visible.cloud && visible.masked;
+    this.masked.visible = visible.masked;
     this.push.visible = visible.push;
     this.draw();
   }
@@ -190,6 +202,7 @@ export class View {
       const [r, g, b] = coloured ? signedColour(residual / (field.scale || 1)) : observed;
       colours.push(linear(r), linear(g), linear(b));
     }
+    if (step.masked) rejected.push(...step.masked);
     replace(this.cloud, used, colours);
     replace(this.masked, rejected);
   }

@@ -14,129 +14,164 @@ const modeNames: Record<Mode, string> = {
   stress: "Stress",
 };
 
-export interface Viewer {
-  node: HTMLElement;
-  select: (step: Step) => void;
-}
+const shownSteps = (report: Report): Step[] => report.steps.filter((s) => s.surface || s.points);
 
-export function viewer3d(report: Report, changed: (step: Step) => void): Viewer {
-  const steps = report.steps.filter((s) => s.surface || s.points);
-  const holder = el("div", { class: "view" });
-  const node = el("section", { id: "object", "aria-label": "The object in 3D" }, el("h2", {}, "Seen and simulated"));
-  if (steps.length === 0 || report.rest.length === 0) {
-    node.append(el("p", { class: "note" }, "This result carries no surfaces, so there is nothing to show in 3D."));
-    return { node, select: () => undefined };
+const sameArrays = (a: ArrayLike<number>, b: ArrayLike<number>): boolean => {
+  for (let i = 0; i < a.length; ++i) if (a[i] !== b[i]) return false;
+  return a.length === b.length;
+};
+
+/** The section with the 3D view. Its camera and choices survive later data of the same object. */
+export class Viewer {
+  readonly node = el("section", { id: "object", "aria-label": "The object in 3D" }, el("h2", {}, "Seen and simulated"));
+  private readonly holder = el("div", { class: "view" });
+  private readonly legend = el("div", { class: "legend" });
+  private readonly readout = el("output", { class: "readout", "aria-live": "polite" });
+  private readonly slider = el("input", { type: "range", min: "0", step: "1", "aria-label": "Step" });
+  private readonly pushSelect = el("select", { "aria-label": "Push" });
+  private readonly play = el("button", { type: "button", class: "play", "aria-label": "Play the steps" }, "\u25b6");
+  private readonly modes = el("div", { class: "choices", role: "group", "aria-label": "Colour" });
+  private readonly toggles = el("div", { class: "toggles", role: "group", "aria-label": "Shown" });
+  private readonly notes = el("div");
+  private readonly visible: Visible = { surface: true, mesh: false, cloud: true, masked: false, rest: false, push: true };
+  private view: View | null = null;
+  private steps: Step[];
+  private step: Step;
+  private fields: Fields;
+  private mode: Mode = "displacement";
+  private timer = 0;
+
+  constructor(private report: Report, private readonly changed: (step: Step) => void) {
+    this.steps = shownSteps(report);
+    this.step = this.steps[this.steps.length - 1];
+    this.fields = new Fields(report);
+    if (this.empty()) {
+      this.node.append(el("p", { class: "note" }, "This result carries no surfaces, so there is nothing to show in 3D."));
+      return;
+    }
+    this.slider.addEventListener("input", () => this.select(this.steps[Number(this.slider.value)]));
+    this.pushSelect.addEventListener("change", () => {
+      const name = this.report.pushes[Number(this.pushSelect.value)].name;
+      this.select(this.steps.filter((s) => s.push === name).pop());
+    });
+    this.play.addEventListener("click", () => (this.timer ? this.pause() : this.start()));
+    const steps = el("div", { class: "steps" }, ...(report.pushes.length > 1 ? [this.pushSelect] : []), this.play, this.slider);
+    this.node.append(
+      el("div", { class: "stage" }, this.holder, this.legend),
+      el("div", { class: "controls" }, steps, this.readout, this.modes, this.toggles),
+      this.notes,
+    );
+    this.offer();
+    // The holder needs its size before the view is made.
+    queueMicrotask(() => {
+      try {
+        this.view = new View(this.holder, this.report);
+      } catch {
+        this.holder.classList.add("without");
+        this.holder.append(el("p", {}, "This browser offers no WebGL, so the 3D view is missing. All figures below are complete."));
+      }
+      this.update();
+    });
   }
 
-  const fields = new Fields(report);
-  let view: View | null = null;
-  let step = steps[steps.length - 1];
-  let mode: Mode = "displacement";
-  const visible: Visible = { surface: true, mesh: false, cloud: true, masked: false, rest: false, push: true };
+  private empty(): boolean {
+    return this.steps.length === 0 || this.report.rest.length === 0;
+  }
 
-  const readout = el("output", { class: "readout", "aria-live": "polite" });
-  const legend = el("div", { class: "legend" });
-  const slider = el("input", { type: "range", min: "0", step: "1", "aria-label": "Step" });
-  const pushes = report.pushes.filter((p) => p.steps.some((s) => steps.includes(s)));
-  const pushSelect = el("select", { "aria-label": "Push" });
-  pushes.forEach((push, i) => pushSelect.append(el("option", { value: String(i) }, push.name || `push ${i + 1}`)));
-  const stepsOf = (name: string): Step[] => steps.filter((s) => s.push === name);
+  /** Takes later data of the same object. False: this is another mesh, make another viewer. */
+  renew(report: Report): boolean {
+    const steps = shownSteps(report);
+    const names = (r: Report): string => JSON.stringify(r.pushes.map((p) => p.name));
+    if (this.empty() || steps.length === 0 || names(report) !== names(this.report) || !sameArrays(report.triangles, this.report.triangles)) return false;
+    this.report = report;
+    this.steps = steps;
+    this.step = steps.find((s) => s.push === this.step.push && s.step === this.step.step) ?? steps[steps.length - 1];
+    this.fields = new Fields(report);
+    this.view?.use(report);
+    this.offer();
+    this.update();
+    return true;
+  }
 
-  const update = (): void => {
-    const field = fields.field(mode, step);
-    view?.show(step, field, visible);
-    showLegend(legend, field);
-    const list = stepsOf(step.push);
-    slider.max = String(list.length - 1);
-    slider.value = String(list.indexOf(step));
-    pushSelect.value = String(pushes.findIndex((p) => p.name === step.push));
+  dispose(): void {
+    this.pause();
+    this.view?.dispose();
+  }
+
+  select(chosen: Step | undefined): void {
+    if (!chosen || !this.steps.includes(chosen) || chosen === this.step) return;
+    this.step = chosen;
+    this.update();
+  }
+
+  private start(): void {
+    this.play.textContent = "\u275a\u275a";
+    this.play.setAttribute("aria-label", "Pause");
+    if (this.step === this.steps[this.steps.length - 1]) this.select(this.steps[0]);
+    this.timer = window.setInterval(() => {
+      const next = this.steps.indexOf(this.step) + 1;
+      if (next >= this.steps.length) return this.pause();
+      this.select(this.steps[next]);
+    }, 250);
+  }
+
+  private pause(): void {
+    window.clearInterval(this.timer);
+    this.timer = 0;
+    this.play.textContent = "\u25b6";
+    this.play.setAttribute("aria-label", "Play the steps");
+  }
+
+  /** The choices that these data allow. */
+  private offer(): void {
+    this.pushSelect.replaceChildren(...this.report.pushes.map((push, i) => el("option", { value: String(i) }, push.name || `push ${i + 1}`)));
+    const modes = this.fields.modes();
+    if (!modes.includes(this.mode)) this.mode = modes[0];
+    this.modes.replaceChildren();
+    for (const m of modes) {
+      const button = el("button", { type: "button", "aria-pressed": String(m === this.mode), "data-mode": m }, modeNames[m]);
+      button.addEventListener("click", () => {
+        this.mode = m;
+        for (const b of this.modes.children) b.setAttribute("aria-pressed", String(b === button));
+        this.update();
+      });
+      this.modes.append(button);
+    }
+    const names: [keyof Visible, string][] = [
+      ["surface", "simulated surface"], ["cloud", "observed points"], ["rest", "rest shape"], ["mesh", "triangles"], ["push", "push"],
+    ];
+    if (this.steps.some((s) => s.masked || s.residual?.some(Number.isNaN))) names.splice(2, 0, ["masked", "masked and unused points"]);
+    this.toggles.replaceChildren();
+    for (const [key, name] of names) {
+      const box = el("input", { type: "checkbox", "data-show": key });
+      box.checked = this.visible[key];
+      box.addEventListener("change", () => {
+        this.visible[key] = box.checked;
+        this.update();
+      });
+      this.toggles.append(el("label", {}, box, name));
+    }
+    this.notes.replaceChildren(...this.report.thinned.map((words) => el("p", { class: "note" }, words)));
+  }
+
+  private update(): void {
+    const { step, steps, report } = this;
+    const field = this.fields.field(this.mode, step);
+    this.view?.show(step, field, this.visible);
+    showLegend(this.legend, field);
+    this.slider.max = String(steps.length - 1);
+    this.slider.value = String(steps.indexOf(step));
+    this.pushSelect.value = String(report.pushes.findIndex((p) => p.name === step.push));
+    const own = steps.filter((s) => s.push === step.push);
     const force = Math.hypot(...step.force_n.map((f) => f ?? 0));
-    const parts = [`step ${step.step} (${list.indexOf(step) + 1} of ${list.length})`, `${quantity(force, "N")} force`];
+    const parts = [`step ${step.step} (${own.indexOf(step) + 1} of ${own.length}${report.pushes.length > 1 ? " of this push" : ""})`, `${quantity(force, "N")} force`];
     if (known(step.travel_m)) parts.push(`${quantity(step.travel_m, "m")} travel`);
     if (known(step.rms_m)) parts.push(`${quantity(step.rms_m, "m")} rms over ${plural(step.points_total, "point")}`);
     if (!step.used) parts.push("not used in the fit");
-    readout.textContent = parts.join(" \u00b7 ");
-    slider.setAttribute("aria-valuetext", parts.join(", "));
-    changed(step);
-  };
-  const select = (chosen: Step): void => {
-    if (!steps.includes(chosen) || chosen === step) return;
-    step = chosen;
-    update();
-  };
-  slider.addEventListener("input", () => select(stepsOf(step.push)[Number(slider.value)]));
-  pushSelect.addEventListener("change", () => {
-    const list = stepsOf(pushes[Number(pushSelect.value)].name);
-    select(list[list.length - 1]);
-  });
-
-  const play = el("button", { type: "button", class: "play", "aria-label": "Play the steps" }, "\u25b6");
-  let timer = 0;
-  const stop = (): void => {
-    window.clearInterval(timer);
-    timer = 0;
-    play.textContent = "\u25b6";
-    play.setAttribute("aria-label", "Play the steps");
-  };
-  play.addEventListener("click", () => {
-    if (timer) return stop();
-    play.textContent = "\u275a\u275a";
-    play.setAttribute("aria-label", "Pause");
-    const list = stepsOf(step.push);
-    if (step === list[list.length - 1]) select(list[0]);
-    timer = window.setInterval(() => {
-      const now = stepsOf(step.push);
-      const next = now.indexOf(step) + 1;
-      if (next >= now.length) return stop();
-      select(now[next]);
-    }, 250);
-  });
-
-  const modes = el("div", { class: "choices", role: "group", "aria-label": "Colour" });
-  for (const m of fields.modes()) {
-    const button = el("button", { type: "button", "aria-pressed": String(m === mode), "data-mode": m }, modeNames[m]);
-    button.addEventListener("click", () => {
-      mode = m;
-      for (const b of modes.children) b.setAttribute("aria-pressed", String(b === button));
-      update();
-    });
-    modes.append(button);
+    this.readout.textContent = parts.join(" \u00b7 ");
+    this.slider.setAttribute("aria-valuetext", [step.push, ...parts].join(", "));
+    this.changed(step);
   }
-  const toggles = el("div", { class: "toggles", role: "group", "aria-label": "Shown" });
-  const maskedPoints = steps.some((s) => s.residual?.some(Number.isNaN));
-  const names: [keyof Visible, string][] = [
-    ["surface", "simulated surface"], ["cloud", "observed points"], ["rest", "rest shape"], ["mesh", "triangles"], ["push", "push"],
-  ];
-  if (maskedPoints) names.splice(2, 0, ["masked", "points not used"]);
-  for (const [key, name] of names) {
-    const box = el("input", { type: "checkbox", "data-show": key });
-    box.checked = visible[key];
-    box.addEventListener("change", () => {
-      visible[key] = box.checked;
-      update();
-    });
-    toggles.append(el("label", {}, box, name));
-  }
-
-  node.append(
-    el("div", { class: "stage" }, holder, legend),
-    el("div", { class: "controls" },
-      el("div", { class: "steps" }, ...(pushes.length > 1 ? [pushSelect] : []), play, slider),
-      readout, modes, toggles),
-  );
-  for (const words of report.thinned) node.append(el("p", { class: "note" }, words));
-
-  // The holder needs its size before the view is made.
-  queueMicrotask(() => {
-    try {
-      view = new View(holder, report);
-    } catch {
-      holder.classList.add("without");
-      holder.append(el("p", {}, "This browser offers no WebGL, so the 3D view is missing. All figures below are complete."));
-    }
-    update();
-  });
-  return { node, select };
 }
 
 function showLegend(legend: HTMLElement, field: Field): void {

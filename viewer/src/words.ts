@@ -47,6 +47,16 @@ export function count(value: number): string {
   return value.toLocaleString("en-US").replaceAll(",", "\u202f");
 }
 
+/** "12 s", "3 min 20 s", as cli/session.cpp says it. */
+export function duration(seconds: number): string {
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  const whole = Math.round(seconds);
+  const two = (v: number): string => String(v).padStart(2, "0");
+  if (whole < 60) return `${whole} s`;
+  if (whole < 3600) return `${Math.floor(whole / 60)} min ${two(whole % 60)} s`;
+  return `${Math.floor(whole / 3600)} h ${two(Math.floor((whole % 3600) / 60))} min`;
+}
+
 export function plural(value: number, word: string): string {
   return `${count(value)} ${word}${value === 1 ? "" : word.endsWith("sh") ? "es" : "s"}`;
 }

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/von_mises.hpp"
+
 #include <Eigen/LU>
 #include <cmath>
 #include <vector>
 
 #include "palpate/fem/materials.hpp"
 #include "palpate/fem/tetrahedron.hpp"
-#include "palpate/prediction/predict.hpp"
 
-namespace palpate::prediction {
+namespace palpate::fem {
 namespace {
+
+/// At most ten rows, on the stack: one an element's node.
+template <int Columns>
+using NodeRows = Eigen::Matrix<double, Eigen::Dynamic, Columns, Eigen::ColMajor, 10, Columns>;
 
 /// Derivatives of the shape functions to the barycentric coordinates: nodes x 4.
 Eigen::Matrix<double, Eigen::Dynamic, 4> shape_derivatives(Index nodes, const Eigen::Vector4d& at) {
@@ -19,7 +24,7 @@ Eigen::Matrix<double, Eigen::Dynamic, 4> shape_derivatives(Index nodes, const Ei
   }
   for (int k = 0; k < 4; ++k) d(k, k) = 4 * at(k) - 1;
   for (int e = 0; e < 6; ++e) {
-    const int a = fem::kTetEdges[e][0], b = fem::kTetEdges[e][1];
+    const int a = kTetEdges[e][0], b = kTetEdges[e][1];
     d(4 + e, a) = 4 * at(b);
     d(4 + e, b) = 4 * at(a);
   }
@@ -35,12 +40,18 @@ double von_mises_of(const Mat3& cauchy) {
 
 VectorX von_mises(const TetMesh& mesh, const std::string& material, double young_modulus_pa, double poisson_ratio,
                   const VectorX& extra, const VectorX& displacement_m) {
-  const fem::MaterialLaw& law = fem::material_law(material);
-  const fem::Moduli moduli = fem::moduli(young_modulus_pa, poisson_ratio, extra);
+  const MaterialLaw& law = material_law(material);
+  const Moduli constants = moduli(young_modulus_pa, poisson_ratio, extra);
   const Index nodes = Index(mesh.tetrahedra.cols());
-  const auto points = nodes == 10 ? fem::tet_quadrature_4() : fem::tet_quadrature_1();
+  const auto points = nodes == 10 ? tet_quadrature_4() : tet_quadrature_1();
   VectorX sum = VectorX::Zero(mesh.nodes_m.rows()), weight = sum;
-  MatrixX x(nodes, 3), u(nodes, 3);
+  std::vector<NodeRows<3>> d_reference;  // a point; reference coordinates are the last three barycentric ones
+  for (const auto& point : points) {
+    const auto d = shape_derivatives(nodes, point.barycentric);
+    NodeRows<3>& to = d_reference.emplace_back(nodes, 3);
+    for (int k = 0; k < 3; ++k) to.col(k) = d.col(k + 1) - d.col(0);
+  }
+  NodeRows<3> x(nodes, 3), u(nodes, 3);
   for (Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
     for (Index k = 0; k < nodes; ++k) {
       const Index node = mesh.tetrahedra(t, k);
@@ -48,19 +59,16 @@ VectorX von_mises(const TetMesh& mesh, const std::string& material, double young
       u.row(k) = displacement_m.segment<3>(3 * node);
     }
     double stress = 0, volume = 0;
-    for (const auto& point : points) {
-      const auto d = shape_derivatives(nodes, point.barycentric);
-      // Reference coordinates are the last three barycentric ones.
-      Eigen::Matrix<double, Eigen::Dynamic, 3> d_reference(nodes, 3);
-      for (int k = 0; k < 3; ++k) d_reference.col(k) = d.col(k + 1) - d.col(0);
-      const Mat3 jacobian = x.transpose() * d_reference;  // dx / d reference
-      const Mat3 gradient = u.transpose() * d_reference * jacobian.inverse();
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      const Mat3 jacobian = x.transpose().lazyProduct(d_reference[p]);  // dx / d reference
+      const Mat3 by_reference = u.transpose().lazyProduct(d_reference[p]);
+      const Mat3 gradient = by_reference * jacobian.inverse();
       Mat3 first = Mat3::Zero();
-      if (!std::isfinite(law.energy_and_stress(moduli, gradient, first))) continue;
+      if (!std::isfinite(law.energy_and_stress(constants, gradient, first))) continue;
       const Mat3 f = Mat3::Identity() + gradient;
       // A law of small strains knows no difference between the stresses.
       const Mat3 cauchy = law.is_linear() ? first : Mat3(first * f.transpose() / f.determinant());
-      const double w = point.weight * std::abs(jacobian.determinant());
+      const double w = points[p].weight * std::abs(jacobian.determinant());
       stress += w * von_mises_of(cauchy);
       volume += w;
     }
@@ -72,4 +80,4 @@ VectorX von_mises(const TetMesh& mesh, const std::string& material, double young
   return (weight.array() > 0).select(sum.array() / weight.array().max(1e-300), 0.0);
 }
 
-}  // namespace palpate::prediction
+}  // namespace palpate::fem

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "palpate/estimation/forward_model_parts.hpp"
+#include "palpate/fem/von_mises.hpp"
+
+namespace palpate::estimation {
+
+VectorX ForwardModel::von_mises_pa(std::size_t s, const VectorX& unknowns) {
+  const double young_pa = std::exp(unknowns(log_young));
+  const Memory& memory = memory_[s];
+  VectorX displacement_m;
+  if (memory.valid && memory.unknowns == unknowns) {
+    displacement_m = memory.displacement_m;
+  } else {
+    Body& body = body_of(push(s), worker_of(s));
+    const Coefficients c = coefficients(s, body, unknowns);
+    const auto at = body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion,
+                                        memory.valid ? &memory.displacement_m : nullptr);
+    if (!at.converged) return {};
+    displacement_m = at.displacement_m;
+  }
+  const VectorX at_nodes = fem::von_mises(object_.mesh, object_.material, young_pa, unknowns(poisson), {}, displacement_m);
+  // The surface hangs on the nodes by weights that serve any nodal field: stresses travel as first components.
+  VectorX carried = VectorX::Zero(3 * at_nodes.size());
+  for (Index n = 0; n < at_nodes.size(); ++n) carried(3 * n) = at_nodes(n);
+  const MatrixX on_surface = object_.surface.restrict(carried);
+  VectorX out(object_.surface.vertex_count());
+  // Quadratic shape functions may undershoot between nodes; a von Mises stress is never negative.
+  for (Index v = 0; v < out.size(); ++v) out(v) = std::max(0.0, on_surface(3 * v, 0));
+  return out;
+}
+
+}  // namespace palpate::estimation
