@@ -103,6 +103,7 @@ int estimate(Session& session, const Options& given) {
   for (const auto& warning : recording.warnings) session.warn(warning);
   Identified found = identify(recording, identify_options(given, session), progress);
   Identification& answer = found.answer;
+  answer.provenance["recording path"] = std::filesystem::absolute(given.recording).lexically_normal().string();
   answer.provenance["seed"] = std::to_string(session.seed);
   progress("write", 0);
   if (answer.termination == Termination::cancelled) {

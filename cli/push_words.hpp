@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Planned pushes and their promises in words and JSON, for `suggest` and `explore`.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "palpate/suggest.hpp"
+
+namespace palpate::cli {
+
+/// Half of a 95 % interval: "4.1 %" of E from a standard deviation of log E, "-" where nothing is known.
+std::string percent_95(double log_std);
+/// "0.024"
+std::string plain_95(double std);
+
+/// "push at (0.6000 0.0100 0.1500) along (+0.00 +0.00 -1.00) up to 8.20 N (about 9.10 mm), seen by camera 2"
+std::string push_words(const estimation::RatedPush& push, const PushScene& scene);
+
+/// Standard deviations and half widths of 95 %; null where nothing is known.
+nlohmann::json spread_json(const estimation::ExpectedSpread& spread);
+
+}  // namespace palpate::cli

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Next best push: which push would shrink the interval of E, of nu or of both the most. The Fisher information of every
+// candidate comes from the fit's own forward model and measurement terms, so it holds the same nuisances with the same
+// priors (Chaloner and Verdinelli 1995: Bayesian D-optimality for `both`, c-optimality for one of them).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/core/identification.hpp"
+#include "palpate/core/progress.hpp"
+#include "palpate/estimation/push_candidates.hpp"
+#include "palpate/estimation/terms/term.hpp"
+
+namespace palpate::estimation {
+
+enum class PushGoal { young_modulus, poisson_ratio, both };
+/// "young-modulus", "poisson-ratio", "both". @throws Error listing them.
+PushGoal push_goal(const std::string& name);
+
+/// What a camera (or scanner) sees of the object at rest from one place.
+struct PlannedView {
+  std::string name;
+  TermInput sees;  ///< RayObservation: rays that hit the object; PointCloud: points on it
+};
+
+/// How a push will be measured, with standard deviations.
+struct SensorPlan {
+  std::vector<PlannedView> views;        ///< one of them is chosen with the push
+  std::optional<double> travel_sigma_m;  ///< encoders along the push; nothing: not read
+  double travel_offset_std_m = 0;
+  double force_std_n = 0, force_relative_std = 0, force_tare_std_n = 0;
+  double contact_std_m = 0;
+  double variance_inflation = 1;  ///< of surface points that err together (docs/uncertainty.md)
+  int levels = 4;                 ///< force steps up to the limit; each is a choice of how hard to push
+};
+
+/// What is known of log E and nu before the push.
+struct Knowledge {
+  double young_modulus_pa = 2e4, poisson_ratio = 0.3;  ///< where information is computed
+  MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, force scale), their priors included
+  Eigen::Vector2d uncured = Eigen::Vector2d::Zero();   ///< variance of log E and nu that no push takes away: the mesh's
+  bool touched = false;                                ///< false: nothing but priors, E is a guess
+};
+
+/// Priors alone: nothing of E, the recording's range of nu and scale of force.
+Knowledge before_touch(const Recording& recording, double young_modulus_pa);
+/// The posterior so far. The force's scale is a common error that is held apart: further pushes do not average it out.
+/// @throws Error when the answer has no Young's modulus or Poisson ratio, or no covariance.
+Knowledge after_fit(const Recording& recording, const Identification& answer);
+
+/// Standard deviations of log E and nu.
+struct ExpectedSpread {
+  double log_young_std = 0, poisson_std = 0, correlation = 0;
+  double score(PushGoal goal) const;  ///< what is minimised: a standard deviation, or the root of the determinant
+};
+
+struct RatedPush {
+  PushCandidate candidate;
+  int view = -1;            ///< index in SensorPlan::views; -1: there are none
+  double force_n = 0;       ///< highest
+  double travel_m = 0;      ///< at that force, small strains
+  int steps = 0;            ///< levels up to it
+  double seen_share = 0;    ///< of the surface around the tool, by that view
+  ExpectedSpread expected;  ///< after the push
+  MatrixX information;      ///< that it adds, 3 x 3 as Knowledge's, every nuisance of its own integrated out
+};
+
+struct PushRanking {
+  Knowledge knowledge;
+  PushGoal goal = PushGoal::both;
+  ExpectedSpread so_far;              ///< infinite where nothing is known
+  std::vector<RatedPush> pushes;      ///< best first
+  int out_of_view = 0, too_soft = 0;  ///< candidates left out: no view shows them; supports do not carry the push
+};
+
+struct RankOptions {
+  PushGoal goal = PushGoal::both;
+  PushLimits limits;
+  double least_seen_share = 0.2;  ///< of the surface around the tool
+  int threads = 1;
+};
+
+/// @param scene      supports, environment, tools and priors of the object; its pushes are not looked at
+/// @param object     simulated with small strains, whatever its law: one factorisation for all candidates
+/// @param tool       name in scene.tools
+/// @throws Error as ForwardModel does; on a plan without sensors.
+PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, const std::string& tool,
+                        const std::vector<PushCandidate>& candidates, const SensorPlan& sensors, const Knowledge& knowledge,
+                        const RankOptions& options, const OnProgress& progress = {});
+
+/// What is expected after these pushes on top of what is known.
+ExpectedSpread expected_after(const Knowledge& knowledge, const std::vector<const RatedPush*>& pushes);
+
+/// Indices into ranking.pushes, each the best after those before it; the same push may come twice.
+std::vector<std::size_t> plan_sequence(const PushRanking& ranking, int count);
+
+}  // namespace palpate::estimation

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/suggest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/identify.hpp"
+#include "palpate/sensing/depth_render.hpp"
+#include "palpate/sensing/observe.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double rays_of_fit = 6000;   // a frame, as the fit thins them
+constexpr double rays_of_plan = 1500;  // fewer with more weight say the same
+
+std::string tool_of(const Recording& recording, const std::string& wanted) {
+  std::string round;
+  for (const auto& tool : recording.tools) {
+    const bool fits = (tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc) && tool.radius_m > 0;
+    if (wanted.empty() ? fits : tool.name == wanted) round += (round.empty() ? "" : "\n") + tool.name;
+  }
+  if (round.empty())
+    throw Error(
+        wanted.empty() ? "no round tool (sphere or disc with radius_m): pushes are planned for one" : "no tool of this name",
+        "tools " + wanted);
+  if (round.find('\n') != std::string::npos) throw Error("there are several round tools: say which one is to push", "tools");
+  return round;
+}
+
+Vec3 up_of(const Recording& recording) {
+  return recording.environment.planes.empty() ? Vec3(Vec3::UnitZ()) : recording.environment.planes.front().normal;
+}
+
+Pose looking_at(const Vec3& eye_m, const Vec3& target_m, const Vec3& up) {
+  Pose pose = Pose::Identity();
+  const Vec3 forward = (target_m - eye_m).normalized();
+  const Vec3 right = forward.cross(up).normalized();
+  pose.linear() << right, forward.cross(right), forward;
+  pose.translation() = eye_m;
+  return pose;
+}
+
+/// Cameras of the recording, each pose once.
+std::vector<DepthFrame> cameras_of(const Recording& recording) {
+  std::vector<DepthFrame> cameras;
+  const auto add = [&](const DepthFrame& frame) {
+    for (const auto& known : cameras) {
+      const Pose apart = known.T_base_camera.inverse() * frame.T_base_camera;
+      if (apart.translation().norm() < 0.01 && Eigen::AngleAxisd(apart.linear()).angle() < 0.02) return;
+    }
+    DepthFrame camera = frame;
+    camera.depth_m.resize(0, 0);
+    camera.mask.resize(0, 0);
+    cameras.push_back(std::move(camera));
+  };
+  for (const auto& push : recording.pushes)
+    for (const auto& step : push.steps)
+      for (const auto& observation : step.observations)
+        if (const auto* frame = std::get_if<DepthFrame>(&observation)) add(*frame);
+  if (cameras.empty())
+    for (const auto& view : recording.rest.views) add(view);
+  return cameras;
+}
+
+const PointCloud* cloud_of(const Recording& recording) {
+  const PointCloud* found = nullptr;
+  for (const auto& push : recording.pushes)
+    for (const auto& step : push.steps)
+      for (const auto& observation : step.observations)
+        if (const auto* cloud = std::get_if<PointCloud>(&observation))
+          if (found == nullptr || cloud->points_m.rows() > found->points_m.rows()) found = cloud;
+  return found;
+}
+
+/// What a camera sees of the object at rest, with the weight of all the rays that the fit would use.
+std::optional<estimation::RayObservation> rays_of(DepthFrame camera, const TriMesh& surface,
+                                                  const Environment& environment) {
+  for (const Plane& plane : environment.planes)
+    if (plane.normal.dot(camera.T_base_camera.translation() - plane.point_m) <= 0) return std::nullopt;
+  camera.depth_m = sensing::render_depth({{&surface, Pose::Identity()}}, camera.camera, camera.T_base_camera);
+  sensing::ObserveOptions options;
+  const double all = static_cast<double>(sensing::observe(camera, environment, options).range_m.size());
+  const auto stride = [&](double wanted) { return std::max(1, static_cast<int>(std::floor(std::sqrt(all / wanted)))); };
+  options.back_projection.stride_px = stride(rays_of_plan);
+  estimation::RayObservation view;
+  view.rays = sensing::observe(camera, environment, options);
+  if (view.rays.range_m.size() == 0) return std::nullopt;
+  const double of_fit = all / std::pow(stride(rays_of_fit), 2);
+  view.rays.sigma_m *= std::sqrt(static_cast<double>(view.rays.range_m.size()) / of_fit);
+  view.pose_std_m = camera.pose_std_m;
+  view.pose_std_rad = camera.pose_std_rad;
+  view.bias_std_m = camera.noise.bias_std_m;
+  return view;
+}
+
+PointCloud on_surface(const PointCloud& cloud, const TriMesh& surface) {
+  const geometry::TriangleTree tree(surface);
+  const Index every = std::max<Index>(1, static_cast<Index>(static_cast<double>(cloud.points_m.rows()) / rays_of_plan));
+  PointCloud out = cloud;
+  out.normals.resize(0, 3);
+  const Index count = (static_cast<Index>(cloud.points_m.rows()) + every - 1) / every;
+  out.points_m.resize(count, 3);
+  const double sigma_m = cloud.sigma_m.size() > 0 ? cloud.sigma_m.mean() : 0;
+  if (!(sigma_m > 0)) throw Error("the cloud needs its standard deviation", "observations: cloud.sigma_m");
+  out.sigma_m = VectorX::Constant(1, sigma_m / std::sqrt(static_cast<double>(every)));
+  for (Index i = 0; i < count; ++i) out.points_m.row(i) = tree.closest(cloud.points_m.row(i * every)).point_m;
+  return out;
+}
+
+/// Errors of force and travel as the last push stated them.
+estimation::SensorPlan errors_of(const Recording& recording, std::vector<std::string>& warnings) {
+  estimation::SensorPlan sensors;
+  for (auto push = recording.pushes.rbegin(); push != recording.pushes.rend(); ++push) {
+    for (const auto& step : push->steps) {
+      if (step.loads.empty() || !step.loads[0].force_n) continue;
+      sensors.force_std_n = step.loads[0].force_std_n;
+      sensors.force_relative_std = step.loads[0].force_relative_std;
+      sensors.contact_std_m = step.loads[0].contact_std_m;
+      sensors.force_tare_std_n = push->force_tare_std_n;
+      sensors.travel_offset_std_m = push->travel_offset_std_m;
+      for (const auto& observation : step.observations)
+        if (const auto* travel = std::get_if<ToolTravel>(&observation)) sensors.travel_sigma_m = travel->sigma_m;
+      return sensors;
+    }
+  }
+  sensors.force_std_n = 0.03;
+  sensors.force_tare_std_n = 0.05;
+  sensors.contact_std_m = 0.001;
+  warnings.push_back(
+      "no push with a force says how well the sensors measure: 0.03 N of noise, 0.05 N of tare, a contact point known to 1 "
+      "mm "
+      "and no encoder were assumed");
+  return sensors;
+}
+
+void add_views(PushScene& scene, const Recording& recording, const SuggestOptions& options) {
+  const TriMesh& surface = scene.simulated.surface.rest();
+  const Vec3 low = surface.vertices_m.colwise().minCoeff(), high = surface.vertices_m.colwise().maxCoeff();
+  const Vec3 middle = 0.5 * (low + high), up = up_of(recording);
+  std::vector<DepthFrame> cameras = options.cameras.empty() ? cameras_of(recording) : options.cameras;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < cameras.size(); ++i) names.push_back("camera " + std::to_string(i + 1));
+  const PointCloud* cloud = cameras.empty() ? cloud_of(recording) : nullptr;
+  int more = options.viewpoints;
+  if (cameras.empty() && cloud == nullptr) {
+    DepthFrame camera;
+    camera.camera = {640, 480, 606, 606, 319.5, 239.5, DistortionModel::none, {}};
+    camera.noise.model = "realsense_d435";
+    camera.pose_std_m = camera.pose_std_rad = 5e-4;
+    const Vec3 aside = up.unitOrthogonal();
+    camera.T_base_camera =
+        looking_at(middle + std::max(0.5, 2.5 * (high - low).norm()) * (aside + up).normalized(), middle, up);
+    cameras = {camera};
+    names = {"camera"};
+    more = std::max(more, 3);
+    scene.warnings.push_back("no camera is known: one like a RealSense D435 was assumed, at four places around the object");
+  }
+  for (int k = 1; k <= more && !cameras.empty(); ++k) {
+    const double angle = 2 * EIGEN_PI * k / (more + 1);
+    DepthFrame turned = cameras.front();
+    const Eigen::AngleAxisd turn(angle, up);
+    turned.T_base_camera.linear() = turn * cameras.front().T_base_camera.linear();
+    turned.T_base_camera.translation() = middle + turn * (cameras.front().T_base_camera.translation() - middle);
+    cameras.push_back(turned);
+    names.push_back(names.front() + " turned by " + std::to_string(std::lround(angle * 180 / EIGEN_PI)) + " degrees");
+  }
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    auto rays = rays_of(cameras[i], surface, recording.environment);
+    if (!rays) {
+      scene.warnings.push_back(names[i] + " sees nothing of the object, or stands behind a plane");
+      continue;
+    }
+    scene.sensors.views.push_back({names[i], std::move(*rays)});
+    scene.viewpoints.push_back({names[i], cameras[i].T_base_camera});
+  }
+  if (cloud != nullptr) {
+    scene.sensors.views.push_back({"cloud", on_surface(*cloud, surface)});
+    scene.viewpoints.push_back({"cloud", std::nullopt});
+  }
+}
+
+}  // namespace
+
+PushScene prepare_pushes(const Recording& recording, const SuggestOptions& options, const OnProgress& progress) {
+  PushScene scene;
+  scene.tool = tool_of(recording, options.tool);
+  scene.object = recording;
+  scene.object.pushes.clear();
+  scene.object.model.refine = "none";  // candidates are everywhere
+  scene.simulated = build_simulated_object(scene.object, progress);
+  scene.sensors = options.sensors ? *options.sensors : errors_of(recording, scene.warnings);
+  scene.sensors.views.clear();
+  add_views(scene, recording, options);
+
+  std::vector<Index> held;
+  for (const auto& support : scene.object.supports) {
+    const auto nodes = fem::support_nodes(scene.simulated.mesh, support);
+    held.insert(held.end(), nodes.begin(), nodes.end());
+  }
+  const auto tool =
+      std::find_if(recording.tools.begin(), recording.tools.end(), [&](const Tool& t) { return t.name == scene.tool; });
+  const estimation::PushSpace space(scene.simulated.surface.rest(), scene.object,
+                                    scene.simulated.mesh.nodes_m(held, Eigen::all), *tool, options.candidates);
+  if (options.only.empty()) {
+    scene.candidates = space.sample(&scene.refused);
+  } else {
+    for (estimation::PushCandidate candidate : options.only) {
+      const std::string word = space.refusal(candidate);
+      if (word.empty())
+        scene.candidates.push_back(candidate);
+      else
+        ++scene.refused[word];
+    }
+  }
+  if (scene.candidates.empty()) {
+    std::string reasons;
+    for (const auto& [word, count] : scene.refused)
+      reasons += (reasons.empty() ? "" : ", ") + word + " (" + std::to_string(count) + ")";
+    throw Error("no push is possible: " + reasons + "; loosen the limits (tilt, stick length, tool radius)", "candidates");
+  }
+  return scene;
+}
+
+estimation::PushRanking suggest(const PushScene& scene, const Identification* so_far, const SuggestOptions& options,
+                                const OnProgress& progress) {
+  estimation::SensorPlan sensors = scene.sensors;
+  const estimation::Knowledge knowledge = so_far != nullptr
+                                              ? estimation::after_fit(scene.object, *so_far)
+                                              : estimation::before_touch(scene.object, options.young_modulus_pa);
+  if (so_far != nullptr) {
+    const auto inflation = so_far->provenance.find("variance inflation of correlated points");
+    if (inflation != so_far->provenance.end())
+      sensors.variance_inflation = std::max(1.0, std::strtod(inflation->second.c_str(), nullptr));
+  }
+  estimation::RankOptions rank;
+  rank.goal = options.goal;
+  rank.limits = options.candidates.limits;
+  rank.threads = options.threads;
+  return estimation::rank_pushes(scene.object, scene.simulated, scene.tool, scene.candidates, sensors, knowledge, rank,
+                                 progress);
+}
+
+}  // namespace palpate

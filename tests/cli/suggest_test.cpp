@@ -1,0 +1,117 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// `palpate suggest` before the first touch, on an object that nobody has pushed.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "palpate/io/recording.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace palpate;
+
+/// A box of 100 x 80 x 90 mm on a table, seen from one side; nothing was pushed yet.
+Recording box_on_table() {
+  Recording recording;
+  recording.name = "box";
+  TriMesh box;
+  box.vertices_m.resize(8, 3);
+  for (int i = 0; i < 8; ++i) box.vertices_m.row(i) << 0.5 + 0.1 * (i & 1), 0.08 * ((i >> 1) & 1), 0.09 * (i >> 2);
+  box.triangles.resize(12, 3);
+  box.triangles << 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7,
+      5;
+  recording.rest.surface = box;
+  Support table;
+  table.kind = SupportKind::plane;
+  table.name = "table";
+  table.plane = {Vec3::Zero(), Vec3::UnitZ()};
+  table.tolerance_m = 0.002;
+  recording.supports = {table};
+  recording.environment.planes = {table.plane};
+  recording.force_scale_std = 0.01;
+  Tool stick;
+  stick.name = "stick";
+  stick.shape = ToolShape::disc;
+  stick.radius_m = 0.015;
+  recording.tools = {stick};
+  return recording;
+}
+
+struct Answer {
+  int exit_code = -1;
+  nlohmann::json json;
+};
+
+Answer suggest(const std::string& folder, const std::string& options) {
+  const fs::path out = fs::path(testing::TempDir()) / "palpate_suggest.json";
+  const std::string command = std::string(PALPATE_CLI) + " suggest " + folder + " --json --quiet --contacts 6 --tilts 1 " +
+                              options + " > " + out.string() + " 2> /dev/null";
+  Answer answer;
+  answer.exit_code = WEXITSTATUS(std::system(command.c_str()));
+  std::ifstream file(out);
+  answer.json = nlohmann::json::parse(file, nullptr, false);
+  return answer;
+}
+
+class Suggest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = (fs::path(testing::TempDir()) / "palpate_suggest_box").string();
+    fs::remove_all(folder_);
+    io::write_recording(box_on_table(), folder_);
+  }
+  std::string folder_;
+};
+
+TEST_F(Suggest, BeforeTheFirstTouchPushesAreSortedAndWithinTheLimits) {
+  const Answer answer = suggest(folder_, "--for poisson-ratio --force-limit 2.5");
+  ASSERT_EQ(answer.exit_code, 0);
+  EXPECT_FALSE(answer.json["touched"].get<bool>());
+  EXPECT_TRUE(answer.json["so_far"]["log_young_std"].is_null()) << "nothing is known of E";
+  // A camera was made up, and so were the sensors' errors: both are said.
+  EXPECT_EQ(answer.json["warnings"].size(), 2u);
+  EXPECT_EQ(answer.json["views"].size(), 4u);
+  ASSERT_GT(answer.json["pushes"].size(), 10u);
+  double last = 0;
+  for (const auto& push : answer.json["pushes"]) {
+    EXPECT_LE(push["force_n"].get<double>(), 2.5 * (1 + 1e-12));
+    EXPECT_GT(push["force_n"].get<double>(), 0.1);
+    EXPECT_LT(push["direction"][2].get<double>(), 0.3) << "from above or from the side";
+    EXPECT_GT(push["contact_m"][2].get<double>(), 0.0);
+    const double std = push["expected"]["poisson_std"];
+    EXPECT_GE(std, last);
+    last = std;
+  }
+  EXPECT_LT(answer.json["pushes"][0]["expected"]["poisson_std"].get<double>(), 0.1);
+  ASSERT_EQ(answer.json["sequence"].size(), 3u);
+  EXPECT_LT(answer.json["sequence"][2]["expected"]["poisson_std"], answer.json["sequence"][0]["expected"]["poisson_std"]);
+}
+
+TEST_F(Suggest, SameSeedSameAnswerAndIntervalsHardlyDependOnTheGuess) {
+  const Answer once = suggest(folder_, "--for young-modulus"), again = suggest(folder_, "--for young-modulus");
+  ASSERT_EQ(once.exit_code, 0);
+  EXPECT_EQ(once.json, again.json);
+  // Twice as stiff, twice the force, the same deformation: only the force's own errors weigh less.
+  const Answer stiffer = suggest(folder_, "--for young-modulus --young-modulus 40000");
+  const auto &soft = once.json["pushes"][0], &stiff = stiffer.json["pushes"][0];
+  EXPECT_NEAR(stiff["force_n"].get<double>() / soft["force_n"].get<double>(), 2, 1e-6);
+  EXPECT_NEAR(stiff["travel_m"].get<double>(), soft["travel_m"].get<double>(), 1e-9);
+  EXPECT_NEAR(std::log(stiff["expected"]["poisson_std"].get<double>() / soft["expected"]["poisson_std"].get<double>()), 0,
+              0.1);
+}
+
+TEST_F(Suggest, APlaceThatNoToolReachesIsAnInputErrorThatSaysWhy) {
+  EXPECT_EQ(suggest(folder_, "--contact 0.55 0.04 0.09").exit_code, 0);
+  const Answer below = suggest(folder_, "--contact 0.55 0.04 0 --direction 0 0 1");
+  EXPECT_EQ(below.exit_code, 3);
+  EXPECT_THAT(below.json["error"]["message"].get<std::string>(), testing::HasSubstr("no push is possible"));
+}
+
+}  // namespace

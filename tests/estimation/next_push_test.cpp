@@ -1,0 +1,203 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// What a planned push promises against what it delivers: the push is made on a finer mesh, with errors of every sensor, and
+// fitted.
+#include "palpate/estimation/next_push.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "palpate/core/error.hpp"
+#include "planned_scene.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+Knowledge untouched() { return before_touch(block_on_table(), true_young_pa); }
+
+PushRanking ranked(const std::vector<PushCandidate>& candidates, const Knowledge& knowledge, PushGoal goal) {
+  const SimulatedObject object = block_object(1);
+  RankOptions options;
+  options.goal = goal;
+  return rank_pushes(block_on_table(), object, "pad", candidates, block_sensors(object.surface.rest()), knowledge, options);
+}
+
+std::vector<double> ranks(const std::vector<double>& values) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+  std::vector<double> rank(values.size());
+  for (std::size_t i = 0; i < order.size(); ++i) rank[order[i]] = static_cast<double>(i);
+  return rank;
+}
+
+/// Spearman's.
+double rank_correlation(const std::vector<double>& a, const std::vector<double>& b) {
+  const auto ra = ranks(a), rb = ranks(b);
+  const double n = static_cast<double>(a.size()), mean = 0.5 * (n - 1);
+  double ab = 0, aa = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    ab += (ra[i] - mean) * (rb[i] - mean);
+    aa += (ra[i] - mean) * (ra[i] - mean);
+  }
+  return ab / aa;
+}
+
+TEST(NextPush, PromisesWhatAFitOfTheRealPushDelivers) {
+  const auto candidates = block_candidates(6, 1);
+  ASSERT_GE(candidates.size(), 6u);
+  const PushRanking ranking = ranked(candidates, untouched(), PushGoal::young_modulus);
+  const SensorPlan sensors = block_sensors(block_object(1).surface.rest());
+  std::vector<double> promised_e, delivered_e, promised_nu, delivered_nu;
+  for (const RatedPush& push : ranking.pushes) {
+    if (push.steps == 2) continue;  // two forces a place are enough to fit
+    MadePushes made(static_cast<unsigned>(promised_e.size() + 1));
+    made.make(push, sensors);
+    const Identification answer = made.fitted();
+    ASSERT_EQ(answer.termination, Termination::converged) << answer.message;
+    const double young_std = std::sqrt(answer.covariance(0, 0)), poisson_std = std::sqrt(answer.covariance(1, 1));
+    promised_e.push_back(push.expected.log_young_std);
+    delivered_e.push_back(young_std);
+    promised_nu.push_back(push.expected.poisson_std);
+    delivered_nu.push_back(poisson_std);
+    std::printf(
+        "at (%.3f %.3f %.3f) along (%+.2f %+.2f %+.2f) %.2f N %.1f mm: log E %.4f promised, %.4f delivered; nu %.4f, %.4f\n",
+        push.candidate.contact_m.x(), push.candidate.contact_m.y(), push.candidate.contact_m.z(),
+        push.candidate.direction.x(), push.candidate.direction.y(), push.candidate.direction.z(), push.force_n,
+        1e3 * push.travel_m, push.expected.log_young_std, young_std, push.expected.poisson_std, poisson_std);
+    EXPECT_LT(std::abs(std::log(push.expected.log_young_std / young_std)), std::log(1.5));
+    EXPECT_LT(std::abs(std::log(push.expected.poisson_std / poisson_std)), std::log(1.5));
+  }
+  ASSERT_GE(promised_e.size(), 10u);
+  EXPECT_GT(rank_correlation(promised_e, delivered_e), 0.8);
+  EXPECT_GT(rank_correlation(promised_nu, delivered_nu), 0.8);
+}
+
+TEST(NextPush, SecondPushDeliversWhatWasPromisedAfterTheFirst) {
+  const auto candidates = block_candidates(6, 1);
+  const SensorPlan sensors = block_sensors(block_object(1).surface.rest());
+  const PushRanking first = ranked(candidates, untouched(), PushGoal::both);
+  MadePushes made(3);
+  made.make(first.pushes.back(), sensors);  // the worst leaves something to do
+  const Identification before = made.fitted();
+  const Knowledge known = after_fit(made.recording(), before);
+  const PushRanking second = ranked(candidates, known, PushGoal::both);
+  EXPECT_NEAR(second.so_far.log_young_std, std::sqrt(before.covariance(0, 0)), 1e-6);
+  EXPECT_NEAR(second.so_far.poisson_std, std::sqrt(before.covariance(1, 1)), 1e-6);
+  made.make(second.pushes.front(), sensors);
+  const Identification after = made.fitted();
+  const ExpectedSpread& promised = second.pushes.front().expected;
+  std::printf("before %.4f %.4f, promised %.4f %.4f, delivered %.4f %.4f\n", second.so_far.log_young_std,
+              second.so_far.poisson_std, promised.log_young_std, promised.poisson_std, std::sqrt(after.covariance(0, 0)),
+              std::sqrt(after.covariance(1, 1)));
+  EXPECT_LT(promised.log_young_std, second.so_far.log_young_std);
+  EXPECT_LT(std::abs(std::log(promised.log_young_std / std::sqrt(after.covariance(0, 0)))), std::log(1.5));
+  EXPECT_LT(std::abs(std::log(promised.poisson_std / std::sqrt(after.covariance(1, 1)))), std::log(1.5));
+}
+
+TEST(NextPush, HarderPushesPromiseMoreAndNothingLiesOutsideTheLimits) {
+  const auto candidates = block_candidates(8, 2);
+  const PushRanking ranking = ranked(candidates, untouched(), PushGoal::both);
+  const PushLimits limits;
+  std::map<std::pair<double, double>, std::vector<const RatedPush*>> at;
+  for (const RatedPush& push : ranking.pushes) {
+    EXPECT_LE(push.force_n, limits.force_n);
+    EXPECT_LE(push.travel_m, limits.travel_m);
+    EXPECT_LE(push.travel_m, limits.thickness_share * push.candidate.thickness_m * 1.02);
+    EXPECT_LE(push.force_n, 1.0001 * limits.pressure_over_young * true_young_pa * EIGEN_PI * 0.012 * 0.012);
+    EXPECT_GE(push.seen_share, 0.2);
+    at[{push.candidate.contact_m.x() + 7 * push.candidate.contact_m.y() + 49 * push.candidate.contact_m.z(),
+        push.candidate.direction.x() + 3 * push.candidate.direction.y()}]
+        .push_back(&push);
+  }
+  for (auto& [place, pushes] : at) {
+    ASSERT_EQ(pushes.size(), 3u);
+    std::sort(pushes.begin(), pushes.end(), [](const auto* a, const auto* b) { return a->force_n < b->force_n; });
+    for (std::size_t i = 1; i < pushes.size(); ++i) {
+      EXPECT_LT(pushes[i]->expected.log_young_std, pushes[i - 1]->expected.log_young_std);
+      EXPECT_LE(pushes[i]->expected.poisson_std, pushes[i - 1]->expected.poisson_std * (1 + 1e-9));
+    }
+  }
+}
+
+TEST(NextPush, LimitsOfTheRobotBind) {
+  const SimulatedObject object = block_object(1);
+  RankOptions options;
+  options.limits.force_n = 0.3;
+  const auto candidates = block_candidates(3, 0);
+  const SensorPlan sensors = block_sensors(object.surface.rest());
+  const PushRanking weak = rank_pushes(block_on_table(), object, "pad", candidates, sensors, untouched(), options);
+  for (const RatedPush& push : weak.pushes) EXPECT_LE(push.force_n, 0.3 * (1 + 1e-12));
+  options.limits = {};
+  options.limits.travel_m = 0.001;
+  const PushRanking shallow = rank_pushes(block_on_table(), object, "pad", candidates, sensors, untouched(), options);
+  for (const RatedPush& push : shallow.pushes) EXPECT_LE(push.travel_m, 0.00101);
+}
+
+TEST(NextPush, NothingIsSuggestedThroughTheTableOrWhereTheCameraSeesNothing) {
+  std::map<std::string, int> refused;
+  for (const auto& candidate : block_candidates(20, 4, &refused)) {
+    EXPECT_LT(candidate.direction.z(), 0.35) << "from below";
+    EXPECT_GT(candidate.contact_m.z(), 0.006);
+    EXPECT_GT(candidate.thickness_m, 0.012);
+    // The hand, 0.3 m behind the tip, stays above the table.
+    EXPECT_GT((candidate.contact_m - 0.3 * candidate.direction).z(), 0.0);
+  }
+  EXPECT_GT(refused["held"] + refused["behind a plane"], 0) << "the bottom is part of the surface";
+  EXPECT_GT(refused["uneven"], 0) << "so are the edges";
+  // The camera stands at -x, -y: the faces at +x and +y are hidden from it.
+  std::vector<PushCandidate> hidden(2);
+  hidden[0].contact_m = Vec3(0.08, 0.04, 0.04);
+  hidden[0].direction = -Vec3::UnitX();
+  hidden[1].contact_m = Vec3(0.04, 0.08, 0.04);
+  hidden[1].direction = -Vec3::UnitY();
+  const PushRanking ranking = ranked(hidden, untouched(), PushGoal::both);
+  EXPECT_TRUE(ranking.pushes.empty());
+  EXPECT_EQ(ranking.out_of_view, 2);
+}
+
+TEST(NextPush, ASecondViewIsChosenWhereItSeesMore) {
+  const SimulatedObject object = block_object(1);
+  SensorPlan sensors = block_sensors(object.surface.rest());
+  sensors.views.push_back({"behind", look(object.surface.rest(), Vec3(0.33, 0.43, 0.4))});
+  std::vector<PushCandidate> hidden(1);
+  hidden[0].contact_m = Vec3(0.08, 0.04, 0.04);
+  hidden[0].direction = -Vec3::UnitX();
+  hidden[0].thickness_m = 0.08;
+  const PushRanking ranking = rank_pushes(block_on_table(), object, "pad", hidden, sensors, untouched(), {});
+  ASSERT_FALSE(ranking.pushes.empty());
+  for (const RatedPush& push : ranking.pushes) EXPECT_EQ(push.view, 1);
+}
+
+TEST(NextPush, ASequenceNeverGetsWorseAndForceScaleIsNotAveragedOut) {
+  const PushRanking ranking = ranked(block_candidates(6, 1), untouched(), PushGoal::both);
+  const auto order = plan_sequence(ranking, 30);
+  ASSERT_EQ(order.size(), 30u);
+  EXPECT_EQ(order[0], 0u);
+  std::vector<const RatedPush*> made;
+  double last = 1e300;
+  ExpectedSpread after;
+  for (const std::size_t i : order) {
+    made.push_back(&ranking.pushes[i]);
+    after = expected_after(ranking.knowledge, made);
+    EXPECT_LE(after.score(PushGoal::both), last);
+    last = after.score(PushGoal::both);
+  }
+  EXPECT_GT(after.log_young_std, 0.01);  // force_scale_std
+  EXPECT_LT(after.log_young_std, 0.02);
+}
+
+TEST(NextPush, BadPlansAreRefused) {
+  EXPECT_THROW(push_goal("density"), Error);
+  EXPECT_THROW(before_touch(block_on_table(), 0), Error);
+  EXPECT_THROW(after_fit(block_on_table(), Identification{}), Error);
+  Recording scene = block_on_table();
+  scene.tools[0].shape = ToolShape::platen;
+  EXPECT_THROW(PushSpace(block_object(1).surface.rest(), scene, Points(0, 3), scene.tools[0], {}), Error);
+  EXPECT_THROW(rank_pushes(block_on_table(), block_object(1), "pad", block_candidates(1, 0), {}, untouched(), {}), Error);
+}
+
+}  // namespace
+}  // namespace palpate::estimation
