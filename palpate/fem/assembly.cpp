@@ -236,13 +236,13 @@ void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX
           sum.segment<3>(3 * slot_[static_cast<std::size_t>(e) * N + a]) += weight * part.gradient * g.row(a).transpose();
       }
     }
-    c *= weight;
     double* block = local;
     for (int b = 0; b < N; ++b) {
       // D(ij, k) = sum_l C(ij, kl) G_bl, then K_ab(i, k) = sum_j G_aj D(ij, k).
       Eigen::Matrix<double, 9, 3> d;
+      const Vec3 gb = weight * g.row(b).transpose();
       d.noalias() =
-          g(b, 0) * c.template leftCols<3>() + g(b, 1) * c.template middleCols<3>(3) + g(b, 2) * c.template rightCols<3>();
+          gb(0) * c.template leftCols<3>() + gb(1) * c.template middleCols<3>(3) + gb(2) * c.template rightCols<3>();
       for (int a = b; a < N; ++a, block += 9)
         Eigen::Map<Mat3>(block).noalias() +=
             g(a, 0) * d.template topRows<3>() + g(a, 1) * d.template middleRows<3>(3) + g(a, 2) * d.template bottomRows<3>();

@@ -62,6 +62,7 @@ struct LinearSolver::Impl {
   State factor_state = State::stale, small_state = State::stale, rigid_state = State::stale;
   bool blocks_current = false;
 
+  double tolerance = 0;         // of the present solve
   double known_iterations = 0;  // of the last iterative solve, 0: none yet
   double matrices = 0;          // that have been set
 
@@ -170,11 +171,11 @@ struct LinearSolver::Impl {
         if (norm > 0) outcome.residual = std::max(outcome.residual, correction.col(c).norm() / norm);
         if (!correction.col(c).allFinite()) outcome.residual = std::numeric_limits<double>::infinity();
       }
-      if (outcome.residual <= options.tolerance || step == 3) break;
+      if (outcome.residual <= tolerance || step == 3) break;
       factor->solve(correction.data(), correction.cols(), correction.outerStride());
       x += correction;
     }
-    outcome.solved = outcome.residual <= options.tolerance;
+    outcome.solved = outcome.residual <= tolerance;
     if (!outcome.solved) outcome.reason = "the matrix is nearly singular: the residual stays above the tolerance";
     return outcome;
   }
@@ -195,7 +196,7 @@ struct LinearSolver::Impl {
         for (Eigen::Index u = 0; u < x.rows(); ++u) solution[padded[static_cast<std::size_t>(u)]] = (*start)(u, done);
       }
       const ConjugateGradientsResult result =
-          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, options.tolerance, max_iterations, threads);
+          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, tolerance, max_iterations, threads);
       outcome.iterations = std::max(outcome.iterations, result.iterations);
       outcome.residual = std::max(outcome.residual, result.residual);
       if (!result.converged) {
@@ -270,8 +271,10 @@ void LinearSolver::set_matrix(const Eigen::SparseMatrix<double>& lower) {
   impl.factor_state = impl.small_state = impl.rigid_state = Impl::State::stale;
 }
 
-LinearSolver::Outcome LinearSolver::solve_in_place(Eigen::Ref<MatrixX> right_hand_sides, const MatrixX* start) {
+LinearSolver::Outcome LinearSolver::solve_in_place(Eigen::Ref<MatrixX> right_hand_sides, const MatrixX* start,
+                                                   double tolerance) {
   Impl& impl = *impl_;
+  impl.tolerance = tolerance > 0 ? tolerance : impl.options.tolerance;
   if (!impl.has_values) throw Error("call set_matrix() first", "LinearSolver::solve_in_place");
   if (right_hand_sides.rows() != impl.lower.cols()) {
     throw Error("right-hand sides have " + std::to_string(right_hand_sides.rows()) + " rows, the matrix has " +

@@ -60,7 +60,8 @@ class LinearSolver {
 
   /// Replaces right-hand sides by solutions (when not solved: by the best that was found, or left as they were).
   /// @param start  starting points of iterative methods, same shape; nullptr: zero
-  Outcome solve_in_place(Eigen::Ref<MatrixX> right_hand_sides, const MatrixX* start = nullptr);
+  /// @param tolerance  of this solve; 0: that of the options
+  Outcome solve_in_place(Eigen::Ref<MatrixX> right_hand_sides, const MatrixX* start = nullptr, double tolerance = 0);
 
   /// Negative pivots of the last direct factorisation in indefinite mode (Sylvester: negative eigenvalues).
   int negative_pivots() const;

@@ -17,6 +17,7 @@ ReducedSystem::ReducedSystem(const BlockPattern& pattern, const std::vector<Cons
       special_(pattern.nodes, -1),
       constraints_(constraints),
       factor_(SparseFactor::Options{false, 3, threads}),
+      nodes_m_(nodes_m),
       threads_(threads) {
   for (const Constraint& c : constraints_) {
     if (c.count == 3) {
@@ -85,7 +86,6 @@ void ReducedSystem::analyse(const BlockPattern& pattern) {
   const std::vector<double> values(inner.size(), 0.0);
   lower_ = Eigen::Map<const Eigen::SparseMatrix<double>>(n, n, static_cast<Index>(inner.size()), outer.data(), inner.data(),
                                                          values.data());
-  factor_.analyse(lower_);
 }
 
 void ReducedSystem::fill(const BlockPattern& pattern, const BlockValues& blocks, double shift) {
@@ -134,6 +134,8 @@ void ReducedSystem::fill(const BlockPattern& pattern, const BlockValues& blocks,
 bool ReducedSystem::factorise(const BlockPattern& pattern, const BlockValues& blocks, double shift, int negative) {
   use_indefinite_ = false;
   if (negative == 0) {
+    if (!analysed_) factor_.analyse(lower_);
+    analysed_ = true;
     fill(pattern, blocks, shift);
     if (factor_.factorise(lower_)) return complete_border();
     if (border_.cols() == 0) return false;
@@ -219,6 +221,45 @@ MatrixX ReducedSystem::solve(const MatrixX& right_hand_sides) const {
     reduced -= border_solution_ * (schur_inverse_ * t);
   }
   return expand(reduced);
+}
+
+bool ReducedSystem::takes_any_method() const {
+  // Pressures stand behind the mesh's nodes: their matrix is not definite.
+  return border_.cols() == 0 && static_cast<Index>(kept_.size()) == nodes_;
+}
+
+UnknownPlacement ReducedSystem::placement() const {
+  UnknownPlacement out{Points(lower_.cols(), 3), Points::Zero(lower_.cols(), 3)};
+  for (Index reduced = 0; reduced < static_cast<Index>(kept_nodes_.size()); ++reduced) {
+    const Index node = kept_nodes_[static_cast<std::size_t>(reduced)];
+    const int special = special_[static_cast<std::size_t>(node)];
+    for (int k = 0; k < 3; ++k) {
+      out.point_m.row(3 * reduced + k) = nodes_m_.row(node);
+      if (special < 0)
+        out.direction(3 * reduced + k, k) = 1;
+      else if (k >= partial_[static_cast<std::size_t>(special)].count)  // what is held takes part in no rigid motion
+        out.direction.row(3 * reduced + k) = partial_[static_cast<std::size_t>(special)].axes.col(k).transpose();
+    }
+  }
+  return out;
+}
+
+void ReducedSystem::set_matrix(const BlockPattern& pattern, const BlockValues& blocks, double shift) {
+  if (!any_) {
+    LinearSolver::Options options;
+    options.threads = threads_;
+    any_.emplace(options);
+    any_->analyse(lower_, placement());
+  }
+  fill(pattern, blocks, shift);
+  any_->set_matrix(lower_);
+}
+
+LinearSolver::Outcome ReducedSystem::solve_by_any(const MatrixX& right_hand_sides, double tolerance, MatrixX& du) {
+  MatrixX reduced = reduce(right_hand_sides);
+  const LinearSolver::Outcome outcome = any_->solve_in_place(reduced, nullptr, tolerance);
+  du = expand(reduced);
+  return outcome;
 }
 
 MatrixX rigid_motions(const Points& nodes_m) {

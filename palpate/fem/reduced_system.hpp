@@ -9,6 +9,7 @@
 
 #include "palpate/core/math.hpp"
 #include "palpate/fem/assembly.hpp"
+#include "palpate/fem/linear_solver.hpp"
 #include "palpate/fem/sparse_factor.hpp"
 #include "palpate/fem/statics.hpp"
 
@@ -36,8 +37,17 @@ class ReducedSystem {
   /// du (3n x c) with K_ff du_f = rhs_f, du_c = 0 (free object: rigid part of du zero, inertia balances rhs).
   MatrixX solve(const MatrixX& right_hand_sides) const;
 
+  /// True for held bodies without pressures: `set_matrix` and `solve_by_any` then take whatever is cheapest (conjugate
+  /// gradients, single or double precision factor; LinearSolver).
+  bool takes_any_method() const;
+  Index unknowns() const { return static_cast<Index>(lower_.cols()); }
+  void set_matrix(const BlockPattern& pattern, const BlockValues& blocks, double shift);
+  /// As `solve`, to a relative residual. Not solved: du is not to be used, the outcome says whether the matrix is to blame.
+  LinearSolver::Outcome solve_by_any(const MatrixX& right_hand_sides, double tolerance, MatrixX& du);
+
  private:
   void analyse(const BlockPattern& pattern);
+  UnknownPlacement placement() const;
   void fill(const BlockPattern& pattern, const BlockValues& blocks, double shift);
   MatrixX reduce(const MatrixX& full) const;
   MatrixX expand(const MatrixX& reduced) const;
@@ -56,6 +66,9 @@ class ReducedSystem {
   std::vector<Constraint> constraints_;
   Eigen::SparseMatrix<double> lower_;
   SparseFactor factor_;
+  bool analysed_ = false;            // factor_
+  std::optional<LinearSolver> any_;  // made when first needed
+  Points nodes_m_;
   std::optional<SparseFactor> indefinite_;  // made when a tangent is first met that is not positive definite
   bool use_indefinite_ = false;
   int threads_ = 1;

@@ -10,17 +10,23 @@ namespace {
 
 // Rotation of F = R S with det R = +1 (inverted elements included: S then has a negative eigenvalue).
 Mat3 polar_rotation(const Mat3& f) {
-  const double det = f.determinant();
-  if (det > 1e-3 * std::pow(f.squaredNorm() / 3, 1.5)) {
-    // Scaled Newton iteration (Higham 1986): quadratic, five or six steps at the strains of a push.
+  const double size = f.squaredNorm() / 3;
+  if (f.determinant() > 1e-3 * size * std::sqrt(size)) {
+    // Newton's iteration (Higham 1986), scaled while it is far: quadratic, four steps at the strains of a push.
     Mat3 r = f;
+    bool far = true;
     for (int i = 0; i < 30; ++i) {
-      const Mat3 inverse_transposed = r.inverse().transpose();
-      const double scale = std::sqrt(inverse_transposed.norm() / r.norm());
-      const Mat3 next = 0.5 * (scale * r + inverse_transposed / scale);
+      Mat3 cofactor;
+      cofactor << r.col(1).cross(r.col(2)), r.col(2).cross(r.col(0)), r.col(0).cross(r.col(1));
+      const double inverse_determinant = 1 / r.col(0).dot(cofactor.col(0));
+      const double scale =
+          far ? std::sqrt(std::sqrt(cofactor.squaredNorm() * inverse_determinant * inverse_determinant / r.squaredNorm()))
+              : 1;
+      const Mat3 next = 0.5 * scale * r + 0.5 * inverse_determinant / scale * cofactor;
       const double change = (next - r).squaredNorm();
       r = next;
-      if (change < 1e-28) return r;
+      if (change < 1e-15) return r;  // the error of `next` is half the square of the step
+      far = change > 0.01;
     }
   }
   const Eigen::JacobiSVD<Mat3> svd(f, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -38,22 +44,24 @@ Mat3 stretch_minus_identity(const Mat3& h, const Mat3& rotation) {
   return 0.5 * (strain + strain.transpose());
 }
 
-// dR/dF: dR = R [w]x with (tr(S) I - S) w = axial(R'dF - dF'R).
+// dR/dF: dR = R [w]x with (tr(S) I - S) w = axial(R'dF - dF'R); the block of dR's column j and dF's column l is
+// U_j (tr(S) I - S)^-1 U_l', U_j = R [e_j]x'.
 void rotation_derivative(const Mat3& r, const Mat3& strain, Mat9& out) {
   Mat3 spin = -strain;
   spin.diagonal().array() += strain.trace() + 2;
   const Mat3 spin_inverse = spin.inverse();
-  for (int l = 0; l < 3; ++l)
-    for (int k = 0; k < 3; ++k) {
-      // R'dF for dF = e_k e_l' has the column l equal to row k of R.
-      const Vec3 row = r.row(k).transpose();
-      const Vec3 axial = Vec3::Unit(l).cross(row);
-      const Vec3 w = spin_inverse * axial;
-      Mat3 cross;
-      cross << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
-      const Mat3 d = r * cross;
-      out.col(k + 3 * l) = as_vector(d);
+  Mat3 u[3];
+  u[0] << Vec3::Zero(), -r.col(2), r.col(1);
+  u[1] << r.col(2), Vec3::Zero(), -r.col(0);
+  u[2] << -r.col(1), r.col(0), Vec3::Zero();
+  for (int j = 0; j < 3; ++j) {
+    const Mat3 left = u[j] * spin_inverse;
+    for (int l = 0; l <= j; ++l) {
+      const Mat3 block = left * u[l].transpose();
+      out.block<3, 3>(3 * j, 3 * l) = block;
+      if (l < j) out.block<3, 3>(3 * l, 3 * j) = block.transpose();
     }
+  }
 }
 
 class Corotational final : public MaterialLaw {

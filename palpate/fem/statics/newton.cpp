@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include "palpate/fem/statics/static_system.hpp"
@@ -7,6 +8,17 @@ namespace palpate::fem {
 namespace {
 
 constexpr double kStaleContraction = 0.2;  // of the residual, per step with an old factor
+constexpr double kLargestShift = 1e3;
+
+// Eisenstat & Walker 1996, choice 2: a linear solve no more exact than Newton's model is, near the end as exact as needed.
+double forcing_term(double residual, double last_residual, double last_forcing, double tolerance) {
+  constexpr double first = 0.05, gamma = 0.9;
+  if (!(last_residual > 0)) return first;
+  double eta = gamma * std::pow(residual / last_residual, 2);
+  const double safeguard = gamma * last_forcing * last_forcing;
+  if (safeguard > 0.1) eta = std::max(eta, safeguard);
+  return std::clamp(eta, std::max(1e-10, 0.3 * tolerance / residual), first);
+}
 
 }  // namespace
 
@@ -15,7 +27,7 @@ bool StaticSystem::factorise_tangent(const StaticProblem& p, const VectorX& u, i
   factored_u.resize(0);
   // The exact tangent first; a shifted one only where it is not positive definite (clamping every element would destroy
   // quadratic convergence). Under a limit load the shift keeps descent towards a stable equilibrium.
-  for (double shift = 0; shift < 1e3; shift = shift == 0 ? 1e-3 : shift * 4) {
+  for (double shift = 0; shift < kLargestShift; shift = shift == 0 ? 1e-3 : shift * 4) {
     ++factorisations;
     if (system.factorise(assembly.pattern(), blocks, shift, assembly.expected_negative_pivots())) {
       if (shifted) *shifted = shift > 0;
@@ -27,6 +39,36 @@ bool StaticSystem::factorise_tangent(const StaticProblem& p, const VectorX& u, i
     }
   }
   return false;
+}
+
+std::string StaticSystem::newton_step(const StaticProblem& p, const StaticState& s, const VectorX& jump, bool at_target,
+                                      double forcing, VectorX& d, bool& shifted, Equilibrium& out) {
+  const auto right_hand_side = [&] {
+    VectorX rhs = p.external - s.internal;
+    if (!at_target) rhs -= assembly.multiply(blocks, jump);
+    return rhs;
+  };
+  if (!steps_by_any()) {
+    if (!factorise_tangent(p, s.u, out.factorisations, &shifted)) return "the tangent could not be factorised";
+    d = system.solve(right_hand_side());
+    return d.allFinite() ? "" : "the Newton step is not finite";
+  }
+  assembly.tangent(law, p.m, s.u, blocks);
+  factored_u.resize(0);
+  const VectorX rhs = right_hand_side();
+  for (double shift = 0; shift < kLargestShift; shift = shift == 0 ? 1e-3 : shift * 4) {
+    system.set_matrix(assembly.pattern(), blocks, shift);
+    MatrixX step;
+    const LinearSolver::Outcome outcome = system.solve_by_any(rhs, forcing, step);
+    ++out.factorisations;
+    if (outcome.solved) {
+      d = step.col(0);
+      shifted = shift > 0;
+      return d.allFinite() ? "" : "the Newton step is not finite";
+    }
+    if (!outcome.not_positive_definite) return outcome.reason;
+  }
+  return "the tangent could not be factorised";
 }
 
 // A step with the last factor instead of the tangent at s (modified Newton). Taken only where it brings the residual down
@@ -46,6 +88,7 @@ bool StaticSystem::stale_step(const StaticProblem& p, const VectorX& jump, bool 
 
 std::string StaticSystem::newton(const StaticProblem& p, StaticState& s, Equilibrium& out, int max_steps, bool near) {
   StaticState trial;
+  double last_residual = 0, forcing = 0;
   for (double effort = 0;;) {
     const VectorX jump = p.prescribed - system.prescribed_part(s.u);
     const bool at_target = jump.lpNorm<Eigen::Infinity>() <= 1e-14 * diameter_m;
@@ -56,14 +99,13 @@ std::string StaticSystem::newton(const StaticProblem& p, StaticState& s, Equilib
     }
     if (effort >= max_steps) return "Newton's method did not converge in " + std::to_string(max_steps) + " steps";
     bool shifted = false;
-    const bool factorised = factorise_tangent(p, s.u, out.factorisations, &shifted);
+    VectorX d_free;
+    forcing = forcing_term(s.residual, at_target ? last_residual : 0, forcing, options.residual_tolerance);
+    last_residual = s.residual;
+    const std::string failed = newton_step(p, s, jump, at_target, forcing, d_free, shifted, out);
     // Past a point of instability the energy falls slowly towards another state; that is progress all the same.
     effort += shifted ? 0.15 : 1;
-    if (!factorised) return "the tangent could not be factorised";
-    VectorX rhs = -(s.internal - p.external);
-    if (!at_target) rhs -= assembly.multiply(blocks, jump);
-    const VectorX d_free = system.solve(rhs);
-    if (!d_free.allFinite()) return "the Newton step is not finite";
+    if (!failed.empty()) return failed;
     ++out.newton_steps;
     const double slope = s.unbalanced.dot(d_free);  // negative for a descent direction
     bool accepted = false;

@@ -5,6 +5,15 @@
 
 namespace palpate::fem {
 
+MatrixX StaticSystem::solve_tangent_system(const MatrixX& right_hand_sides) {
+  if (!is_large()) return system.solve(right_hand_sides);
+  MatrixX du;
+  if (system.solve_by_any(right_hand_sides, kLargeTolerance, du).solved) return du;
+  if (!system.factorise_indefinite(assembly.pattern(), blocks))
+    throw Error("the tangent is singular at this state: it has no derivatives", "sensitivity.at");
+  return system.solve(right_hand_sides);
+}
+
 SensitivityAlong StaticSystem::sensitivity(const Equilibrium& at, const MatrixX& along_force, const MatrixX& along_motion) {
   const StaticProblem p =
       problem(at.young_modulus_pa, at.poisson_ratio, at.force_coefficients, at.motion_coefficients, at.extra);
@@ -17,7 +26,10 @@ SensitivityAlong StaticSystem::sensitivity(const Equilibrium& at, const MatrixX&
   } else {
     const bool same = factored_u.size() == u.size() && factored_u == u && factored_moduli.young_pa == p.m.young_pa &&
                       factored_moduli.poisson == p.m.poisson && factored_moduli.extra == p.m.extra;
-    if (!same) {
+    if (is_large()) {
+      assembly.tangent(law, p.m, u, blocks);
+      system.set_matrix(assembly.pattern(), blocks, 0);
+    } else if (!same) {
       factored_u.resize(0);
       assembly.tangent(law, p.m, u, blocks);
       if (system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots())) {
@@ -43,7 +55,8 @@ SensitivityAlong StaticSystem::sensitivity(const Equilibrium& at, const MatrixX&
   const MatrixX imposed = motions * along_motion;
   for (Index j = 0; j < along; ++j)
     if (!imposed.col(j).isZero(0)) rhs.col(2 + x + j) -= scale * assembly.multiply(blocks, imposed.col(j));
-  MatrixX du = system.solve(rhs) / scale;
+  MatrixX du = law.is_linear() ? solve_linear_system(rhs) : solve_tangent_system(rhs);
+  du /= scale;
   // Reactions: M' (K du - rhs), with K du of the whole displacement.
   MatrixX reaction(m, du.cols());
   for (Index j = 0; m > 0 && j < du.cols(); ++j)

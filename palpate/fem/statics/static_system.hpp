@@ -14,6 +14,8 @@
 
 namespace palpate::fem {
 
+constexpr double kLargeTolerance = 1e-11;  ///< relative residual of linear solves of large bodies
+
 /// Of one set of parameters and coefficients.
 struct StaticProblem {
   Moduli m;
@@ -58,9 +60,17 @@ class StaticSystem {
   double linear_poisson = std::numeric_limits<double>::quiet_NaN();
 
  private:
+  /// Unknowns above which one factor for all loads and derivatives no longer pays before any other method.
+  bool is_large() const { return system.takes_any_method() && system.unknowns() > 20000; }
+  /// The same for a single step of Newton's method.
+  bool steps_by_any() const { return system.takes_any_method() && system.unknowns() > 5000; }
   /// False where the law does not exist.
   bool evaluate(const StaticProblem& p, StaticState& s) const;
   bool factorise_tangent(const StaticProblem& p, const VectorX& u, int& factorisations, bool* shifted = nullptr);
+  /// d = K^-1 (unbalanced forces and imposed jump), K the tangent at s or, where it is not positive definite, a shifted one;
+  /// the reason why there is none, or nothing. @param forcing  relative residual that is good enough for large bodies
+  std::string newton_step(const StaticProblem& p, const StaticState& s, const VectorX& jump, bool at_target, double forcing,
+                          VectorX& d, bool& shifted, Equilibrium& out);
   /// A step with the last factor; false: it does not bring the residual down enough, and s is as it was.
   bool stale_step(const StaticProblem& p, const VectorX& jump, bool at_target, StaticState& s, StaticState& trial) const;
   /// From s (evaluated) towards p; the reason why it did not converge, or nothing. @param near  s is close to a state that
@@ -74,6 +84,10 @@ class StaticSystem {
   Equilibrium blank(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const;
   void finish(const StaticProblem& p, StaticState& s, Equilibrium& out) const;
   void factorise_linear(double poisson, int* factorisations);
+  /// With the matrix of `factorise_linear`. @throws Error when it is not positive definite
+  MatrixX solve_linear_system(const MatrixX& right_hand_sides);
+  /// With the tangent in `blocks`, which may have negative pivots. @throws Error when it is singular
+  MatrixX solve_tangent_system(const MatrixX& right_hand_sides);
 };
 
 }  // namespace palpate::fem

@@ -17,10 +17,21 @@ void StaticSystem::factorise_linear(double poisson, int* factorisations) {
     for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] = unit.lambda * blocks_lambda[i] + unit.mu * blocks_mu[i];
   }
   linear_poisson = std::numeric_limits<double>::quiet_NaN();
-  if (!system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots()))
+  if (is_large())
+    system.set_matrix(assembly.pattern(), blocks, 0);
+  else if (!system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots()))
     throw Error("the stiffness matrix is not positive definite: is the mesh degenerate?", "mesh");
   if (factorisations) ++*factorisations;
   linear_poisson = poisson;
+}
+
+MatrixX StaticSystem::solve_linear_system(const MatrixX& right_hand_sides) {
+  if (!is_large()) return system.solve(right_hand_sides);
+  MatrixX du;
+  const LinearSolver::Outcome outcome = system.solve_by_any(right_hand_sides, kLargeTolerance, du);
+  if (outcome.solved) return du;
+  linear_poisson = std::numeric_limits<double>::quiet_NaN();
+  throw Error("the stiffness matrix could not be solved with (" + outcome.reason + "): is the mesh degenerate?", "mesh");
 }
 
 std::vector<Equilibrium> StaticSystem::solve_linear(double young, double poisson, const MatrixX& a, const MatrixX& b) {
@@ -38,7 +49,7 @@ std::vector<Equilibrium> StaticSystem::solve_linear(double young, double poisson
     rhs.col(c) = problems[c].external / young;
     if (motions.cols() > 0) rhs.col(c) -= assembly.multiply(blocks, problems[c].prescribed);
   }
-  const MatrixX u = system.solve(rhs);
+  const MatrixX u = solve_linear_system(rhs);
   for (Index c = 0; c < a.cols(); ++c) {
     StaticState s;
     s.u = u.col(c) + problems[c].prescribed;
@@ -75,7 +86,7 @@ UnitResponses StaticSystem::unit_responses(double poisson, const Eigen::SparseMa
         rhs.col(c) = -assembly.multiply(blocks, imposed.col(c));
       }
     }
-    const MatrixX u = system.solve(rhs) + imposed;
+    const MatrixX u = solve_linear_system(rhs) + imposed;
     values.middleCols(first, count) = watched * u;
     for (Index c = 0; c < count; ++c) {
       // K' u at E = 1; K u - F a is what supports carry, the rest of it what the solve left over.
@@ -87,7 +98,7 @@ UnitResponses StaticSystem::unit_responses(double poisson, const Eigen::SparseMa
       rhs.col(c) = -assembly.forces_d_poisson(law, unit, u.col(c));
       reactions.col(first + c) = motions.transpose() * (internal - external.col(c));
     }
-    const MatrixX du = system.solve(rhs);
+    const MatrixX du = solve_linear_system(rhs);
     slopes.middleCols(first, count) = watched * du;
     for (Index c = 0; m > 0 && c < count; ++c)
       reaction_slopes.col(first + c) = motions.transpose() * (assembly.multiply(blocks, du.col(c)) - rhs.col(c));
