@@ -9,34 +9,29 @@
 #include <memory>
 #include <string>
 
+#include "cli/lab_setup.hpp"
 #include "cli/logged_robot.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/fem/materials.hpp"
 #include "palpate/io/bag_write.hpp"
-#include "palpate/io/mesh_file.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/lab/built_in.hpp"
-#include "palpate/lab/object.hpp"
-#include "palpate/lab/robot.hpp"
 
 namespace palpate::cli {
 namespace {
 
 struct RecordArguments {
   bool demo = false;
-  std::string object = "cube", material, depth_sensor = "realsense_d435", force_sensor = "generic";
+  LabArguments lab;
   std::string output;
   std::string truth;
-  double young_modulus_pa = 0;
-  double poisson_ratio = -1;
   bool resume = false;
   std::string bag, raw_bag;
   acquisition::PushOptions push;
 };
 
-nlohmann::json truth_json(const lab::DemoTruth& truth) {
+nlohmann::json demo_truth_json(const lab::DemoTruth& truth) {
   nlohmann::json json = {{"young_modulus_pa", truth.young_modulus_pa},
                          {"poisson_ratio", truth.poisson_ratio},
                          {"material", truth.material},
@@ -50,37 +45,6 @@ nlohmann::json truth_json(const lab::DemoTruth& truth) {
   return json;
 }
 
-// A name of the lab's table, or a mesh file.
-lab::LabObject object_of(const RecordArguments& arguments, std::uint64_t seed) {
-  lab::ObjectOptions options;
-  options.seed = seed;
-  if (!arguments.material.empty()) options.material = arguments.material;
-  if (arguments.young_modulus_pa != 0) options.young_modulus_pa = arguments.young_modulus_pa;
-  if (arguments.poisson_ratio >= 0) options.poisson_ratio = arguments.poisson_ratio;
-  const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),
-                                    [&](const lab::BuiltInObject& row) { return row.name == arguments.object; });
-  if (built_in || !std::filesystem::exists(arguments.object)) return lab::make_object(arguments.object, options);
-  return lab::object_from_surface(io::read_tri_mesh(arguments.object), std::filesystem::path(arguments.object).filename().string(), options);
-}
-
-nlohmann::json truth_json(const lab::LabRobot& robot) {
-  const lab::LabObject& object = robot.object();
-  nlohmann::json json = {{"object", object.name},
-                         {"young_modulus_pa", object.young_modulus_pa},
-                         {"poisson_ratio", object.poisson_ratio},
-                         {"material", object.material},
-                         {"extra", object.extra},
-                         {"force_scale", robot.true_force_scale()},
-                         {"steps", nlohmann::json::array()}};
-  return json;
-}
-
-void write_json(const nlohmann::json& json, const std::filesystem::path& path) {
-  std::ofstream file(path);
-  file << json.dump(2) << '\n';
-  if (!file) throw Error("cannot be written", path.string());
-}
-
 // Runs the protocol at every site; every finished step is on the disk before the next one begins.
 int record_pushes(Session& session, const RecordArguments& arguments) {
   std::filesystem::path folder = arguments.output;
@@ -88,11 +52,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   const bool exists = std::filesystem::exists(folder) && !std::filesystem::is_empty(folder);
   if (exists && !arguments.resume)
     throw Error("is there already; say --resume to go on, or choose another folder", folder.string());
-  lab::LabOptions options;
-  options.seed = session.seed;
-  options.depth = lab::depth_sensor(arguments.depth_sensor);
-  options.force = lab::force_sensor(arguments.force_sensor);
-  lab::LabRobot robot(options, object_of(arguments, session.seed));
+  lab::LabRobot robot(lab_options(arguments.lab, session.seed), lab_object(arguments.lab, session.seed));
   const lab::LabObject& object = robot.object();
   acquisition::PushOptions protocol = arguments.push;
   if (!(protocol.travel_limit_m > 0)) protocol.travel_limit_m = object.travel_limit_m;
@@ -133,10 +93,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
           if (!begun) writer.begin_push(push);
           begun = true;
           writer.add_step(step);
-          truth["steps"].push_back({{"push", push.name},
-                                    {"time_s", step.time_s},
-                                    {"force_n", robot.true_force_n()},
-                                    {"travel_m", robot.true_travel_m()}});
+          truth["steps"].push_back(truth_json(push, step, robot));
           const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
           session.say(fmt::format("{} ({}), {:.1f} s: {:.2f} N{}", push.name, plan.site, step.time_s, force,
                                   step.unloading ? ", going back" : ""));
@@ -173,7 +130,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
                   {"object", object.name},
                   {"steps", steps},
                   {"pushes", told},
-                  {"seed", options.seed}});
+                  {"seed", session.seed}});
   return fine && !Session::interrupted() ? exit_done : exit_numbers;
 }
 
@@ -183,12 +140,12 @@ int record_demo(Session& session, const RecordArguments& arguments) {
   lab::DemoOptions options;
   options.seed = session.seed;
   options.threads = session.thread_count();
-  if (arguments.young_modulus_pa != 0) options.young_modulus_pa = arguments.young_modulus_pa;
-  if (arguments.poisson_ratio >= 0) options.poisson_ratio = arguments.poisson_ratio;
+  if (arguments.lab.young_modulus_pa != 0) options.young_modulus_pa = arguments.lab.young_modulus_pa;
+  if (arguments.lab.poisson_ratio >= 0) options.poisson_ratio = arguments.lab.poisson_ratio;
   const lab::Demo demo = lab::make_demo(options, session.progress());
   io::write_recording(demo.recording, arguments.output);
   if (!arguments.truth.empty()) {
-    write_json(truth_json(demo.truth), arguments.truth);
+    write_json(demo_truth_json(demo.truth), arguments.truth);
   }
   std::size_t steps = 0;
   for (const Push& push : demo.recording.pushes) steps += push.steps.size();
@@ -205,31 +162,12 @@ Run verbs::record(CLI::App& app) {
   auto arguments = std::make_shared<RecordArguments>();
   // The object says how deep a soft pad can press it and in which steps: less than the paper's 10 cm.
   arguments->push.travel_limit_m = arguments->push.force_step_n = 0;
-  std::string objects;
-  for (const auto& row : lab::built_in_objects()) objects += fmt::format("\n{}: {}", row.name, row.summary);
-  std::string laws;
-  for (const auto* law : fem::material_table()) laws += (laws.empty() ? "" : ", ") + std::string(law->name());
-  app.add_option("--object", arguments->object,
-                 "what the lab's robot pushes: a mesh file (closed, metres), or one of" + objects)
-      ->capture_default_str();
-  app.add_option("--material", arguments->material, "law of the true object: " + laws + " (default neo_hookean)");
-  const auto rows = [](const auto& table) {
-    std::string text;
-    for (const auto& row : table) text += fmt::format("\n{}: {}", row.name, row.source);
-    return text;
-  };
-  app.add_option("--depth-sensor", arguments->depth_sensor, "one of" + rows(lab::depth_sensors()))->capture_default_str();
-  app.add_option("--force-sensor", arguments->force_sensor, "one of" + rows(lab::force_sensors()))->capture_default_str();
+  add_lab_options(app, arguments->lab);
   app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
   app.add_option("-o,--output", arguments->output, "folder to write; must not exist or be empty")->required();
   app.add_option("--truth", arguments->truth,
                  "file for what the simulation knows and the recording does not (default: beside the recording, OUTPUT.truth.json; "
                  "with --demo: not written)");
-  app.add_option("--young-modulus", arguments->young_modulus_pa,
-                 "of the true object, Pa (default: drawn from the seed, 10 to 40 kPa; bar: ten times that)")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--poisson-ratio", arguments->poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
-      ->check(CLI::Range(0.0, 0.4999));
   app.add_option("--force-limit", arguments->push.force_limit_n, "stop at this force, N")->check(CLI::PositiveNumber);
   app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m (default: of the object)")->check(CLI::PositiveNumber);
   app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N (default: of the object)")->check(CLI::PositiveNumber);

@@ -27,6 +27,7 @@ using SetUp = Run(CLI::App& app);
   VERB(info,       "measure", "what is in a recording, in units, and what is wrong with it",           "palpate info recording") \
   VERB(estimate,   "measure", "Young's modulus and Poisson ratio of a recording, with intervals",      "palpate estimate recording -o result") \
   VERB(suggest,    "measure", "the next best push: where, which way and how hard, with what to expect", "palpate suggest result --for poisson-ratio") \
+  VERB(explore,    "measure", "push, estimate and take the next best push, until E and nu are known",  "palpate explore --object ball -o out --young-modulus-within 0.05") \
   VERB(predict,    "use",     "deformation, force and stress of a new push, with bands",               "palpate predict result --contact 0.58 0 0.15 --force 5 -o pressed") \
   VERB(export_,    "use",     "the learned object for other simulators",                               "palpate export result --to calculix -o calculix --verify") \
   VERB(report,     "show",    "the figures of a result as SVG and PNG files, without a display",       "palpate report out --png figures") \

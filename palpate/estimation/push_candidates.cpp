@@ -16,6 +16,7 @@ namespace {
 
 constexpr int rim_points = 8;
 constexpr int draws_a_contact = 40;  // of which the farthest apart are kept
+constexpr const char* out_of_reach = "out of the robot's reach";
 constexpr double hand_length_m = 0.15;
 
 /// Uniform in [0, 1), the same with every standard library.
@@ -81,7 +82,16 @@ Vec3 PushSpace::mean_normal(const Vec3& contact_m) const {
   return sum.norm() > 0 ? Vec3(sum.normalized()) : first;
 }
 
+bool PushSpace::in_reach(const PushCandidate& candidate) const {
+  return !impl_->options.reachable || impl_->options.reachable(candidate.contact_m, candidate.direction);
+}
+
 std::string PushSpace::refusal(PushCandidate& candidate) const {
+  const std::string word = geometric_refusal(candidate);
+  return word.empty() && !in_reach(candidate) ? out_of_reach : word;
+}
+
+std::string PushSpace::geometric_refusal(PushCandidate& candidate) const {
   const Impl& space = *impl_;
   const PushLimits& limits = space.options.limits;
   const Vec3 &contact_m = candidate.contact_m, &direction = candidate.direction;
@@ -119,7 +129,6 @@ std::string PushSpace::refusal(PushCandidate& candidate) const {
   const auto exit = space.tree.cast(contact_m + 1e-3 * space.radius_m * direction, direction);
   candidate.thickness_m = exit ? exit->range_m : 0;
   if (candidate.thickness_m < space.radius_m) return "thin";
-  if (space.options.reachable && !space.options.reachable(contact_m, direction)) return "out of the robot's reach";
   return {};
 }
 
@@ -150,7 +159,7 @@ std::vector<PushCandidate> PushSpace::sample(std::map<std::string, int>* refused
     PushCandidate candidate;
     candidate.contact_m = (1 - u - v) * corner(0) + u * corner(1) + v * corner(2);
     candidate.direction = -mean_normal(candidate.contact_m);
-    const std::string word = refusal(candidate);
+    const std::string word = geometric_refusal(candidate);
     if (word.empty())
       possible.push_back(candidate);
     else
@@ -161,10 +170,15 @@ std::vector<PushCandidate> PushSpace::sample(std::map<std::string, int>* refused
   std::vector<PushCandidate> chosen;
   VectorX distance_m = VectorX::Constant(static_cast<Index>(possible.size()), 1e300);
   const double tilt = 0.9 * options.limits.tilt_rad;
-  for (int c = 0; c < options.contacts && !possible.empty(); ++c) {
+  for (int c = 0; c < options.contacts && !possible.empty();) {
     Index next = 0;
     if (distance_m.maxCoeff(&next) <= 0) break;
     const PushCandidate& at = possible[static_cast<std::size_t>(next)];
+    if (!in_reach(at)) {
+      distance_m(next) = 0;
+      refuse(out_of_reach);
+      continue;
+    }
     for (std::size_t i = 0; i < possible.size(); ++i) {
       double& far = distance_m(static_cast<Index>(i));
       far = std::min(far, (possible[i].contact_m - at.contact_m).norm());
@@ -184,6 +198,7 @@ std::vector<PushCandidate> PushSpace::sample(std::map<std::string, int>* refused
       else
         refuse(word);
     }
+    ++c;
   }
   return chosen;
 }

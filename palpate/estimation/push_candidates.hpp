@@ -60,6 +60,8 @@ class PushSpace {
 
  private:
   Vec3 mean_normal(const Vec3& contact_m) const;
+  std::string geometric_refusal(PushCandidate& candidate) const;
+  bool in_reach(const PushCandidate& candidate) const;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

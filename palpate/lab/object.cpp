@@ -118,7 +118,10 @@ LabObject cube(const ObjectOptions& o) {
   block.young_modulus_pa = object.young_modulus_pa;
   block.poisson_ratio = object.poisson_ratio;
   block.extra = object.extra;
-  object.press = [block](const PushSite& at) {
+  make_pressable(object, o);
+  object.press = [block, anywhere = object.press](const PushSite& at) -> std::unique_ptr<Pressed> {
+    const Vec3 from_foot = at.contact_m - block.base_centre_m;
+    if (std::abs(from_foot.y()) > 1e-9 || from_foot.z() < block.edge_m - 1e-9 || at.direction.z() > -1 + 1e-12) return anywhere(at);
     PressedBlockOptions here = block;
     here.site_m = at.contact_m.x() - block.base_centre_m.x();
     return std::make_unique<PressedBlock>(here);

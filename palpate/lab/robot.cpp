@@ -303,6 +303,30 @@ acquisition::PushPlan LabRobot::plan(std::size_t site) {
   return plan;
 }
 
+acquisition::PushPlan LabRobot::plan_at(const Vec3& contact_m, const Vec3& direction) {
+  Impl& lab = *impl_;
+  const auto& sites = lab.object.sites;
+  for (std::size_t s = 0; s < sites.size(); ++s)
+    if ((sites[s].contact_m - contact_m).norm() < 1e-9 && (sites[s].direction - direction).norm() < 1e-9) return plan(s);
+  lab.object.sites.push_back({"place " + std::to_string(sites.size() + 1), contact_m, direction});
+  lab.curves.emplace_back();
+  return plan(lab.object.sites.size() - 1);
+}
+
+bool LabRobot::reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m) const {
+  const Impl& lab = *impl_;
+  Pose pose = Pose::Identity();
+  pose.linear() = facing(direction);
+  std::vector<double> joints = lab.commanded;
+  for (const double before_m : {start_distance_m, 0.0}) {
+    pose.translation() = contact_m - before_m * direction;
+    const auto found = reach(lab.mask.kinematics(), lab.tip, pose, joints);
+    if (!found) return false;
+    joints = *found;
+  }
+  return true;
+}
+
 double LabRobot::true_force_n() const { return impl_->force(); }
 double LabRobot::true_travel_m() const { return std::max(0.0, impl_->travel()); }
 double LabRobot::true_force_scale() const { return impl_->wrist->scale(); }

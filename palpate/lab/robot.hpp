@@ -53,6 +53,10 @@ class LabRobot : public acquisition::Robot {
   Recording scene() const;
   /// The push at one of the object's sites (the cube has one): the robot then presses there. @throws Error when out of range.
   acquisition::PushPlan plan(std::size_t site = 0);
+  /// The push at any other place of the object: it becomes a site of its own.
+  acquisition::PushPlan plan_at(const Vec3& contact_m, const Vec3& direction);
+  /// Whether the arm gets there, at the contact and where the approach starts.
+  bool reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m = 0.05) const;
   /// What no sensor tells: the force on the object and the travel into it now.
   double true_force_n() const;
   double true_travel_m() const;

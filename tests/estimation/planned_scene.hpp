@@ -9,7 +9,7 @@
 #include "palpate/estimation/next_push.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
-#include "scenes.hpp"
+#include "estimation/scenes.hpp"
 
 namespace palpate::estimation {
 

@@ -127,5 +127,21 @@ TEST(LabRobot, BadOptionsAreRefused) {
   EXPECT_TRUE(refused([](O& o) { o.depth.noise.model = "eye"; }));
 }
 
+TEST(LabRobot, PushesAtPlacesOfItsOwnWhereTheArmGetsThere) {
+  LabRobot robot({}, make_object("ball"));
+  const PushSite known = robot.object().sites[1];
+  EXPECT_EQ(robot.plan_at(known.contact_m, known.direction).site, known.name);
+  const std::size_t before = robot.object().sites.size();
+  const Vec3 aside = known.contact_m + Vec3(0, 0.01, 0);
+  const acquisition::PushPlan plan = robot.plan_at(aside, known.direction);
+  EXPECT_EQ(robot.object().sites.size(), before + 1);
+  EXPECT_EQ(plan.contact_m, aside);
+  EXPECT_NEAR((plan.R_base_tip.col(2) - known.direction).norm(), 0, 1e-12);
+  EXPECT_EQ(robot.plan_at(aside, known.direction).site, plan.site);
+  EXPECT_EQ(robot.object().sites.size(), before + 1);
+  EXPECT_TRUE(robot.reaches(known.contact_m, known.direction));
+  EXPECT_FALSE(robot.reaches(Vec3(2.5, 0, 0.1), -Vec3::UnitZ()));
+}
+
 }  // namespace
 }  // namespace palpate::lab

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// `palpate explore -o OUT`: the lab's robot pushes, estimates and chooses the next best push until E and nu are known as
+// well as was asked for. OUT/recording grows step by step; result, model and report come at the end.
+#include "palpate/explore.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "cli/lab_setup.hpp"
+#include "cli/push_words.hpp"
+#include "cli/verbs.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/io/recording.hpp"
+#include "palpate/io/result.hpp"
+#include "palpate/report/report.hpp"
+#include "palpate/report/words.hpp"
+
+namespace palpate::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  LabArguments lab;
+  ExploreOptions explore;
+  fs::path out;
+  std::string goal = "both", law, refine;
+  double travel_limit_m = 0;
+  bool compare = false;
+};
+
+nlohmann::json json_of(const ExploredPush& push) {
+  const auto& at = push.plan.candidate;
+  return {{"push", push.name},
+          {"contact_m", {at.contact_m.x(), at.contact_m.y(), at.contact_m.z()}},
+          {"direction", {at.direction.x(), at.direction.y(), at.direction.z()}},
+          {"stop", acquisition::to_words(push.report.stop)},
+          {"highest_force_n", push.report.highest_force_n},
+          {"deepest_m", push.report.deepest_m},
+          {"promised", spread_json(push.plan.expected)},
+          {"found", spread_json(push.found)},
+          {"young_modulus_pa", push.young_modulus.value},
+          {"young_modulus_within_95", young_modulus_half_width(push.young_modulus)},
+          {"poisson_ratio", push.poisson_ratio.value},
+          {"poisson_ratio_within_95", poisson_ratio_half_width(push.poisson_ratio)}};
+}
+
+/// One whole loop on a lab of its own. `writer` and `truth` only where it is recorded.
+Explored run_loop(Session& session, const Options& given, PushOrder order, io::RecordingWriter* writer,
+                  nlohmann::json* truth) {
+  lab::LabRobot robot(lab_options(given.lab, session.seed), lab_object(given.lab, session.seed));
+  if (truth != nullptr) *truth = truth_json(robot);
+  ExploreOptions options = given.explore;
+  options.order = order;
+  options.push.travel_limit_m = given.travel_limit_m > 0 ? given.travel_limit_m : robot.object().travel_limit_m;
+  options.suggest.candidates.reachable = [&](const Vec3& contact_m, const Vec3& direction) {
+    return robot.reaches(contact_m, direction, options.push.start_distance_m);
+  };
+  Recording scene = robot.scene();
+  if (!given.law.empty()) scene.model.material = given.law;
+  const bool first = order == PushOrder::next_best;
+  ExploreHooks hooks;
+  hooks.plan = [&](const estimation::PushCandidate& at) { return robot.plan_at(at.contact_m, at.direction); };
+  hooks.on_push_begin = [&](const Push& push) {
+    if (writer != nullptr) writer->begin_push(push);
+  };
+  hooks.on_step = [&](const Push& push, const Step& step) {
+    if (writer == nullptr) return;
+    writer->add_step(step);
+    (*truth)["steps"].push_back(truth_json(push, step, robot));
+    session.say(fmt::format("{}, {:.1f} s: {:.2f} N{}", push.name, step.time_s,
+                            step.loads.empty() ? 0.0 : step.loads[0].force_n->norm(), step.unloading ? ", going back" : ""));
+  };
+  hooks.on_push = [&](const ExploredPush& push) {
+    const Vec3 &at = push.plan.candidate.contact_m, &along = push.plan.candidate.direction;
+    session.say(fmt::format(
+        "{}{} at ({:.3f} {:.3f} {:.3f}) along ({:+.2f} {:+.2f} {:+.2f}): E {} within {:.1f} % (promised {}), nu {:.3f} "
+        "within {:.3f} (promised {})",
+        first ? "" : "  ", push.name, at.x(), at.y(), at.z(), along.x(), along.y(), along.z(),
+        report::quantity(push.young_modulus.value, "Pa"), 100 * young_modulus_half_width(push.young_modulus),
+        percent_95(push.plan.expected.log_young_std), push.poisson_ratio.value, poisson_ratio_half_width(push.poisson_ratio),
+        plain_95(push.plan.expected.poisson_std)));
+  };
+  hooks.keep_going = [] { return !Session::interrupted(); };
+  hooks.on_progress = session.progress();
+  return explore(robot, scene, options, hooks);
+}
+
+std::string count_of(const Explored& run) {
+  const std::size_t pushes = run.pushes.size() + static_cast<std::size_t>(run.fruitless);
+  return fmt::format("{}{} push{}", run.reached ? "" : "more than ", pushes, pushes == 1 ? "" : "es");
+}
+
+int run(const Options& given, Session& session) {
+  std::error_code code;
+  if (fs::exists(given.out, code) && !fs::is_empty(given.out, code))
+    throw Error("is there already; choose another folder or remove it", given.out.string());
+  check(given.explore);
+  nlohmann::json truth;
+  std::optional<io::RecordingWriter> writer;
+  {
+    const lab::LabRobot robot(lab_options(given.lab, session.seed), lab_object(given.lab, session.seed));
+    Recording scene = robot.scene();
+    if (!given.law.empty()) scene.model.material = given.law;
+    writer.emplace(given.out / "recording", scene);
+  }
+  Explored found = run_loop(session, given, PushOrder::next_best, &*writer, &truth);
+  write_json(truth, given.out / "truth.json");
+  if (found.pushes.empty()) {
+    session.warn(found.message);
+    session.result({{"format", "palpate-exploration/1"}, {"reached", false}, {"message", found.message}});
+    return exit_numbers;
+  }
+  Identification& answer = found.identified.answer;
+  answer.provenance["seed"] = std::to_string(session.seed);
+  answer.provenance["recording path"] = fs::absolute(given.out / "recording").lexically_normal().string();
+  io::write_result(answer, given.out);
+  io::write_model(answer, found.identified.volume, given.out / "model");
+  { const io::RecordingWriter object(given.out / "model", found.identified.object); }
+  report::write_report(answer, &found.recording, given.out / "report.html");
+  session.say(report::answer(answer));
+  for (const auto& verdict : answer.verdicts) session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
+  session.say(
+      fmt::format("{} after {}. Next: open {}", found.message, count_of(found), (given.out / "report.html").string()));
+
+  nlohmann::json json = {{"format", "palpate-exploration/1"}, {"reached", found.reached},
+                         {"message", found.message},          {"fruitless", found.fruitless},
+                         {"pushes", nlohmann::json::array()}, {"result", io::result_json(answer)}};
+  for (const auto& push : found.pushes) json["pushes"].push_back(json_of(push));
+  if (given.compare && !Session::interrupted()) {
+    for (const auto& [order, name] :
+         {std::pair{PushOrder::random, "random order"}, {PushOrder::best_repeated, "best place repeated"}}) {
+      session.say(fmt::format("the same lab, {}:", name));
+      const Explored other = run_loop(session, given, order, nullptr, nullptr);
+      if (Session::interrupted()) break;
+      session.say(fmt::format("{}: {}; next best push: {}", name, count_of(other), count_of(found)));
+      nlohmann::json one = {{"order", name}, {"reached", other.reached}, {"pushes", nlohmann::json::array()}};
+      for (const auto& push : other.pushes) one["pushes"].push_back(json_of(push));
+      json["compared"].push_back(one);
+    }
+  }
+  write_json(json, given.out / "exploration.json");
+  session.result(json);
+  return found.reached && answer.termination == Termination::converged ? exit_done : exit_numbers;
+}
+
+}  // namespace
+
+Run verbs::explore(CLI::App& app) {
+  auto given = std::make_shared<Options>();
+  auto& options = given->explore;
+  app.add_option("-o,--out", given->out,
+                 "folder for recording/, result.json, model/, report.html, exploration.json and truth.json")
+      ->required();
+  add_lab_options(app, given->lab);
+  app.add_option("--young-modulus-within", options.young_modulus_within, "goal: half of the 95 % interval over E")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--poisson-ratio-within", options.poisson_ratio_within, "goal: half of the 95 % interval")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--pushes", options.max_pushes, "most pushes")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--for", given->goal, "young-modulus, poisson-ratio or both: what the next push is chosen for")
+      ->check(CLI::IsMember({"young-modulus", "poisson-ratio", "both"}))
+      ->capture_default_str();
+  app.add_flag("--compare", given->compare, "also run the same lab with a random order and with the best place repeated");
+  app.add_option("--levels", options.levels, "force steps of a push")->check(CLI::Range(1, 20))->capture_default_str();
+  app.add_option("--contacts", options.suggest.candidates.contacts, "places that are compared")
+      ->check(CLI::Range(1, 500))
+      ->capture_default_str();
+  app.add_option("--tilts", options.suggest.candidates.tilts, "slanted directions at each place, besides the straight one")
+      ->check(CLI::Range(0, 12))
+      ->capture_default_str();
+  app.add_option("--force-limit", options.push.force_limit_n, "of the robot, N")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--travel-limit", given->travel_limit_m, "of the robot, m (default: of the object)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--guess", options.suggest.young_modulus_pa, "of Young's modulus before the first touch, Pa")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--law", given->law, "material law of the estimate (default: that of the true object)");
+  app.add_option("--refine", given->refine, "none or auto: finer under the tool")->check(CLI::IsMember({"none", "auto"}));
+  return [given](Session& session) {
+    Options chosen = *given;
+    chosen.explore.suggest.goal = estimation::push_goal(given->goal);
+    chosen.explore.suggest.candidates.seed = chosen.explore.seed = session.seed;
+    chosen.explore.suggest.threads = chosen.explore.identify.fit.threads = session.thread_count();
+    if (!given->refine.empty()) chosen.explore.identify.refine = given->refine;
+    return run(chosen, session);
+  };
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/lab_setup.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/materials.hpp"
+#include "palpate/io/mesh_file.hpp"
+
+namespace palpate::cli {
+
+void add_lab_options(CLI::App& app, LabArguments& arguments) {
+  std::string objects;
+  for (const auto& row : lab::built_in_objects()) objects += fmt::format("\n{}: {}", row.name, row.summary);
+  std::string laws;
+  for (const auto* law : fem::material_table()) laws += (laws.empty() ? "" : ", ") + std::string(law->name());
+  app.add_option("--object", arguments.object,
+                 "what the lab's robot pushes: a mesh file (closed, metres), or one of" + objects)
+      ->capture_default_str();
+  app.add_option("--material", arguments.material, "law of the true object: " + laws + " (default neo_hookean)");
+  const auto rows = [](const auto& table) {
+    std::string text;
+    for (const auto& row : table) text += fmt::format("\n{}: {}", row.name, row.source);
+    return text;
+  };
+  app.add_option("--depth-sensor", arguments.depth_sensor, "one of" + rows(lab::depth_sensors()))->capture_default_str();
+  app.add_option("--force-sensor", arguments.force_sensor, "one of" + rows(lab::force_sensors()))->capture_default_str();
+  app.add_option("--young-modulus", arguments.young_modulus_pa,
+                 "of the true object, Pa (default: drawn from the seed, 10 to 40 kPa; bar: ten times that)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
+      ->check(CLI::Range(0.0, 0.4999));
+}
+
+lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
+  lab::ObjectOptions options;
+  options.seed = seed;
+  if (!arguments.material.empty()) options.material = arguments.material;
+  if (arguments.young_modulus_pa != 0) options.young_modulus_pa = arguments.young_modulus_pa;
+  if (arguments.poisson_ratio >= 0) options.poisson_ratio = arguments.poisson_ratio;
+  const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),
+                                    [&](const lab::BuiltInObject& row) { return row.name == arguments.object; });
+  if (built_in || !std::filesystem::exists(arguments.object)) return lab::make_object(arguments.object, options);
+  return lab::object_from_surface(io::read_tri_mesh(arguments.object),
+                                  std::filesystem::path(arguments.object).filename().string(), options);
+}
+
+lab::LabOptions lab_options(const LabArguments& arguments, std::uint64_t seed) {
+  lab::LabOptions options;
+  options.seed = seed;
+  options.depth = lab::depth_sensor(arguments.depth_sensor);
+  options.force = lab::force_sensor(arguments.force_sensor);
+  return options;
+}
+
+nlohmann::json truth_json(const lab::LabRobot& robot) {
+  const lab::LabObject& object = robot.object();
+  return {{"object", object.name},
+          {"young_modulus_pa", object.young_modulus_pa},
+          {"poisson_ratio", object.poisson_ratio},
+          {"material", object.material},
+          {"extra", object.extra},
+          {"force_scale", robot.true_force_scale()},
+          {"steps", nlohmann::json::array()}};
+}
+
+nlohmann::json truth_json(const Push& push, const Step& step, const lab::LabRobot& robot) {
+  return {
+      {"push", push.name}, {"time_s", step.time_s}, {"force_n", robot.true_force_n()}, {"travel_m", robot.true_travel_m()}};
+}
+
+void write_json(const nlohmann::json& json, const std::filesystem::path& path) {
+  std::ofstream file(path);
+  file << json.dump(2) << '\n';
+  if (!file) throw Error("cannot be written", path.string());
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/explore.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+using estimation::PushRanking;
+using estimation::RatedPush;
+
+const Parameter& parameter(const Identification& answer, const std::string& name) {
+  for (const auto& one : answer.parameters)
+    if (one.name == name && one.region.empty()) return one;
+  throw Error("holds no " + name, "Identification.parameters");
+}
+
+/// Hardest push of every candidate of a ranking, best first: how hard to push is limited, not chosen, once a push is made.
+std::vector<RatedPush> hardest(const PushRanking& ranking) {
+  std::vector<RatedPush> pushes;
+  for (const auto& push : ranking.pushes) {
+    const auto same = std::find_if(pushes.begin(), pushes.end(), [&](const RatedPush& known) {
+      return known.candidate.contact_m == push.candidate.contact_m && known.candidate.direction == push.candidate.direction;
+    });
+    if (same == pushes.end())
+      pushes.push_back(push);
+    else if (push.steps > same->steps)
+      *same = push;
+  }
+  return pushes;
+}
+
+class Loop {
+ public:
+  Loop(acquisition::Robot& robot, const Recording& scene, const ExploreOptions& options, const ExploreHooks& hooks)
+      : robot_(robot), options_(options), hooks_(hooks) {
+    out_.recording = scene;
+    out_.recording.pushes.clear();
+    prepare(scene);
+  }
+
+  Explored run() {
+    std::vector<RatedPush> fixed_order;
+    while (out_.message.empty()) {
+      if (hooks_.keep_going && !hooks_.keep_going()) return end("stopped on request");
+      const std::size_t made = out_.pushes.size() + static_cast<std::size_t>(out_.fruitless);
+      if (made >= static_cast<std::size_t>(options_.max_pushes)) return end("all pushes are used up");
+      const Identification* so_far = out_.pushes.empty() ? nullptr : &out_.identified.answer;
+      const PushRanking ranking = suggest(out_.scene, so_far, options_.suggest, hooks_.on_progress);
+      std::vector<RatedPush> pushes = hardest(ranking);
+      if (pushes.empty()) return end("no push is possible in view of the camera");
+      ExploredPush next;
+      next.plan = pushes.front();
+      if (options_.order != PushOrder::next_best) {
+        if (fixed_order.empty()) fixed_order = order_of(pushes);
+        next.plan = again(pushes, fixed_order[made % fixed_order.size()]);
+      }
+      push(next, so_far != nullptr);
+      if (next.report.stop == acquisition::StopReason::user) return end("stopped on request");
+      if (!pressed()) {
+        ++out_.fruitless;
+        forget(next.plan.candidate);
+        continue;
+      }
+      estimate(false);
+      if (out_.identified.answer.termination == Termination::cancelled) return end("stopped on request");
+      take_in(std::move(next));
+    }
+    return end(out_.message);
+  }
+
+ private:
+  void prepare(const Recording& scene) {
+    SuggestOptions suggesting = options_.suggest;
+    suggesting.candidates.limits.force_n = std::min(suggesting.candidates.limits.force_n, options_.push.force_limit_n);
+    suggesting.candidates.limits.travel_m = std::min(suggesting.candidates.limits.travel_m, options_.push.travel_limit_m);
+    options_.suggest = suggesting;
+    // What the robot's own sensors say of themselves.
+    const DepthFrame frame = robot_.take_depth_image();
+    suggesting.cameras = {frame};
+    estimation::SensorPlan sensors;
+    sensors.travel_sigma_m = robot_.travel_sigma_m();
+    sensors.travel_offset_std_m = options_.push.increment_m;
+    const double noise_n = force_noise_n();
+    sensors.force_tare_std_n = noise_n / std::sqrt(static_cast<double>(options_.push.free_air_samples));
+    const double samples = options_.push.settling.window_s / options_.push.sample_period_s;
+    sensors.force_std_n = noise_n / std::sqrt(std::max(1.0, samples));
+    sensors.contact_std_m = options_.push.contact_std_m;
+    sensors.levels = options_.levels;
+    suggesting.sensors = sensors;
+    out_.scene = prepare_pushes(scene, suggesting, hooks_.on_progress);
+  }
+
+  /// Of one reading in free air, per axis.
+  double force_noise_n() {
+    Vec3 sum = Vec3::Zero(), squares = Vec3::Zero();
+    const int count = options_.push.free_air_samples;
+    for (int i = 0; i < count; ++i) {
+      robot_.wait(options_.push.sample_period_s);
+      const Vec3 force = robot_.read().force_n;
+      sum += force;
+      squares += force.cwiseAbs2();
+    }
+    const Vec3 variance = (squares / count - (sum / count).cwiseAbs2()).cwiseMax(0.0);
+    return std::max(1e-4, std::sqrt(variance.mean()));
+  }
+
+  std::vector<RatedPush> order_of(std::vector<RatedPush> pushes) const {
+    if (options_.order == PushOrder::best_repeated) return {pushes.front()};
+    std::mt19937_64 random(options_.seed);
+    for (std::size_t i = pushes.size(); i > 1; --i) std::swap(pushes[i - 1], pushes[random() % i]);
+    return pushes;
+  }
+
+  /// The same place with the forces that are known to be right by now.
+  static RatedPush again(const std::vector<RatedPush>& pushes, const RatedPush& wanted) {
+    for (const auto& push : pushes)
+      if (push.candidate.contact_m == wanted.candidate.contact_m && push.candidate.direction == wanted.candidate.direction)
+        return push;
+    return wanted;
+  }
+
+  void push(ExploredPush& next, bool stiffness_known) {
+    acquisition::PushPlan plan = hooks_.plan(next.plan.candidate);
+    plan.name = next.name = "push " + std::to_string(out_.pushes.size() + static_cast<std::size_t>(out_.fruitless) + 1);
+    acquisition::PushOptions protocol = options_.push;
+    protocol.travel_limit_m = std::min(protocol.travel_limit_m, next.plan.travel_m);
+    if (stiffness_known) {
+      // Large strains may stiffen the object: the force, too, ends the push.
+      protocol.force_limit_n = std::min(protocol.force_limit_n, 1.1 * next.plan.force_n);
+      protocol.force_step_n = next.plan.force_n / options_.levels;
+    } else {
+      protocol.force_step_n = first_step_n(plan, protocol);  // of which travel_limit_m is the whole push's
+    }
+    bool begun = false;
+    const auto on_step = [&](const Push& made, const Step& step) {
+      if (!begun) {
+        out_.recording.pushes.push_back(made);
+        out_.recording.pushes.back().steps.clear();
+        if (hooks_.on_push_begin) hooks_.on_push_begin(made);
+      }
+      begun = true;
+      out_.recording.pushes.back().steps.push_back(step);
+      if (hooks_.on_step) hooks_.on_step(made, step);
+    };
+    next.report = acquisition::run_push(robot_, plan, protocol, on_step, hooks_.keep_going);
+  }
+
+  /// A short touch says how stiff it is there; nothing of it is recorded.
+  double first_step_n(const acquisition::PushPlan& plan, acquisition::PushOptions protocol) {
+    const double whole_m = protocol.travel_limit_m;
+    protocol.travel_limit_m = std::min(options_.touch_travel_m, protocol.travel_limit_m);
+    protocol.force_step_n = protocol.force_limit_n;
+    protocol.unloading_steps = 0;
+    const auto report = acquisition::run_push(robot_, plan, protocol, {}, hooks_.keep_going);
+    if (!(report.highest_force_n > 0) || !(report.deepest_m > 0)) return options_.push.force_step_n;
+    const double whole_n = report.highest_force_n / report.deepest_m * whole_m;
+    return std::max(1e-3, std::min(whole_n, options_.push.force_limit_n) / options_.levels);
+  }
+
+  /// The last push has a loaded step; else it is taken out of the recording again.
+  bool pressed() {
+    auto& pushes = out_.recording.pushes;
+    if (pushes.size() == out_.pushes.size()) return false;
+    for (const Step& step : pushes.back().steps)
+      if (!step.loads.empty()) return true;
+    pushes.pop_back();
+    return false;
+  }
+
+  void forget(const estimation::PushCandidate& candidate) {
+    auto& all = out_.scene.candidates;
+    all.erase(std::remove_if(all.begin(), all.end(), [&](const auto& one) { return one.contact_m == candidate.contact_m; }),
+              all.end());
+  }
+
+  /// @param whole  with the checks that refit parts of the recording: only the last estimate needs them
+  void estimate(bool whole) {
+    IdentifyOptions options = options_.identify;
+    options.fit.cross_checks = whole;
+    if (!out_.pushes.empty()) options.fit.young_start_pa = parameter(out_.identified.answer, "young_modulus").value;
+    out_.identified = identify(out_.recording, options, hooks_.on_progress);
+  }
+
+  void take_in(ExploredPush next) {
+    const Identification& answer = out_.identified.answer;
+    if (answer.parameters.empty()) {
+      out_.message = "the estimate did not work out: " + answer.message;
+      return;
+    }
+    next.young_modulus = parameter(answer, "young_modulus");
+    next.poisson_ratio = parameter(answer, "poisson_ratio");
+    next.found.log_young_std = std::sqrt(answer.covariance(0, 0));
+    next.found.poisson_std = std::sqrt(answer.covariance(1, 1));
+    out_.reached = young_modulus_half_width(next.young_modulus) <= options_.young_modulus_within &&
+                   poisson_ratio_half_width(next.poisson_ratio) <= options_.poisson_ratio_within;
+    out_.pushes.push_back(std::move(next));
+    if (hooks_.on_push) hooks_.on_push(out_.pushes.back());
+    if (out_.reached) out_.message = "both intervals are as narrow as was asked for";
+  }
+
+  Explored end(const std::string& message) {
+    out_.message = message;
+    const bool stopped = hooks_.keep_going && !hooks_.keep_going();
+    if (options_.identify.fit.cross_checks && !out_.pushes.empty() && !stopped) estimate(true);
+    return std::move(out_);
+  }
+
+  acquisition::Robot& robot_;
+  ExploreOptions options_;
+  const ExploreHooks& hooks_;
+  Explored out_;
+};
+
+}  // namespace
+
+void check(const ExploreOptions& o) {
+  const auto need = [](bool good, const char* field, const char* rule) {
+    if (!good) throw Error(rule, std::string("ExploreOptions.") + field);
+  };
+  need(o.young_modulus_within > 0, "young_modulus_within", "must be positive");
+  need(o.poisson_ratio_within > 0, "poisson_ratio_within", "must be positive");
+  need(o.max_pushes >= 1, "max_pushes", "must be at least 1");
+  need(o.levels >= 1, "levels", "must be at least 1");
+  need(o.touch_travel_m > 0, "touch_travel_m", "must be positive");
+  need(o.identify.method == "palpate", "identify.method", "must be palpate: the paper's has no interval");
+  acquisition::check(o.push);
+  estimation::check(o.suggest.candidates);
+}
+
+double young_modulus_half_width(const Parameter& young) { return 0.5 * (young.upper_95 - young.lower_95) / young.value; }
+double poisson_ratio_half_width(const Parameter& ratio) { return 0.5 * (ratio.upper_95 - ratio.lower_95); }
+
+Explored explore(acquisition::Robot& robot, const Recording& scene, const ExploreOptions& options,
+                 const ExploreHooks& hooks) {
+  check(options);
+  if (!hooks.plan) throw Error("must say how the robot makes a push", "ExploreHooks.plan");
+  return Loop(robot, scene, options, hooks).run();
+}
+
+}  // namespace palpate

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// The door that closes the loop: push, estimate, take the next best push, until E and nu are known as well as was asked for,
+// or the pushes are used up.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "palpate/acquisition/push_protocol.hpp"
+#include "palpate/identify.hpp"
+#include "palpate/suggest.hpp"
+
+namespace palpate {
+
+/// Which of the candidates comes next. All but `next_best` are there to be compared with.
+enum class PushOrder {
+  next_best,     ///< ranked anew after each estimate
+  random,        ///< a seeded order over the same candidates
+  best_repeated  ///< the one that is best before the first touch, again and again
+};
+
+struct ExploreOptions {
+  double young_modulus_within = 0.05;  ///< half of the 95 % interval over E
+  double poisson_ratio_within = 0.03;  ///< half of the 95 % interval
+  int max_pushes = 8;
+  PushOrder order = PushOrder::next_best;
+  std::uint64_t seed = 1;         ///< of the random order
+  SuggestOptions suggest;         ///< goal, limits, candidates; its cameras and sensors are the robot's
+  int levels = 4;                 ///< force steps of a push
+  double touch_travel_m = 0.002;  ///< of the trial touch that sizes the first push's steps; it is not recorded
+  acquisition::PushOptions push;  ///< limits of force and travel are the lower of these and the plan's
+  IdentifyOptions identify;
+};
+
+/// @throws Error naming the option that is out of range.
+void check(const ExploreOptions& options);
+
+/// One push of the loop, and what it gave.
+struct ExploredPush {
+  std::string name;
+  estimation::RatedPush plan;  ///< `expected` is what was promised for after it
+  acquisition::PushReport report;
+  Parameter young_modulus, poisson_ratio;  ///< estimated from all pushes so far
+  estimation::ExpectedSpread found;        ///< standard deviations of that estimate
+};
+
+struct Explored {
+  Recording recording;
+  Identified identified;
+  PushScene scene;
+  std::vector<ExploredPush> pushes;
+  int fruitless = 0;     ///< pushes that found nothing to press on; they count, and their places are not tried again
+  bool reached = false;  ///< the goal
+  std::string message;   ///< why it ended, in plain words
+};
+
+struct ExploreHooks {
+  /// How this robot makes a push at this place (orientation of the tip, its own bookkeeping). Required.
+  std::function<acquisition::PushPlan(const estimation::PushCandidate& candidate)> plan;
+  std::function<void(const Push& push)> on_push_begin;    ///< before its first step is handed over
+  acquisition::OnStep on_step;                            ///< every recorded step
+  std::function<void(const ExploredPush& push)> on_push;  ///< after each estimate
+  std::function<bool()> keep_going;                       ///< false: stop where it is
+  OnProgress on_progress;
+};
+
+/// @param scene  object, supports, tools and priors without pushes
+/// @throws Error where no push is possible, no hook plans one, or no answer can exist.
+Explored explore(acquisition::Robot& robot, const Recording& scene, const ExploreOptions& options,
+                 const ExploreHooks& hooks);
+
+/// Half of a 95 % interval over E (relative) and of nu.
+double young_modulus_half_width(const Parameter& young_modulus);
+double poisson_ratio_half_width(const Parameter& poisson_ratio);
+
+}  // namespace palpate

@@ -1,0 +1,157 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// The loop of push, estimate, next push on a small robot with a truth of its own. PALPATE_LABS=40 explore_explore_test
+// --gtest_filter='*Fewer*' compares the orders on forty of them.
+#include "palpate/explore.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "block_robot.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+ExploreOptions loop_options() {
+  ExploreOptions options;
+  options.young_modulus_within = 0.04;
+  options.poisson_ratio_within = 0.014;
+  options.max_pushes = 12;
+  options.levels = 2;
+  options.suggest.candidates.contacts = 8;
+  options.suggest.candidates.tilts = 1;
+  options.push.unloading_steps = 0;
+  options.push.contact_std_m = 1e-3;
+  options.push.settling_timeout_s = 3;
+  options.identify.fit.cross_checks = false;
+  return options;
+}
+
+struct Tried {
+  Explored found;
+  int begun = 0, steps = 0, told = 0;
+};
+
+Tried explored(BlockRobot& robot, const ExploreOptions& options, const std::function<bool()>& keep_going = {}) {
+  Tried run;
+  ExploreHooks hooks;
+  hooks.plan = [&](const estimation::PushCandidate& at) { return robot.plan(at); };
+  hooks.on_push_begin = [&](const Push&) { ++run.begun; };
+  hooks.on_step = [&](const Push&, const Step&) { ++run.steps; };
+  hooks.on_push = [&](const ExploredPush&) { ++run.told; };
+  hooks.keep_going = keep_going;
+  run.found = explore(robot, BlockRobot::scene(), options, hooks);
+  return run;
+}
+
+std::size_t count(const Explored& run) { return run.pushes.size() + static_cast<std::size_t>(run.fruitless); }
+
+TEST(Explore, EndsWhenBothIntervalsAreAsNarrowAsAskedForAndHoldTheTruth) {
+  BlockRobot robot(1);
+  const Tried run = explored(robot, loop_options());
+  const Explored& found = run.found;
+  ASSERT_TRUE(found.reached) << found.message;
+  ASSERT_FALSE(found.pushes.empty());
+  const ExploredPush& last = found.pushes.back();
+  EXPECT_LE(young_modulus_half_width(last.young_modulus), 0.04);
+  EXPECT_LE(poisson_ratio_half_width(last.poisson_ratio), 0.014);
+  for (std::size_t i = 0; i + 1 < found.pushes.size(); ++i)
+    EXPECT_TRUE(young_modulus_half_width(found.pushes[i].young_modulus) > 0.04 ||
+                poisson_ratio_half_width(found.pushes[i].poisson_ratio) > 0.014);
+  EXPECT_NEAR(std::log(last.young_modulus.value / estimation::true_young_pa), 0, 0.07);
+  EXPECT_NEAR(last.poisson_ratio.value, estimation::true_poisson, 0.035);
+  // What was promised for each push came about, within a factor of two (the stick hides nothing from this camera).
+  for (const auto& push : found.pushes) {
+    EXPECT_LT(std::abs(std::log(push.found.log_young_std / push.plan.expected.log_young_std)), std::log(2.0)) << push.name;
+    EXPECT_LT(push.report.highest_force_n, 50);
+  }
+  // The recording is the whole of it, and every step was handed over as it was made.
+  ASSERT_EQ(found.recording.pushes.size(), found.pushes.size());
+  std::size_t steps = 0;
+  for (const auto& push : found.recording.pushes) steps += push.steps.size();
+  EXPECT_EQ(static_cast<std::size_t>(run.steps), steps);
+  EXPECT_EQ(static_cast<std::size_t>(run.begun), found.pushes.size());
+  EXPECT_EQ(static_cast<std::size_t>(run.told), found.pushes.size());
+  EXPECT_GT(found.identified.volume.tetrahedra.rows(), 0);
+}
+
+TEST(Explore, NextBestPushNeedsFewerPushesThanARandomOrderOrTheBestPlaceRepeated) {
+  const char* text = std::getenv("PALPATE_LABS");
+  const int labs = text != nullptr ? std::max(1, std::atoi(text)) : 1;
+  std::vector<double> random_share, repeated_share;
+  for (int seed = 1; seed <= labs; ++seed) {
+    std::size_t pushes[3];
+    for (const PushOrder order : {PushOrder::next_best, PushOrder::random, PushOrder::best_repeated}) {
+      BlockRobot robot(static_cast<unsigned>(seed));
+      ExploreOptions options = loop_options();
+      options.poisson_ratio_within = 0.011;
+      options.max_pushes = labs > 1 ? 12 : 6;
+      options.order = order;
+      options.seed = static_cast<std::uint64_t>(seed);
+      const Tried run = explored(robot, options);
+      pushes[static_cast<int>(order)] = count(run.found);
+      if (order == PushOrder::next_best) {
+        EXPECT_TRUE(run.found.reached) << run.found.message;
+      }
+    }
+    std::printf("seed %d: next best %zu, random %zu, repeated %zu (%d: or more)\n", seed, pushes[0], pushes[1], pushes[2],
+                labs > 1 ? 12 : 6);
+    std::fflush(stdout);
+    random_share.push_back(static_cast<double>(pushes[0]) / static_cast<double>(pushes[1]));
+    repeated_share.push_back(static_cast<double>(pushes[0]) / static_cast<double>(pushes[2]));
+  }
+  const auto median = [](std::vector<double> v) {
+    std::sort(v.begin(), v.end());
+    return v[v.size() / 2];
+  };
+  std::printf("share of the pushes, median of %d: %.2f of the random order's, %.2f of the repeated one's\n", labs,
+              median(random_share), median(repeated_share));
+  EXPECT_LE(median(random_share), 1);
+  EXPECT_LE(median(repeated_share), 1);
+}
+
+TEST(Explore, BudgetRefusalAndUserEndIt) {
+  ExploreOptions options = loop_options();
+  options.max_pushes = 1;
+  options.young_modulus_within = 1e-4;
+  BlockRobot robot(2);
+  const Explored one = explored(robot, options).found;
+  EXPECT_FALSE(one.reached);
+  EXPECT_EQ(one.pushes.size(), 1u);
+  EXPECT_EQ(one.message, "all pushes are used up");
+
+  BlockRobot stubborn(2);
+  stubborn.refuses = true;
+  options.max_pushes = 3;
+  const Explored none = explored(stubborn, options).found;
+  EXPECT_EQ(none.fruitless, 3);
+  EXPECT_TRUE(none.pushes.empty());
+  EXPECT_TRUE(none.recording.pushes.empty());
+  EXPECT_EQ(stubborn.places, 3) << "a place that failed is not tried again";
+
+  BlockRobot stopped(2);
+  int asked = 0;
+  const Explored half = explored(stopped, options, [&] { return ++asked < 60; }).found;
+  EXPECT_FALSE(half.reached);
+  EXPECT_EQ(half.message, "stopped on request");
+}
+
+TEST(Explore, BadOptionsAreNamed) {
+  BlockRobot robot(1);
+  ExploreHooks hooks;
+  EXPECT_THROW(explore(robot, BlockRobot::scene(), {}, hooks), Error);
+  hooks.plan = [&](const estimation::PushCandidate& at) { return robot.plan(at); };
+  ExploreOptions options;
+  options.young_modulus_within = 0;
+  EXPECT_THROW(explore(robot, BlockRobot::scene(), options, hooks), Error);
+  options = {};
+  options.identify.method = "paper";
+  EXPECT_THROW(explore(robot, BlockRobot::scene(), options, hooks), Error);
+}
+
+}  // namespace
+}  // namespace palpate
