@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "cli/bag_recording.hpp"
+#include "cli/live_report.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/identify.hpp"
@@ -25,6 +26,7 @@ struct Options {
   double poisson_ratio = -2, young_start_pa = 0;
   int max_iterations = 60;
   bool budget = false;
+  LiveOptions live;
 };
 
 /// Seconds a stage, from the progress reports: the library itself reads no clock.
@@ -93,7 +95,8 @@ void tell(Session& session, const Options& given, const Identification& answer) 
 
 int estimate(Session& session, const Options& given) {
   StageClock clock;
-  const OnProgress show = session.progress();
+  LiveReport live(given.live, session, given.recording.filename().string());
+  const OnProgress show = live.watch(session.progress());
   const OnProgress progress = [&](std::string_view stage, double share) {
     clock.enter(std::string(stage));
     return show ? show(stage, share) : true;
@@ -101,7 +104,9 @@ int estimate(Session& session, const Options& given) {
   progress("read", 0);
   const Recording recording = load_recording(session, given.recording, given.mapping);
   for (const auto& warning : recording.warnings) session.warn(warning);
-  Identified found = identify(recording, identify_options(given, session), progress);
+  IdentifyOptions options = identify_options(given, session);
+  options.fit.on_estimate = live.on_estimate(recording);
+  Identified found = identify(recording, options, progress);
   Identification& answer = found.answer;
   answer.provenance["recording path"] = std::filesystem::absolute(given.recording).lexically_normal().string();
   answer.provenance["seed"] = std::to_string(session.seed);
@@ -118,6 +123,7 @@ int estimate(Session& session, const Options& given) {
   if (!answer.parameters.empty()) tell(session, given, answer);
   session.say(fmt::format("written            {}", (given.out / "report.html").string()));
   session.result(io::result_json(answer));
+  live.finish(answer, recording, (given.out / "report.html").string());
   return answer.termination == Termination::converged ? exit_done : exit_numbers;
 }
 
@@ -141,6 +147,7 @@ Run verbs::estimate(CLI::App& app) {
   app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)");
   app.add_option("--max-iterations", given->max_iterations, "most iterations of the fit")->check(CLI::PositiveNumber);
   app.add_flag("--budget", given->budget, "print what each input's uncertainty does to E and nu");
+  given->live.add_to(app);
   return [given](Session& session) { return estimate(session, *given); };
 }
 

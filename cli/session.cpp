@@ -42,6 +42,31 @@ void stop_on_interrupt() {
   std::signal(SIGPIPE, SIG_IGN);  // a reader that closed early is no reason to lose a result on disk
 }
 
+std::string stage_words(std::string_view stage) {
+  constexpr std::pair<std::string_view, std::string_view> words[] = {
+      {"read", "reading the recording"},
+      {"press", "pressing the object"},
+      {"lattice", "filling the object with tetrahedra"},
+      {"quality", "improving the tetrahedra"},
+      {"fit", "fitting"},
+      {"paper's method", "fitting by the paper's method"},
+      {"mesh error", "asking a finer mesh"},
+      {"posterior", "exploring the posterior"},
+      {"stress", "stresses"},
+      {"cross-check", "checking the parts against each other"},
+      {"write", "writing"},
+  };
+  for (const auto& [name, said] : words) {
+    if (name == stage) return std::string(said);
+  }
+  return std::string(stage);
+}
+
+std::optional<double> time_left_s(double elapsed_s, double share) {
+  if (!(elapsed_s > time_left_after_s) || !(share > time_left_after_share) || !(share < 1)) return std::nullopt;
+  return elapsed_s * (1 - share) / share;
+}
+
 bool Session::interrupted() { return interrupt_seen.load(); }
 
 std::string duration(double seconds) {
@@ -67,6 +92,13 @@ void Session::say(std::string_view line) {
   const std::scoped_lock lock(mutex_);
   clear_line();
   fmt::print(stderr, "{}\n", line);
+}
+
+void Session::announce(std::string_view line) {
+  const std::scoped_lock lock(mutex_);
+  clear_line();
+  fmt::print(stderr, "{}\n", line);
+  std::fflush(stderr);
 }
 
 void Session::warn(std::string_view line) {
@@ -97,24 +129,21 @@ bool Session::draw(std::string_view stage, double share) {
   if (stage != stage_) {
     if (on_terminal && !stage_.empty() && line_open_) {
       clear_line();
-      fmt::print(stderr, "  {:<40} {}\n", stage_, duration(since(stage_start_)));
+      fmt::print(stderr, "  {:<40} {}\n", stage_words(stage_), duration(since(stage_start_)));
     }
     stage_ = stage;
     stage_start_ = now;
     last_draw_ = {};
-    if (!on_terminal) fmt::print(stderr, "{} ...\n", stage_);
+    if (!on_terminal) fmt::print(stderr, "{} ...\n", stage_words(stage_));
   }
   const bool finished = share >= 1.0;
   if (on_terminal && finished) {
     clear_line();
-    fmt::print(stderr, "  {:<40} {}\n", stage_, duration(since(stage_start_)));
+    fmt::print(stderr, "  {:<40} {}\n", stage_words(stage_), duration(since(stage_start_)));
     stage_.clear();
   } else if (on_terminal && since(last_draw_) > redraw_every_s) {
-    const double elapsed = since(stage_start_);
-    std::string line = fmt::format("  {:<40} {:3.0f} %", stage_, 100 * std::fmax(share, 0.0));
-    if (elapsed > time_left_after_s && share > time_left_after_share) {
-      line += fmt::format("  about {} left", duration(elapsed * (1 - share) / share));
-    }
+    std::string line = fmt::format("  {:<40} {:3.0f} %", stage_words(stage_), 100 * std::fmax(share, 0.0));
+    if (const auto left_s = time_left_s(since(stage_start_), share)) line += fmt::format("  about {} left", duration(*left_s));
     if (line.size() >= terminal_columns()) line.resize(terminal_columns() - 1);
     fmt::print(stderr, "\r\033[K{}", line);
     std::fflush(stderr);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -32,6 +33,8 @@ class Session {
 
   /// A line for people on stderr, unless --quiet.
   void say(std::string_view line);
+  /// A line that the user asked for by an option: also with --quiet.
+  void announce(std::string_view line);
   /// A warning in plain words on stderr, also with --quiet.
   void warn(std::string_view line);
   /// The one JSON object of this run on stdout, with --json only. NaN becomes null.
@@ -55,6 +58,12 @@ class Session {
 
 /// Ctrl-C asks the running work to stop at its next progress report; pressed again it ends the program at once.
 void stop_on_interrupt();
+
+/// A stage of the library ("lattice") in the words of this program ("filling with tetrahedra").
+std::string stage_words(std::string_view stage);
+
+/// By the share that is done; nothing while that says little.
+std::optional<double> time_left_s(double elapsed_s, double share);
 
 /// "12 s", "3 min 20 s", "1 h 05 min"
 std::string duration(double seconds);

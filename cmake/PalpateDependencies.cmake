@@ -14,3 +14,7 @@ find_package(SQLite3 REQUIRED)
 find_package(fmt REQUIRED)
 find_path(METIS_INCLUDE_DIR metis.h REQUIRED)
 find_library(METIS_LIBRARY metis REQUIRED)
+# The program's live view; headers only.
+if(PALPATE_BUILD_CLI)
+  find_package(Boost 1.74 REQUIRED)
+endif()

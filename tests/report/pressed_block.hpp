@@ -115,10 +115,17 @@ inline palpate::Identification identification(const Size& size = {}) {
       step.force_n = Vec3(0, 0, -step.force_measured_n);
       step.contact_m = contact;
       step.tool_radius_m = 0.012;
+      step.von_mises_pa = (step.surface_m - id.surface.vertices_m).rowwise().norm() * (young_pa / edge_m);
+      step.masked_m = Points::Zero(40, 3);  // a strip of table beside the block
+      for (int i = 0; i < 40; ++i) step.masked_m.row(i) << edge_m * (0.55 + 0.005 * i), edge_m * (0.02 * i - 0.4), 0;
       id.steps.push_back(step);
     }
     id.per_push.push_back(
         {"young_modulus", name, "Pa", young_pa * (1 + 0.02 * p), 600, 19100.0 + 400 * p, 21500.0 + 400 * p, true});
+  }
+  if (size.pushes > 1) {  // the first two at one place, the others at another
+    id.per_site = {{"young_modulus", "left", "Pa", young_pa * 1.01, 500, 19300, 21300, true},
+                   {"young_modulus", "right", "Pa", young_pa * 0.99, 500, 18900, 20900, true}};
   }
   id.fit = {std::sqrt(squares / static_cast<double>(points)),   1.03, points, static_cast<std::size_t>(size.pushes),
             static_cast<std::size_t>(size.pushes * size.steps), 6,    9};

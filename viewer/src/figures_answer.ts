@@ -156,6 +156,8 @@ export function perPush(report: Report, width: number): SVGElement | null {
 }
 
 export function perSite(report: Report, width: number): SVGElement | null {
+  // Where every site was pushed once, the pushes have said it all.
+  if (report.per_site.every((site) => report.per_push.some((push) => push.value === site.value))) return null;
   const sites = report.per_site.filter((p) => known(p.lower_95) && known(p.upper_95)).slice(0, 60);
   return youngOfParts(report, width, [[sites, category(3)]], "Young's modulus of each site alone");
 }

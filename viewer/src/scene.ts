@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The object in 3D: simulated surface, observed cloud, the push. Draws only when something changed.
 import {
-  AmbientLight, BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide, Group,
+  AmbientLight, BufferAttribute, BufferGeometry, CatmullRomCurve3, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide, Group,
   LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Points, PointsMaterial,
-  Quaternion, Scene, TorusGeometry, Vector3, WebGLRenderer, WireframeGeometry,
+  Quaternion, Scene, TubeGeometry, Vector3, WebGLRenderer, WireframeGeometry,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { observed, signedColour, sizeColour, unseen } from "./colours";
@@ -226,15 +226,23 @@ export class View {
     shaft.position.copy(tip).addScaledVector(direction, -thick * 6 - length / 2);
     this.push.add(head, shaft);
     const radius = step.tool_radius_m ?? 0;
-    if (radius > 0) {
-      const patch = new Mesh(new TorusGeometry(radius, thick * 0.35, 8, 48), material);
-      patch.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), direction);
-      patch.position.copy(tip);
-      this.push.add(patch);
-    }
+    if (radius > 0) this.push.add(new Mesh(this.patchRim(step, direction, radius, thick * 0.4), material));
   }
 
-  /** Where the contact point of the rest surface has gone: with its nearest vertex. */
+  /** The rim of the touched patch, draped over the deformed surface. */
+  private patchRim(step: Step, direction: Vector3, radius: number, thick: number): TubeGeometry {
+    const centre = new Vector3(...(step.contact_m as number[]));
+    const turn = new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), direction);
+    const rim: Vector3[] = [];
+    for (let k = 0; k < 48; ++k) {
+      const angle = (2 * Math.PI * k) / 48;
+      const at = new Vector3(Math.cos(angle), Math.sin(angle), 0).multiplyScalar(radius).applyQuaternion(turn).add(centre);
+      rim.push(this.deformed(at, step).addScaledVector(direction, -thick));
+    }
+    return new TubeGeometry(new CatmullRomCurve3(rim, true), 96, thick, 6, true);
+  }
+
+  /** Where a point of the rest surface has gone: with its nearest vertex. */
   private deformed(point: Vector3, step: Step): Vector3 {
     if (!step.surface) return point;
     let best = -1;

@@ -11,14 +11,15 @@ const quiet = [
 ];
 const software = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
 
-/** Opens a page file, hands it and what it complained about to `use`, and cleans up. */
+/** Opens a page file (or a live view's address), hands it and what it complained about to `use`, and cleans up. */
 export async function withPage(file, { webgl = true, ...context } = {}, use) {
+  const live = file.startsWith("http://127.0.0.1:");
   const profile = mkdtempSync(join(tmpdir(), "palpate-browser-"));
   const browser = await chromium.launchPersistentContext(profile, {
     executablePath: process.env.PALPATE_CHROMIUM ?? "/usr/bin/chromium",
     headless: true,
     args: [...quiet, ...(webgl ? software : ["--disable-3d-apis"])],
-    offline: true,
+    offline: !live,
     viewport: { width: 1200, height: 900 },
     ...context,
   });
@@ -28,10 +29,11 @@ export async function withPage(file, { webgl = true, ...context } = {}, use) {
     page.on("console", (message) => ["error", "warning"].includes(message.type()) && complaints.push(message.text()));
     page.on("pageerror", (error) => complaints.push(String(error)));
     page.on("request", (request) => {
-      if (!/^(file|data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`);
+      const own = live ? request.url().startsWith(file) : /^file:/.test(request.url());
+      if (!own && !/^(data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`);
     });
-    await page.goto(`file://${file}`);
-    await page.waitForSelector("html[data-ready=true]", { timeout: 60000 });
+    await page.goto(live ? file : `file://${file}`);
+    await page.waitForSelector("html[data-ready=true]", { timeout: 120000 });
     return await use(page, complaints);
   } finally {
     await browser.close();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // usage: node page.mjs CHECK REPORT.html     exit code 0: holds
+//        node page.mjs live ADDRESS RESULT.json
 import assert from "node:assert/strict";
+import { existsSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { withPage } from "./browser.mjs";
 
@@ -43,6 +45,20 @@ const checks = {
       const data = await dataOf(page);
       const legend = Number(await page.locator('[data-key="legend-max"]').textContent());
       assert.ok(Math.abs(legend / 1000 / data.residual_scale_m - 1) < 0.01, `legend ends at ${legend}, data at ${data.residual_scale_m}`);
+      await page.locator('[data-mode="stress"]').click();
+      await settled(page);
+      assert.equal(await page.locator(".legend-title").textContent(), "von Mises stress (kPa)");
+      assert.ok(Math.abs(Number(await page.locator('[data-key="legend-max"]').textContent()) * 1000 / data.stress_scale_pa - 1) < 0.01);
+      for (const shown of ["masked", "mesh", "push"]) {
+        const before = await canvas.screenshot();
+        await page.locator(`[data-show="${shown}"]`).click();
+        await settled(page);
+        assert.ok(!before.equals(await canvas.screenshot()), `switching ${shown} does not change the picture`);
+      }
+      assert.equal(Number(await slider.getAttribute("max")), data.steps.length - 1, "the slider does not reach over all pushes");
+      await slider.fill("0");
+      assert.equal(await page.getByRole("combobox", { name: "Push" }).inputValue(), "0");
+      assert.ok((await page.locator(".plot .band").count()) > 0, "force against travel has no band");
       await page.locator('[data-mode="displacement"]').click();
       const deepest = Math.max(...data.steps.map((s) => s.travel_m));
       const reach = Number(await page.locator('[data-key="legend-max"]').textContent()) / 1000;
@@ -50,9 +66,16 @@ const checks = {
       // A click on a measured point selects its step.
       await page.locator(".plot .point").nth(1).dispatchEvent("click"); // the marks of two pushes may overlap
       assert.match(await page.locator(".readout").textContent(), new RegExp(`^step ${data.steps[1].step} `));
-      for (const name of ["Force against travel", "What the data say", "Residuals", "Error budget", "Nuisances", "Convergence", "Each push"]) {
+      for (const name of ["Force against travel", "What the data say", "Residuals", "Error budget", "Nuisances", "Convergence", "Each push", "Each site"]) {
         assert.ok((await page.locator("figure h3", { hasText: name }).count()) > 0, `no figure ${name}`);
       }
+      // Paper unfolds what the screen folds.
+      await page.evaluate(() => window.dispatchEvent(new Event("beforeprint")));
+      assert.equal(await page.locator("#provenance details").evaluate((node) => node.open), true);
+      await page.emulateMedia({ media: "print" });
+      assert.equal(await page.locator(".toggles").isVisible(), false);
+      assert.equal(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), "rgb(255, 255, 255)");
+      await page.emulateMedia({ media: "screen" });
       await page.setViewportSize({ width: 360, height: 780 });
       await settled(page);
       const wide = await page.evaluate(() => document.documentElement.scrollWidth);
@@ -112,5 +135,41 @@ const checks = {
   },
 };
 
-const [name, file] = process.argv.slice(2);
-await checks[name](resolve(file));
+/** The page of a running estimate: looked at from its first estimate to its end. */
+async function live(address, result) {
+  await withPage(address, {}, async (page, complaints) => {
+    const lead = () => page.locator(".lead").textContent();
+    assert.match(await lead(), /^So far: Young's modulus /);
+    assert.ok(!existsSync(result), "the first estimate was shown after the end");
+    assert.match(await page.locator("#live").textContent(), /^Running: .+ \d+ %/);
+    const canvas = page.locator(".view canvas");
+    await page.locator('[data-show="cloud"]').uncheck();
+    await settled(page);
+    const slider = page.getByRole("slider", { name: "Step" });
+    const last = await canvas.screenshot();
+    await slider.fill("0");
+    await settled(page);
+    assert.ok(!last.equals(await canvas.screenshot()), "the slider does not change the picture");
+    await page.evaluate(() => (document.querySelector(".view canvas").dataset.mark = "mine"));
+
+    await page.waitForSelector('#live[data-finished="true"]', { timeout: 240000 });
+    const answer = JSON.parse(readFileSync(result, "utf8"));
+    for (const p of answer.parameters) {
+      const card = page.locator(`.card[data-name="${p.name}"]`).first();
+      assert.equal(Number(await card.locator('data[data-key="value"]').getAttribute("value")), p.value, p.name);
+      assert.equal(Number(await card.locator('data[data-key="interval"]').getAttribute("value")), p.lower_95, p.name);
+    }
+    assert.match(await lead(), /^Young's modulus is .+ \(95 % interval /);
+    // What the reader has chosen outlives the updates.
+    assert.equal(await page.locator(".view canvas").getAttribute("data-mark"), "mine");
+    assert.equal(await slider.inputValue(), "0");
+    assert.equal(await page.locator('[data-show="cloud"]').isChecked(), false);
+    for (const name of ["What the data say", "Convergence", "Error budget"]) {
+      assert.ok((await page.locator("figure h3", { hasText: name }).count()) > 0, `no figure ${name}`);
+    }
+    assert.deepEqual(real(complaints), []);
+  });
+}
+
+const [name, file, result] = process.argv.slice(2);
+await (name === "live" ? live(file, result) : checks[name](resolve(file)));
