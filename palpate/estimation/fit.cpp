@@ -204,6 +204,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     residuals = objective.summarise(loss);
   }
   answer.fit.iterations = optimum.iterations;
+  const ReuseWhile reuse(model, optimiser.reuse);  // what follows looks at the optimum and close around it
 
   const double factor = residuals.points > 0 ? tukey_information_factor(loss.tukey) : 1;
   const std::vector<int> moving = free_unknowns(unknowns);

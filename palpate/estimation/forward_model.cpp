@@ -100,6 +100,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     }
   }
   memory_.resize(steps_.size());
+  followed_.assign(steps_.size(), 0);
   workers_ = std::clamp<std::size_t>(static_cast<std::size_t>(std::max(options_.threads, 1)), 1, steps_.size());
   linear_ = fem::material_law(object_.material).is_linear();
   poisson_lower_ = unknowns[poisson].lower;
@@ -169,6 +170,33 @@ ForwardModel::Watched ForwardModel::superpose(const Body& body, const Coefficien
   return watched;
 }
 
+double ForwardModel::reuse_error() const {
+  const double furthest = *std::max_element(followed_.begin(), followed_.end());
+  return furthest * furthest;
+}
+
+VectorX ForwardModel::Memory::change_to(const VectorX& there) const {
+  VectorX change(static_cast<Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k) change(static_cast<Index>(k)) = there(columns[k]) - unknowns(columns[k]);
+  return change;
+}
+
+bool ForwardModel::follow(std::size_t s, const VectorX& unknowns, Watched& watched, StepPrediction& out) {
+  const Memory& anchor = memory_[s];
+  if (!anchor.valid || anchor.columns.empty()) return false;
+  const VectorX change = anchor.change_to(unknowns);
+  watched = anchor.watched;
+  watched.moved_m += watched.d_moved * change;
+  const double moved_m = (watched.moved_m - anchor.watched.moved_m).lpNorm<Eigen::Infinity>();
+  if (moved_m > reuse_ * anchor.watched.moved_m.lpNorm<Eigen::Infinity>()) return false;
+  if (moved_m > 0) followed_[s] = moved_m / anchor.watched.moved_m.lpNorm<Eigen::Infinity>();
+  watched.conjugate_m += watched.d_conjugate * change;
+  watched.reaction_n += watched.d_reaction * change;
+  out.converged = true;
+  out.inverted_elements = anchor.inverted_elements;
+  return true;
+}
+
 int ForwardModel::inverted_elements(std::size_t s, const VectorX& unknowns) {
   Body& body = body_of(push(s), worker_of(s));
   const Coefficients c = coefficients(s, body, unknowns);
@@ -179,16 +207,14 @@ int ForwardModel::inverted_elements(std::size_t s, const VectorX& unknowns) {
 bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
                               Watched& watched, StepPrediction& out) {
   const std::size_t worker = worker_of(s);
+  followed_[s] = 0;
   // Start from the last solution of this step, or else of the step before, moved along its derivatives.
   Memory& memory = memory_[s];
   const Memory* from = memory.valid ? &memory : nullptr;
   VectorX start;
   if (from != nullptr) {
     start = from->displacement_m;
-    for (std::size_t k = 0; k < from->columns.size(); ++k) {
-      const double change = unknowns(from->columns[k]) - from->unknowns(from->columns[k]);
-      if (change != 0) start += change * from->derivative.col(static_cast<Index>(k));
-    }
+    start += from->derivative * from->change_to(unknowns);
     // A straight line is no good guess for a far step.
     const double moved_m = (start - from->displacement_m).lpNorm<Eigen::Infinity>();
     if (moved_m > 0.2 * from->displacement_m.lpNorm<Eigen::Infinity>()) start = from->displacement_m;
@@ -211,7 +237,7 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
 
   watched.moved_m = object_.surface.restrict(at.displacement_m);
   if (!derivatives) {
-    memory = {true, unknowns, at.displacement_m, {}, MatrixX(at.displacement_m.size(), 0)};
+    memory = {true, unknowns, at.displacement_m, {}, MatrixX(at.displacement_m.size(), 0), {}, at.inverted_elements};
     return true;
   }
   const fem::SensitivityAlong d = body.statics->sensitivity_along(at, c.d_force, c.d_motion);
@@ -224,7 +250,7 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
   watched.reaction_n = at.motion_reaction;
   watched.d_reaction.resize(c.motion.size(), 2 + others);
   watched.d_reaction << d.reaction_d_log_young, d.reaction_d_poisson, d.reaction_d_along;
-  memory = {true, unknowns, at.displacement_m, {log_young, poisson}, std::move(field)};
+  memory = {true, unknowns, at.displacement_m, {log_young, poisson}, std::move(field), watched, at.inverted_elements};
   memory.columns.insert(memory.columns.end(), c.columns.begin(), c.columns.end());
   return true;
 }
@@ -264,7 +290,8 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
   if (linear_) {
     at = superpose(body, c, unknowns, out);
     ++solves_[worker];
-  } else if (!solve_step(s, body, c, unknowns, derivatives, at, out)) {
+  } else if (!(reuse_ > 0 && derivatives && follow(s, unknowns, at, out)) &&
+             !solve_step(s, body, c, unknowns, derivatives, at, out)) {
     return out;
   }
 

@@ -84,6 +84,12 @@ class ForwardModel {
   std::size_t first_step_of(std::size_t worker) const { return worker * steps_.size() / workers_; }
   std::size_t workers() const { return workers_; }
 
+  /// A non-linear step whose solution would move by at most this share of itself since it was last solved follows its
+  /// derivatives and is not solved anew: wrong by about the share's square. 0 (the default): every prediction is a solution.
+  void set_reuse(double share) { reuse_ = share; }
+  /// The largest square of such a share in the steps' last predictions: how far they are from solutions, relative.
+  double reuse_error() const;
+
   /// Forgets warm starts, so that the next answer does not depend on what was asked before.
   void forget();
 
@@ -98,6 +104,8 @@ class ForwardModel {
   /// False: no equilibrium, and `out` says why.
   bool solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
                   Watched& watched, StepPrediction& out);
+  /// False: too far from where the step was last solved.
+  bool follow(std::size_t s, const VectorX& unknowns, Watched& watched, StepPrediction& out);
   Watched superpose(const Body& body, const Coefficients& c, const VectorX& unknowns, StepPrediction& out) const;
 
   std::size_t worker_of(std::size_t s) const;
@@ -117,6 +125,8 @@ class ForwardModel {
   bool linear_ = false;  // workers share one solver for each set of platens, else each has its own
   std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies_;
   std::vector<Memory> memory_;
+  double reuse_ = 0;
+  std::vector<double> followed_;  // a step: share of itself by which the last prediction left a solution
 
   Vec3 clamp_pivot_m_ = Vec3::Zero();
   std::vector<int> clamp_;                     // a step: first of six unknowns, or -1
@@ -128,6 +138,18 @@ class ForwardModel {
   std::optional<SurfaceField> field_;
   int field_unknown_ = -1;
   std::vector<int> solves_;  // a worker
+};
+
+/// Sets how far solutions are reused, for as long as it lives.
+class ReuseWhile {
+ public:
+  ReuseWhile(ForwardModel& model, double share) : model_(model) { model_.set_reuse(share); }
+  ~ReuseWhile() { model_.set_reuse(0); }
+  ReuseWhile(const ReuseWhile&) = delete;
+  ReuseWhile& operator=(const ReuseWhile&) = delete;
+
+ private:
+  ForwardModel& model_;
 };
 
 }  // namespace palpate::estimation

@@ -38,19 +38,23 @@ struct ForwardModel::Coefficients {
   MatrixX d_force, d_motion;  // coefficients x columns
 };
 
+/// Surface displacements, mean motions under the forces' columns (work-conjugate) and platens' reactions, with derivatives
+/// to log E, nu and the unknowns of Coefficients.
+struct ForwardModel::Watched {
+  VectorX moved_m, conjugate_m, reaction_n;
+  MatrixX d_moved, d_conjugate, d_reaction;
+};
+
 struct ForwardModel::Memory {
   bool valid = false;
   VectorX unknowns;
   VectorX displacement_m;
   std::vector<int> columns;
   MatrixX derivative;  // 3n x columns, object frame
-};
+  Watched watched;     // with derivatives where there are columns
+  int inverted_elements = 0;
 
-/// Surface displacements, mean motions under the forces' columns (work-conjugate) and platens' reactions, with derivatives
-/// to log E, nu and the unknowns of Coefficients.
-struct ForwardModel::Watched {
-  VectorX moved_m, conjugate_m, reaction_n;
-  MatrixX d_moved, d_conjugate, d_reaction;
+  VectorX change_to(const VectorX& there) const;  // of the columns' unknowns
 };
 
 /// Where a load acts: its columns, and the derivatives of those to a shift of the contact along two tangents.

@@ -114,7 +114,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
     copy.model.poisson_fixed = optimum.unknowns(poisson);
     copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
     object.material = "linear";
-    const auto statics = statics_options(recording, object, options);
+    const auto statics = statics_options(copy, object, options);  // of this ratio alone
     Unknowns unknowns;
     auto held = std::make_unique<Recording>(std::move(copy));
     ForwardModel model(*held, std::move(object), unknowns, statics);

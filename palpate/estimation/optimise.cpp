@@ -32,6 +32,8 @@ std::vector<int> free_unknowns(const Unknowns& unknowns) {
 Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, const OptimiseOptions& options,
                  const OnProgress& progress) {
   const Unknowns& unknowns = objective.unknowns();
+  ForwardModel& model = objective.model();
+  const ReuseWhile reuse(model, options.reuse);
   Optimum best;
   best.unknowns = start;
   best.evaluation = objective.evaluate(start, loss, progress);
@@ -41,6 +43,15 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
     return best;
   }
   if (options.on_accepted) options.on_accepted(best, true);
+  // The derivatives have been followed as far as they lead: from here on from a solution.
+  const auto solve_anew = [&] {
+    model.set_reuse(0);
+    Evaluation solved = objective.evaluate(best.unknowns, loss, progress);
+    model.set_reuse(options.reuse);
+    if (!solved.usable) return false;
+    best.evaluation = std::move(solved);
+    return true;
+  };
   double damping = 1e-6;
   for (best.iterations = 1; best.iterations <= options.max_iterations; ++best.iterations) {
     // Hold nu where it sits on a bound that the gradient pushes against.
@@ -106,11 +117,15 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
       if (options.on_accepted) options.on_accepted(best, false);
       // Rays that change triangles leave a floor on which steps of a hundredth of a standard deviation go to and fro.
       if ((largest < options.step_tolerance && gain < 1e-3) || (largest < 0.02 && gain < 1e-4)) {
-        best.termination = Termination::converged;
-        best.message = "converged";
-        return best;
+        if (model.reuse_error() <= options.reuse_error) {
+          best.termination = Termination::converged;
+          best.message = "converged";
+          return best;
+        }
+        solve_anew();
       }
     }
+    if (!accepted && model.reuse_error() > options.reuse_error && solve_anew()) continue;
     if (!accepted) {
       // Correspondences that flip between triangles leave a floor; a step that nothing improves on is the end.
       objective.evaluate(best.unknowns, loss, progress);
@@ -150,6 +165,8 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
   OptimiseOptions rough = options;
   rough.max_iterations = 4;
   rough.step_tolerance = 0.1;
+  rough.reuse = 0.1;
+  rough.reuse_error = 1e-2;
   while (loss.tukey > 2 * final_loss.tukey) {
     at = optimise(objective, at.unknowns, loss, rough, progress);
     iterations += at.iterations;

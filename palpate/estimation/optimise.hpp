@@ -15,6 +15,9 @@ struct OptimiseOptions {
   double step_tolerance = 1e-3;  ///< stop when log E and nu move by less than this share of their standard deviation
   /// Called where a round starts and after every accepted step; the objective's last evaluation is this one's.
   std::function<void(const Optimum&, bool starts)> on_accepted;
+  /// Non-linear steps follow their derivatives this far (ForwardModel::set_reuse), the optimum itself no further than
+  /// ForwardModel::reuse_error.
+  double reuse = 0.02, reuse_error = 1e-6;
 };
 
 struct Optimum {

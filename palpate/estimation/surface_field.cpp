@@ -2,6 +2,7 @@
 #include "palpate/estimation/surface_field.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
@@ -11,7 +12,8 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr Index most_modes = 300;  // the normal equations cost their square a point
+constexpr Index most_carriers = 400;
+constexpr double kept = 0.995;     // of the field's variance: the normal equations cost the square of the modes a point
 constexpr double spacing = 0.65;   // of the points that carry the field, in correlation lengths
 
 Points vertex_normals(const TriMesh& mesh) {
@@ -46,7 +48,7 @@ SurfaceField::SurfaceField(const TriMesh& rest, double std_m, double correlation
   std::vector<Index> carriers{0};
   VectorX gap2 = VectorX::Constant(count, std::numeric_limits<double>::infinity());
   const double enough2 = std::pow(spacing * correlation_m, 2);
-  while (static_cast<Index>(carriers.size()) < most_modes) {
+  while (static_cast<Index>(carriers.size()) < most_carriers) {
     const Index last = carriers.back();
     for (Index v = 0; v < count; ++v) {
       const double d2 = (rest.vertices_m.row(v) - rest.vertices_m.row(last)).squaredNorm() +
@@ -66,7 +68,14 @@ SurfaceField::SurfaceField(const TriMesh& rest, double std_m, double correlation
   }
   among.diagonal().array() += 1e-8 * std_m * std_m;
   const Eigen::LLT<MatrixX> root(among);
-  basis_ = root.matrixL().solve(across.transpose()).transpose();
+  const MatrixX full = root.matrixL().solve(across.transpose()).transpose();
+  // A smooth field has few directions that matter: the principal ones over the vertices, until little is left.
+  const Eigen::SelfAdjointEigenSolver<MatrixX> principal(full.transpose() * full);
+  const VectorX& variance = principal.eigenvalues();  // rising
+  double left = variance.sum() * (1 - kept);
+  Index dropped = 0;
+  while (dropped + 1 < modes && variance(dropped) < left) left -= variance(dropped++);
+  basis_ = full * principal.eigenvectors().rightCols(modes - dropped);
 }
 
 }  // namespace palpate::estimation

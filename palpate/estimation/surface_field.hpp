@@ -10,7 +10,7 @@ namespace palpate::estimation {
 /// Offset of surface vertex v along its normal: basis.row(v) . c with independent standard normal coefficients c. The prior is
 /// a Gaussian process: covariance of two vertices std_m^2 (n . n') exp(-|x - x'|^2 / (2 correlation_m^2)), in the low rank of
 /// points that lie everywhere within 0.65 correlation lengths (Quinonero-Candela and Rasmussen 2005, section 4: subset of
-/// regressors).
+/// regressors), cut to the principal modes that hold 99.5 % of the variance.
 class SurfaceField {
  public:
   /// @throws Error when std_m or correlation_m is not positive, or the surface is empty.

@@ -201,5 +201,47 @@ TEST(ForwardModel, WarmAndColdStartsAgree) {
   EXPECT_LT((plain.surface_m - cold).cwiseAbs().maxCoeff(), 1e-11);
 }
 
+// A step that is followed along its derivatives is as far from a solution as the model says, and none that is too far is.
+TEST(ForwardModel, FollowedStepsAreAsWrongAsTheySay) {
+  const TetMesh mesh = kuhn_block(3, 2, 2, block_size_m);
+  const Recording recording = clamped_block(mesh);
+  Unknowns unknowns;
+  ForwardModel model(recording, simulated(mesh, "neo_hookean"), unknowns, tight());
+  const VectorX at = away_from_rest(unknowns);
+  const auto all_steps = [&](const VectorX& there) {
+    std::vector<StepPrediction> steps;
+    for (std::size_t s = 0; s < model.step_count(); ++s) steps.push_back(model.predict(s, there));
+    return steps;
+  };
+  const auto anchors = all_steps(at);
+  EXPECT_EQ(model.reuse_error(), 0);
+  double before = 0;
+  for (const double change : {0.002, 0.02, 0.1}) {
+    VectorX there = at;
+    there(log_young) += change;
+    there(poisson) += 0.3 * change;
+    all_steps(at);
+    model.set_reuse(0.05);
+    const int solves = model.solves();
+    const auto followed = all_steps(there);
+    const double error = model.reuse_error();
+    const bool solved = model.solves() > solves;
+    model.set_reuse(0);
+    EXPECT_EQ(solved, change > 0.05) << change;
+    if (solved) continue;
+    EXPECT_GT(error, before);
+    before = error;
+    const auto truth = all_steps(there);
+    for (std::size_t s = 0; s < truth.size(); ++s) {
+      ASSERT_TRUE(truth[s].converged) << truth[s].reason;
+      ASSERT_TRUE(followed[s].converged);
+      const double moved_m = (truth[s].surface_m - model.object().surface.rest().vertices_m).cwiseAbs().maxCoeff();
+      EXPECT_LT((followed[s].surface_m - truth[s].surface_m).cwiseAbs().maxCoeff(), 3 * error * moved_m) << s << " at " << change;
+      if (truth[s].travel_m.size() == 0) continue;
+      EXPECT_LT((followed[s].travel_m - truth[s].travel_m).cwiseAbs().maxCoeff(), 3 * error * moved_m) << s << " at " << change;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace palpate::estimation
