@@ -27,6 +27,7 @@ struct RecordArguments {
   std::string output;
   std::string truth;
   bool resume = false;
+  int views = 0;
   std::string bag, raw_bag;
   acquisition::PushOptions push;
 };
@@ -57,6 +58,10 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   acquisition::PushOptions protocol = arguments.push;
   if (!(protocol.travel_limit_m > 0)) protocol.travel_limit_m = object.travel_limit_m;
   Recording recording = robot.scene();
+  if (arguments.views > 0) {
+    recording.rest.surface.reset();
+    recording.rest.views = robot.look_around(arguments.views);
+  }
   nlohmann::json truth = truth_json(robot);
   const std::filesystem::path truth_file =
       std::filesystem::path(arguments.truth.empty() ? folder.string() + ".truth.json" : arguments.truth);
@@ -165,6 +170,10 @@ Run verbs::record(CLI::App& app) {
   add_lab_options(app, arguments->lab);
   app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
   app.add_option("-o,--output", arguments->output, "folder to write; must not exist or be empty")->required();
+  app.add_option("--views", arguments->views,
+                 "look at the untouched object from this many sides and let `estimate` build its shape from that; 0: its shape is given")
+      ->check(CLI::Range(0, 64))
+      ->capture_default_str();
   app.add_option("--truth", arguments->truth,
                  "file for what the simulation knows and the recording does not (default: beside the recording, OUTPUT.truth.json; "
                  "with --demo: not written)");

@@ -154,6 +154,18 @@ reconstruction::BuiltObject build_from_views(const Recording& recording, const r
   return reconstruction::build_object(clouds, fuse, recording.supports, options, progress);
 }
 
+/// How far the seen part of a surface that was fused from views is off; 0 for one that was given.
+double seen_std_m(const reconstruction::BuiltObject& built) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t v = 0; v < built.seen.size(); ++v) {
+    if (built.seen[v] == 0) continue;
+    sum += std::pow(built.surface_sigma_m(static_cast<Index>(v)), 2);
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
 /// Volume mesh of a recording that gives a surface or views of one.
 void fill_with_tetrahedra(Recording& recording, const OnProgress& progress) {
   if (!recording.rest.surface && recording.rest.views.empty()) {
@@ -165,6 +177,7 @@ void fill_with_tetrahedra(Recording& recording, const OnProgress& progress) {
   auto built = recording.rest.surface
                    ? reconstruction::build_object(*recording.rest.surface, recording.supports, options, progress)
                    : build_from_views(recording, options, progress);
+  if (recording.rest.surface_std_m == 0) recording.rest.surface_std_m = seen_std_m(built);
   for (const auto& warning : built.model.warnings) recording.warnings.push_back(warning);
   recording.supports = std::move(built.model.supports);
   recording.rest.surface = std::move(built.model.surface);

@@ -267,6 +267,39 @@ DepthFrame LabRobot::take_depth_image() {
   return frame;
 }
 
+std::vector<DepthFrame> LabRobot::look_around(int views) const {
+  const Impl& lab = *impl_;
+  if (views < 1) throw Error("must be at least 1", "views");
+  const Vec3 low = lab.object.surface.vertices_m.colwise().minCoeff().transpose(),
+             high = lab.object.surface.vertices_m.colwise().maxCoeff().transpose();
+  const Vec3 middle = 0.5 * (low + high);
+  const double away_m = std::max(0.35, 2.2 * (high - low).norm());
+  const geometry::TriangleTree object(lab.object.surface);
+  Scene scene;
+  scene.bodies.push_back(&object);
+  scene.planes.push_back(lab.table);
+  Random random(lab.options.seed, 4);
+  std::vector<DepthFrame> frames;
+  for (int k = 0; k < views; ++k) {
+    const double around = 2 * M_PI * k / std::max(1, views - 1) + M_PI / 4, down = M_PI / 6;
+    Vec3 eye = middle + away_m * Vec3(std::cos(down) * std::cos(around), std::cos(down) * std::sin(around), std::sin(down));
+    if (k > 0 && k == views - 1) eye = middle + away_m * Vec3(0.05, 0, 1).normalized();
+    DepthFrame frame;
+    frame.camera = lab.camera;
+    frame.T_base_camera = look_at(eye, middle);
+    frame.pose_std_m = lab.options.camera_std_m;
+    frame.pose_std_rad = lab.options.camera_std_rad;
+    frame.noise = lab.options.depth.noise;
+    Pose T_base_true = frame.T_base_camera;
+    const Vec3 turn = lab.options.camera_std_rad * random.normal3();
+    if (turn.norm() > 0) T_base_true.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
+    T_base_true.pretranslate(lab.options.camera_std_m * random.normal3());
+    frame.depth_m = sense_depth(cast_view(scene, frame.camera, T_base_true), frame.camera, lab.options.depth, random);
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
 Recording LabRobot::scene() const {
   const Impl& lab = *impl_;
   Recording recording;

@@ -49,6 +49,11 @@ class LabRobot : public acquisition::Robot {
   void wait(double duration_s) override;
   double travel_sigma_m() const override;
 
+  /// Images of the untouched object from a camera that is carried around it: `views` - 1 on a ring that looks down by a third
+  /// of a right angle, the last from above. Every pose errs anew by camera_std_m and camera_std_rad. The arm is out of the way.
+  /// @throws Error for less than one view
+  std::vector<DepthFrame> look_around(int views) const;
+
   /// A recording without pushes: object, support, table, tool, robot and priors, as a person would write them down.
   Recording scene() const;
   /// The push at one of the object's sites (the cube has one): the robot then presses there. @throws Error when out of range.
