@@ -4,14 +4,15 @@
 
 The cube has an edge of 0.15 m, n^3 cells of five linear tetrahedra, its bottom is held, a pressure of 10 N in all acts on a
 disc of 25 mm radius at the centre of the top. CalculiX and palpate run as whole processes from the same input deck (read,
-assemble, solve, write); DOLFINx and palpate are compared in process (assemble and solve; DOLFINx' just-in-time compilation,
-its mesh and its sparsity pattern are not counted). Every program runs with one thread; seconds are CPU seconds, the smallest
-of the repeats. Each line also says by how much the displacements differ.
+assemble, solve, write); DOLFINx and palpate are compared in process (assemble and solve; DOLFINx' just-in-time compilation is not counted,
+mesh and sparsity pattern are counted on neither side). Seconds are CPU seconds of all threads, the smallest of the repeats; wall
+seconds stand beside them where --threads is above one. Each line also says peak memory and by how much the displacements
+differ. PETSc has no threads of its own and is left out above one.
 
   cmake --preset developer && ninja -C build/developer solve_deck
   benchmarks/compare_solvers.py build/developer/benchmarks/solve_deck --cells 6 13 27 --poisson 0.3 0.49
 
-Programs that are absent are left out with a word. Options: --repeats, --keep FOLDER, --json FILE.
+Programs that are absent are left out with a word. Options: --threads N..., --repeats, --keep FOLDER, --json FILE.
 """
 import argparse
 import json
@@ -25,7 +26,10 @@ import time
 import numpy as np
 
 EDGE, RADIUS, FORCE, YOUNG = 0.15, 0.025, 10.0, 20e3
-ONE_THREAD = dict(os.environ, OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", CCX_NPROC_EQUATION_SOLVER="1")
+
+
+def environment(threads):
+    return dict(os.environ, OMP_NUM_THREADS=str(threads), OPENBLAS_NUM_THREADS="1", CCX_NPROC_EQUATION_SOLVER=str(threads))
 
 
 def cube(n):
@@ -72,11 +76,11 @@ def write_deck(path, nodes, tets, load, poisson, solver):
         deck.write("*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
 
 
-def run(command, folder, timeout):
+def run(command, folder, timeout, threads=1):
     """CPU seconds, wall seconds, peak megabytes, stdout of a process."""
     start, peak = time.monotonic(), 0.0
     with open(os.path.join(folder, "out.txt"), "wb") as out:
-        process = subprocess.Popen(command, cwd=folder, env=ONE_THREAD, stdout=out, stderr=subprocess.STDOUT)
+        process = subprocess.Popen(command, cwd=folder, env=environment(threads), stdout=out, stderr=subprocess.STDOUT)
         while True:
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
             if pid:
@@ -97,8 +101,10 @@ def run(command, folder, timeout):
     return usage.ru_utime + usage.ru_stime, time.monotonic() - start, peak, text
 
 
-def smallest(command, folder, repeats, timeout):
-    return min((run(command, folder, timeout) for _ in range(repeats)), key=lambda result: result[0])
+def smallest(command, folder, repeats, timeout, threads):
+    """Of CPU and of wall seconds each the smallest, the largest memory."""
+    results = [run(command, folder, timeout, threads) for _ in range(repeats)]
+    return min(r[0] for r in results), min(r[1] for r in results), max(r[2] for r in results), results[0][3]
 
 
 def displacements(path, count):
@@ -190,23 +196,28 @@ def dolfinx_worker(path):
         except PETSc.Error as error:
             print(f"{name}: {error}", file=sys.stderr)
     np.save(path + ".u.npy", solution)
-    print(json.dumps(dict(assembly=assembly, solvers=results)))
+    with open("/proc/self/status") as text:  # with the interpreter, the compiler's results and both matrices
+        peak = [float(line.split()[1]) / 1024 for line in text if line.startswith("VmHWM")][0]
+    print(json.dumps(dict(assembly=assembly, peak_mb=peak, solvers=results)))
 
 
 def compare(case, arguments, folder):
-    n, poisson = case
+    n, poisson, threads = case
     nodes, tets = cube(n)
     load = disc_load(nodes, tets)
     deck = os.path.join(folder, "cube.inp")
     write_deck(deck, nodes, tets, load, poisson, "")
-    result = dict(cells=n, tetrahedra=len(tets), poisson=poisson, load_average=os.getloadavg()[0])
-    cpu, wall, memory, text = smallest([os.path.abspath(arguments.solve_deck), deck, "ours.txt"], folder, arguments.repeats,
-                                       arguments.timeout)
+    result = dict(cells=n, tetrahedra=len(tets), poisson=poisson, threads=threads,
+                  load_average=os.getloadavg()[0])
+    cpu, wall, memory, text = smallest([os.path.abspath(arguments.solve_deck), deck, "ours.txt", "--threads", str(threads)],
+                                       folder, arguments.repeats, arguments.timeout, threads)
     ours = json.loads(text.strip().splitlines()[-1])
     u = displacements(os.path.join(folder, "ours.txt"), len(nodes))
     result["palpate"] = dict(ours, cpu_s=cpu, wall_s=wall, peak_mb=memory)
-    print(f"\n{len(tets)} tetrahedra, nu = {poisson}, load average {result['load_average']:.1f}\n"
-          f"  palpate, whole process         {cpu:9.3f} s {memory:7.0f} MB   {ours['method']}, {ours['steps']} steps")
+    beside = lambda seconds: f" (wall {seconds:.3f} s)" if threads > 1 else ""
+    print(f"\n{len(tets)} tetrahedra, nu = {poisson}, threads {threads}, load average {result['load_average']:.1f}\n"
+          f"  palpate, whole process         {cpu:9.3f} s{beside(wall)} {memory:7.0f} MB   {ours['method']}, {ours['steps']} steps",
+          flush=True)
 
     if shutil.which("ccx"):
         for solver in ("SPOOLES", "ITERATIVE SCALING", "ITERATIVE CHOLESKY"):
@@ -216,7 +227,7 @@ def compare(case, arguments, folder):
             write_deck(os.path.join(folder, name + ".inp"), nodes, tets, load, poisson, solver)
             try:
                 cpu, wall, memory, _ = smallest(["ccx", "-i", name], folder, arguments.repeats if len(tets) < 50000 else 1,
-                                                arguments.timeout)
+                                                arguments.timeout, threads)
             except RuntimeError as error:
                 print(f"  CalculiX {solver:21} {error}")
                 continue
@@ -224,28 +235,32 @@ def compare(case, arguments, folder):
             difference = np.linalg.norm(other - u) / np.linalg.norm(u)
             ratio = cpu / result["palpate"]["cpu_s"]
             result["CalculiX " + solver] = dict(cpu_s=cpu, wall_s=wall, peak_mb=memory, ratio=ratio, difference=difference)
-            print(f"  CalculiX {solver:21} {cpu:9.3f} s {memory:7.0f} MB   {ratio:6.1f} x ours, differs by {difference:.1e}")
+            print(f"  CalculiX {solver:21} {cpu:9.3f} s{beside(wall)} {memory:7.0f} MB   {ratio:6.1f} x ours, differs by "
+                  f"{difference:.1e}", flush=True)
     else:
         print("  CalculiX: ccx is not installed")
 
+    if threads > 1:
+        return result
     in_process = ours["assemble_s"] + ours["solve_s"]
     path = os.path.join(folder, "case.npz")
     np.savez(path, nodes=nodes, tets=tets, load=load, poisson=poisson)
-    worker = subprocess.run([sys.executable, os.path.abspath(__file__), "--dolfinx-worker", path], env=ONE_THREAD,
+    worker = subprocess.run([sys.executable, os.path.abspath(__file__), "--dolfinx-worker", path], env=environment(1),
                             capture_output=True, text=True)
     if worker.returncode != 0:
         reason = worker.stderr.strip().splitlines()
         print(f"  DOLFINx: left out ({reason[-1] if reason else 'it crashed'})")
         return result
     peer = json.loads(worker.stdout.strip().splitlines()[-1])
-    print(f"  palpate, in process            {in_process:9.3f} s              assemble {ours['assemble_s']:.3f}, solve {ours['solve_s']:.3f}")
+    print(f"  palpate, in process            {in_process:9.3f} s              assemble {ours['assemble_s']:.3f}, solve {ours['solve_s']:.3f}"
+          f" (pattern {ours['pattern_s']:.3f} not counted)")
     difference = np.linalg.norm(np.load(path + ".u.npy") - u) / np.linalg.norm(u)
     for name, solved in peer["solvers"].items():
         total = peer["assembly"] + solved["seconds"]
         result["PETSc " + name] = dict(cpu_s=total, ratio=total / in_process, steps=solved["steps"], difference=difference)
         print(f"  PETSc {name:24} {total:9.3f} s              {total / in_process:6.1f} x ours, assemble "
               f"{peer['assembly']:.3f}, {solved['steps']} steps")
-    print(f"  (DOLFINx' displacements differ by {difference:.1e})")
+    print(f"  (DOLFINx' displacements differ by {difference:.1e}; {peer['peak_mb']:.0f} MB)", flush=True)
     return result
 
 
@@ -256,6 +271,7 @@ def main():
     parser.add_argument("solve_deck", help="the program of benchmarks/solve_deck.cpp")
     parser.add_argument("--cells", type=int, nargs="+", default=[6, 13, 27], help="cells along an edge (47: 519 115 tetrahedra)")
     parser.add_argument("--poisson", type=float, nargs="+", default=[0.3, 0.49])
+    parser.add_argument("--threads", type=int, nargs="+", default=[1])
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--timeout", type=float, default=300, help="seconds a process")
     parser.add_argument("--patient", action="store_true", help="SPOOLES above 200 000 tetrahedra too")
@@ -263,10 +279,10 @@ def main():
     parser.add_argument("--json", help="writes all numbers to this file")
     arguments = parser.parse_args()
     results = []
-    for case in [(n, poisson) for n in arguments.cells for poisson in arguments.poisson]:
+    for case in [(n, nu, threads) for n in arguments.cells for nu in arguments.poisson for threads in arguments.threads]:
         with tempfile.TemporaryDirectory() as folder:
             if arguments.keep:
-                folder = os.path.join(arguments.keep, f"cube_{case[0]}_{case[1]}")
+                folder = os.path.join(arguments.keep, f"cube_{case[0]}_{case[1]}_{case[2]}")
                 os.makedirs(folder, exist_ok=True)
             results.append(compare(case, arguments, folder))
     if arguments.json:

@@ -156,6 +156,7 @@ int run(int argc, char** argv) {
   const Deck deck = read_deck(argv[1]);
   stage("read");
   const fem::Assembly assembly(deck.mesh);
+  stage("pattern");
   fem::BlockValues blocks;
   assembly.tangent(fem::material_law("linear"), fem::moduli(deck.young_pa, deck.poisson), VectorX::Zero(deck.load.size()),
                    blocks);

@@ -32,6 +32,16 @@ Eigen::SparseMatrix<double> spread_over_nodes(Index node_count, const std::vecto
 /// @throws Error when no boundary face lies in it.
 Eigen::SparseMatrix<double> spread_over_patch(const TetMesh& mesh, const Vec3& centre_m, double radius_m);
 
+/// What a tool touches: points within radius_m of the segment centre_m - half_length_m to centre_m + half_length_m (no
+/// length: a disc, the patch of a sphere; else that of a bar).
+struct ContactPatch {
+  Vec3 centre_m = Vec3::Zero();
+  double radius_m = 0;
+  Vec3 half_length_m = Vec3::Zero();
+  double distance_m(const Vec3& x_m) const;  ///< of a point to the segment
+};
+Eigen::SparseMatrix<double> spread_over_patch(const TetMesh& mesh, const ContactPatch& where);
+
 /// Three columns: body force per unit density (kg/m3) and unit acceleration along x, y, z: newton.
 Eigen::SparseMatrix<double> body_force(const TetMesh& mesh);
 

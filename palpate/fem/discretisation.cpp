@@ -11,16 +11,16 @@
 namespace palpate::fem {
 namespace {
 
-double longest_edge_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m) {
+double longest_edge_near(const TetMesh& mesh, const ContactPatch& patch) {
   double longest = 0;
   for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
     double distance = std::numeric_limits<double>::infinity(), edge = 0;
     for (int a = 0; a < 4; ++a) {
       const Vec3 x = mesh.nodes_m.row(mesh.tetrahedra(e, a)).transpose();
-      distance = std::min(distance, (x - centre_m).norm());
+      distance = std::min(distance, patch.distance_m(x));
       for (int b = 0; b < a; ++b) edge = std::max(edge, (x - mesh.nodes_m.row(mesh.tetrahedra(e, b)).transpose()).norm());
     }
-    if (distance <= radius_m) longest = std::max(longest, edge);
+    if (distance <= patch.radius_m) longest = std::max(longest, edge);
   }
   return longest;
 }
@@ -29,17 +29,35 @@ double longest_edge_near(const TetMesh& mesh, const Vec3& centre_m, double radiu
 
 Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double radius_m, const BoundaryOn& boundary_on,
                           const VectorX& force, const DiscretisationOptions& options) {
+  return discretise(base, ContactPatch{contact_m, radius_m, Vec3::Zero()}, boundary_on, force, options);
+}
+
+Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const BoundaryOn& boundary_on,
+                          const VectorX& force, const DiscretisationOptions& options) {
+  const double radius_m = patch.radius_m;
   if (!(radius_m > 0)) throw Error("must be positive, is " + std::to_string(radius_m), "radius_m");
   if (!(options.tolerance > 0))
     throw Error("must be positive, is " + std::to_string(options.tolerance), "options.tolerance");
   StaticsOptions statics;
   statics.dilatation = options.dilatation;
+  // What cameras see, on the corners that all levels share.
+  std::vector<Index> seen;
+  std::vector<char> counted(static_cast<std::size_t>(base.nodes_m.rows()), 0);
+  const Tetrahedra faces = boundary_faces(base);
+  for (Index k = 0; k < faces.size(); ++k) {
+    const Index node = faces.data()[k];
+    if (counted[static_cast<std::size_t>(node)]++) continue;
+    if (patch.distance_m(base.nodes_m.row(node).transpose()) > radius_m) seen.push_back(node);
+  }
+  VectorX surface(3 * static_cast<Index>(seen.size()));
   const auto work = [&](const RefinedMesh& linear, const TetMesh& quadratic) {
     const Boundary boundary = boundary_on(quadratic, linear);
     const Eigen::SparseMatrix<double> forces = boundary.forces;
     const Statics body(quadratic, "linear", boundary, statics);
     const Equilibrium e =
         body.solve(1.0, options.poisson_ratio, force, VectorX::Zero(static_cast<Index>(boundary.motions.cols())));
+    for (std::size_t i = 0; i < seen.size(); ++i)
+      surface.segment<3>(3 * static_cast<Index>(i)) = e.displacement_m.segment<3>(3 * seen[i]);
     return force.dot(forces.transpose() * e.displacement_m);
   };
 
@@ -49,15 +67,19 @@ Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double rad
   double last = work(out.linear, out.mesh);
   if (!(std::abs(last) > 0)) throw Error("does no work: is the force zero or held by the supports?", "force");
   // The first level already resolves the disc: quadratic tetrahedra need about two edges a radius.
-  double edge = std::min(longest_edge_near(base, contact_m, radius_m) / 2, radius_m);
+  double edge = std::min(longest_edge_near(base, patch) / 2, radius_m);
   double change = 0;
   const double base_work = last;
-  for (int level = 1; level <= options.max_levels; ++level, edge /= 2) {
-    RefinedMesh finer = refine_near(base, contact_m, 1.2 * radius_m, edge, 1.0, options.node_limit);
+  double growth = 0.5;
+  for (int level = 1; level <= options.max_levels; ++level, edge /= 2, growth *= 0.7) {
+    RefinedMesh finer = refine_near(
+        base, [&](const Vec3& x) { return patch.distance_m(x) - 1.2 * radius_m; }, edge, growth, options.node_limit);
     const bool full = finer.mesh.nodes_m.rows() >= options.node_limit;
     if (full && level > 1) break;
     TetMesh quadratic = to_quadratic(finer.mesh);
+    const VectorX last_surface = surface;
     const double now = work(finer, quadratic);
+    out.surface_change = surface.norm() > 0 ? (surface - last_surface).norm() / surface.norm() : 0;
     const double previous_change = change;
     change = std::abs(now - last) / std::abs(now);
     const double ratio = level == 1 ? 1.0 / 3 : std::clamp(change / std::max(previous_change, 1e-12), 0.2, 0.67);
@@ -67,13 +89,13 @@ Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double rad
     out.mesh = std::move(quadratic);
     out.levels = level;
     last = now;
-    if (out.young_error <= options.tolerance) {
+    if (out.young_error <= options.tolerance && (level > 1 || full)) {
       out.tolerance_met = true;
       break;
     }
     if (full) break;
   }
-  out.edge_m = longest_edge_near(out.linear.mesh, contact_m, radius_m);
+  out.edge_m = longest_edge_near(out.linear.mesh, patch);
   return out;
 }
 

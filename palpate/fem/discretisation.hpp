@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "palpate/core/mesh.hpp"
+#include "palpate/fem/boundary.hpp"
 #include "palpate/fem/statics.hpp"
 
 namespace palpate::fem {
@@ -27,13 +28,17 @@ struct RefinedMesh {
 RefinedMesh refine_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m, double edge_m, double growth = 1.0,
                         Index node_limit = 50000);
 
+/// The same near any place. @param distance_m  from it; edges are shorter than edge_m where it is not positive
+RefinedMesh refine_near(const TetMesh& mesh, const std::function<double(const Vec3&)>& distance_m, double edge_m,
+                        double growth = 1.0, Index node_limit = 50000);
+
 /// Adds to a list of nodes of the base mesh the refined nodes whose two parents are in it.
 std::vector<Index> extend_nodes(std::vector<Index> nodes, const RefinedMesh& refined);
 
 struct DiscretisationOptions {
   double tolerance = 0.01;  ///< of the relative error in E that the mesh may cause
   int max_levels = 4;
-  Index node_limit = 4000;  ///< corners, before edge midpoints are added
+  Index node_limit = 8000;  ///< corners, before edge midpoints are added
   double poisson_ratio = 0.3;
   Dilatation dilatation = Dilatation::pointwise;
 };
@@ -44,6 +49,7 @@ struct Discretisation {
   TetMesh mesh;
   double young_error = 0;       ///< estimated relative error in E from the depth under the load
   double base_young_error = 0;  ///< the same of the base mesh with quadratic tetrahedra
+  double surface_change = 0;    ///< rms change of the boundary outside the patch from the last level to this, relative
   double edge_m = 0;            ///< longest edge under the tool
   int levels = 0;
   bool tolerance_met = false;
@@ -54,9 +60,13 @@ using BoundaryOn = std::function<Boundary(const TetMesh& quadratic, const Refine
 
 /// Refines under the tool until the work of the load, W = a' F' u, which is what a force-controlled probe's depth sees
 /// (E_hat / E = u_h / u), changes by so little from level to level that the error left is below the tolerance. Small strains
-/// are used for the choice. The error left is the geometric continuation of the last two changes (half of the first one,
-/// where there is no second): the rim of the load keeps convergence between first and second order.
+/// are used for the choice. The error left is the geometric continuation of the last two changes: the rim of the load keeps
+/// convergence between first and second order. One change alone is no estimate, so there are two levels at least (within the
+/// limit of nodes; then half of the first change). Each level also refines farther away from the tool, for the surface that
+/// cameras see.
 /// @param force  coefficients of the boundary's force columns
+Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const BoundaryOn& boundary_on,
+                          const VectorX& force, const DiscretisationOptions& options = {});
 Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double radius_m, const BoundaryOn& boundary_on,
                           const VectorX& force, const DiscretisationOptions& options = {});
 

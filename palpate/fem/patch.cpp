@@ -25,10 +25,10 @@ VectorX face_shape(Index nodes, const Vec3& l) {
 
 class Patch {
  public:
-  Patch(const TetMesh& mesh, const Tetrahedra& faces, const Vec3& centre, double radius)
-      : mesh_(mesh), faces_(faces), centre_(centre), radius_(radius) {}
+  Patch(const TetMesh& mesh, const Tetrahedra& faces, const ContactPatch& where)
+      : mesh_(mesh), faces_(faces), where_(where), radius_(where.radius_m) {}
 
-  // Integral of the face's shape functions over the part of the face inside the sphere.
+  // Integral of the face's shape functions over the part of the face inside the patch.
   VectorX integrate(Index face) const {
     VectorX sum = VectorX::Zero(faces_.cols());
     add(face, Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ(), 0, sum);
@@ -42,14 +42,14 @@ class Patch {
     return x;
   }
 
-  // Nearest point of the flat triangle of a face's corners to the centre, squared distance.
-  double distance2(Index face) const {
+  // Of the face's points to the middle of the patch.
+  double distance(Index face) const {
     double best = std::numeric_limits<double>::infinity();
     const int n = 8;
     for (int i = 0; i <= n; ++i)
       for (int j = 0; i + j <= n; ++j) {
         const Vec3 l(1.0 - double(i + j) / n, double(i) / n, double(j) / n);
-        best = std::min(best, (at(face, l) - centre_).squaredNorm());
+        best = std::min(best, where_.distance_m(at(face, l)));
       }
     return best;
   }
@@ -60,7 +60,7 @@ class Patch {
     const Vec3 middle = (xa + xb + xc) / 3;
     const double reach =
         std::sqrt(std::max({(xa - middle).squaredNorm(), (xb - middle).squaredNorm(), (xc - middle).squaredNorm()}));
-    const double distance = (middle - centre_).norm();
+    const double distance = where_.distance_m(middle);
     if (distance > radius_ + 1.1 * reach) return;
     const bool inside = distance < radius_ - 1.1 * reach;
     if (depth < kDepth && !(inside && depth >= (faces_.cols() == 6 ? 2 : 0))) {
@@ -81,28 +81,39 @@ class Patch {
 
   const TetMesh& mesh_;
   const Tetrahedra& faces_;
-  Vec3 centre_;
+  const ContactPatch& where_;
   double radius_;
 };
 
 }  // namespace
 
+double ContactPatch::distance_m(const Vec3& x_m) const {
+  const double length2 = half_length_m.squaredNorm();
+  const double along = length2 > 0 ? std::clamp((x_m - centre_m).dot(half_length_m) / length2, -1.0, 1.0) : 0.0;
+  return (x_m - centre_m - along * half_length_m).norm();
+}
+
 Eigen::SparseMatrix<double> spread_over_patch(const TetMesh& mesh, const Vec3& centre_m, double radius_m) {
+  return spread_over_patch(mesh, ContactPatch{centre_m, radius_m, Vec3::Zero()});
+}
+
+Eigen::SparseMatrix<double> spread_over_patch(const TetMesh& mesh, const ContactPatch& where) {
+  const double radius_m = where.radius_m;
   if (!(radius_m > 0)) throw Error("must be positive, is " + std::to_string(radius_m), "radius_m");
   const Tetrahedra faces = boundary_faces(mesh);
-  const Patch patch(mesh, faces, centre_m, radius_m);
+  const Patch patch(mesh, faces, where);
   const Index n = static_cast<Index>(mesh.nodes_m.rows());
 
-  std::map<Index, VectorX> share;  // faces that the sphere reaches
+  std::map<Index, VectorX> share;  // faces that the patch reaches
   Index nearest = -1;
-  double nearest2 = std::numeric_limits<double>::infinity();
+  double nearest_distance = std::numeric_limits<double>::infinity();
   for (Index f = 0; f < faces.rows(); ++f) {
     const VectorX sum = patch.integrate(f);
     if (sum.cwiseAbs().sum() == 0) continue;
     share[f] = sum;
-    const double d2 = patch.distance2(f);
-    if (d2 < nearest2) {
-      nearest2 = d2;
+    const double distance = patch.distance(f);
+    if (distance < nearest_distance) {
+      nearest_distance = distance;
       nearest = f;
     }
   }

@@ -99,6 +99,12 @@ class Bisection {
 
 RefinedMesh refine_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m, double edge_m, double growth,
                         Index node_limit) {
+  return refine_near(
+      mesh, [&](const Vec3& x) { return (x - centre_m).norm() - radius_m; }, edge_m, growth, node_limit);
+}
+
+RefinedMesh refine_near(const TetMesh& mesh, const std::function<double(const Vec3&)>& distance_m, double edge_m,
+                        double growth, Index node_limit) {
   if (mesh.tetrahedra.cols() != 4) throw Error("needs 4 columns (a linear mesh)", "mesh.tetrahedra");
   if (!(edge_m > 0)) throw Error("must be positive, is " + std::to_string(edge_m), "edge_m");
   Bisection work(mesh);
@@ -107,8 +113,8 @@ RefinedMesh refine_near(const TetMesh& mesh, const Vec3& centre_m, double radius
     while (work.alive(t) && work.node_count() < static_cast<std::size_t>(node_limit)) {
       const Edge edge = work.longest(t);
       double distance = std::numeric_limits<double>::infinity();
-      for (Index node : work.tet(t)) distance = std::min(distance, (work.node(node) - centre_m).norm());
-      const double allowed = edge_m + growth * std::max(0.0, distance - radius_m);
+      for (Index node : work.tet(t)) distance = std::min(distance, distance_m(work.node(node)));
+      const double allowed = edge_m + growth * std::max(0.0, distance);
       if ((work.node(edge[0]) - work.node(edge[1])).norm() <= allowed) break;
       work.halve(edge);
     }

@@ -27,7 +27,7 @@ inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Ind
   std::filesystem::create_directories(folder);
   {
     std::ofstream out(folder / "job.inp");
-    out.precision(15);
+    out.precision(12);  // ccx reads 20 characters of a number
     out << "*NODE, NSET=ALL\n";
     for (Index i = 0; i < mesh.nodes_m.rows(); ++i)
       out << i + 1 << ", " << mesh.nodes_m(i, 0) << ", " << mesh.nodes_m(i, 1) << ", " << mesh.nodes_m(i, 2) << "\n";
