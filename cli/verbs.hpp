@@ -26,6 +26,7 @@ using SetUp = Run(CLI::App& app);
   VERB(record,     "measure", "push an object and record it: the software lab, or the demonstration",  "palpate record -o foam_cube --force-limit 8") \
   VERB(info,       "measure", "what is in a recording, in units, and what is wrong with it",           "palpate info recording") \
   VERB(estimate,   "measure", "Young's modulus and Poisson ratio of a recording, with intervals",      "palpate estimate recording -o result") \
+  VERB(check,      "measure", "pushes on a known spring or rigid block: what is wrong with the rig",   "palpate check on_a_spring --stiffness 800") \
   VERB(suggest,    "measure", "the next best push: where, which way and how hard, with what to expect", "palpate suggest result --for poisson-ratio") \
   VERB(explore,    "measure", "push, estimate and take the next best push, until E and nu are known",  "palpate explore --object ball -o out --young-modulus-within 0.05") \
   VERB(predict,    "use",     "deformation, force and stress of a new push, with bands",               "palpate predict result --contact 0.58 0 0.15 --force 5 -o pressed") \

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// `palpate check RECORDING --stiffness K | --rigid`: pushes on a spring of known stiffness or a rigid block say what is
+// wrong with force scale, compliance and the camera's place before any Young's modulus is believed.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "cli/bag_recording.hpp"
+#include "cli/verbs.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/self_check.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/identify.hpp"
+
+namespace palpate::cli {
+namespace {
+
+struct Options {
+  std::filesystem::path recording, mapping;
+  double stiffness_n_per_m = 0;
+  bool rigid = false;
+  estimation::SelfCheckOptions check;
+};
+
+/// "+6.1 % +- 0.4 %"
+std::string written(const estimation::CheckedError& error, double value) {
+  if (error.unit == "1") return fmt::format("{:+.2f} %", 100 * value);
+  if (error.unit == "m") return fmt::format("{:+.2f} mm", 1e3 * value);
+  if (error.unit == "rad") return fmt::format("{:+.3f} deg", value * 180 / EIGEN_PI);
+  if (error.unit == "m/N") return fmt::format("{:+.4f} mm/N", 1e3 * value);
+  return fmt::format("{:+.3f} {}", value, error.unit);
+}
+
+TriMesh body_of(const Recording& recording) {
+  if (recording.rest.surface) return *recording.rest.surface;
+  if (recording.rest.volume) return geometry::boundary_surface(*recording.rest.volume).surface;
+  throw Error("give the body's shape in the base frame as rest.surface_mesh", "rest");
+}
+
+int run(const Options& given, Session& session) {
+  if (given.rigid == (given.stiffness_n_per_m > 0))
+    throw Error("say what was pushed: --stiffness N_PER_M of a spring, or --rigid", "check");
+  const Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
+  estimation::SelfCheckOptions options = given.check;
+  if (!given.rigid) options.stiffness_n_per_m = given.stiffness_n_per_m;
+  const estimation::SelfCheck check = estimation::self_check(recording, body_of(recording), observe(recording), options);
+
+  session.say(fmt::format("{}: {} travels, {} first touches, {} rays; chi2 per degree of freedom {:.2f}",
+                          given.rigid ? "a rigid block" : fmt::format("a spring of {:g} N/m", given.stiffness_n_per_m),
+                          check.travels, check.touches, check.rays, check.chi2_per_dof));
+  nlohmann::json json = {{"format", "palpate-check/1"},        {"converged", check.converged},
+                         {"chi2_per_dof", check.chi2_per_dof}, {"travel_rms_m", check.travel_rms_m},
+                         {"depth_rms_m", check.depth_rms_m},   {"errors", nlohmann::json::array()},
+                         {"verdicts", nlohmann::json::array()}};
+  bool fine = check.converged;
+  for (const auto& error : check.errors) {
+    const std::string stated =
+        error.stated_std > 0 ? "stated within " + written(error, error.stated_std).substr(1) : "stated as exact";
+    session.say(fmt::format("  {:<24} {:>14} +- {:<12} {:<26} {}", error.name, written(error, error.value),
+                            written(error, error.std).substr(1), stated,
+                            !error.determined && !error.name.starts_with("force_tare") ? "not determined"
+                            : error.consistent                                         ? "consistent"
+                                                                                       : "NOT CONSISTENT"));
+    json["errors"].push_back({{"name", error.name},
+                              {"unit", error.unit},
+                              {"value", error.value},
+                              {"std", error.std},
+                              {"lower_95", error.lower_95},
+                              {"upper_95", error.upper_95},
+                              {"stated_std", error.stated_std},
+                              {"determined", error.determined},
+                              {"consistent", error.consistent}});
+    fine = fine && error.consistent;
+  }
+  for (const auto& verdict : check.verdicts) {
+    session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
+    json["verdicts"].push_back({{"code", verdict.code}, {"message", verdict.message}});
+    fine = fine && verdict.code != "does_not_fit";
+  }
+  if (!check.message.empty()) session.warn(check.message);
+  if (fine) session.say("everything that these pushes determine is consistent with what the recording states");
+  json["consistent"] = fine;
+  session.result(json);
+  return fine ? exit_done : exit_numbers;
+}
+
+}  // namespace
+
+Run verbs::check(CLI::App& app) {
+  auto given = std::make_shared<Options>();
+  app.add_option("recording", given->recording,
+                 "of pushes on the known body: forces, travels, and depth images if there is a camera")
+      ->required();
+  app.add_option("--mapping", given->mapping, "what a bag's topics mean (default: mapping.yaml beside it)");
+  app.add_option("--stiffness", given->stiffness_n_per_m,
+                 "of the spring along every push, N/m; its plate is the recording's surface")
+      ->check(CLI::PositiveNumber);
+  app.add_flag("--rigid", given->rigid, "the body does not give way at all");
+  app.add_option("--stiffness-std", given->check.stiffness_relative_std, "how well the stiffness is known, relative")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--placed-within", given->check.placed_std_m,
+                 "standard deviation of the body's place in the robot's frame, m (0: exact)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--turned-within", given->check.placed_std_rad, "of its orientation, rad (0: exact)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--touch-within", given->check.touch_std_m, "of the tip at first contact along the push, m")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  return [given](Session& session) { return run(*given, session); };
+}
+
+}  // namespace palpate::cli

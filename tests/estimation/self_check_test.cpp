@@ -1,0 +1,242 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// A rig with known errors pushes a spring and a rigid block; the check has to find the errors within its own intervals.
+#include "palpate/estimation/self_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "planned_scene.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+struct Rig {
+  double force_scale = 0, compliance_m_per_n = 0;
+  RigidOffset camera;            ///< where it stands, from where it is said to stand
+  double stiffness_n_per_m = 0;  ///< 0: rigid
+  bool images = true;
+  unsigned seed = 1;
+};
+
+constexpr double stated_scale_std = 0.01, stated_pose_std_m = 5e-4, stated_pose_std_rad = 1e-3;
+
+struct Measured {
+  Recording recording;
+  Inputs inputs;
+  TriMesh body;
+};
+
+/// Four pushes on three faces of a block; the camera looks at these faces.
+Measured measured(const Rig& rig) {
+  std::mt19937 random(rig.seed);
+  std::normal_distribution<double> normal;
+  Measured out;
+  out.body = block_object(1).surface.rest();
+  const geometry::TriangleTree still(out.body);
+  Tool pad;
+  pad.name = "pad";
+  pad.shape = ToolShape::disc;
+  pad.radius_m = 0.012;
+  out.recording.tools = {pad};
+  out.recording.force_scale_std = stated_scale_std;
+  const RayObservation stated = look(out.body, camera_eye_m, 24);
+  RigidOffset camera = rig.camera;
+  camera.pivot_m = Vec3(out.body.vertices_m.colwise().mean().transpose());  // as the answer is given
+  const std::vector<std::pair<Vec3, Vec3>> places{{{0.04, 0.04, 0.06}, {0, 0, -1}},
+                                                  {{0.06, 0.03, 0.06}, {0, 0, -1}},
+                                                  {{0, 0.05, 0.04}, {1, 0, 0}},
+                                                  {{0.03, 0, 0.04}, {0, 1, 0}}};
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const auto& [contact, direction] = places[k];
+    Push push;
+    push.name = "push " + std::to_string(k + 1);
+    push.force_tare_std_n = 0.02;
+    push.travel_offset_std_m = 3e-4;
+    const double tare = push.force_tare_std_n * normal(random), zero = push.travel_offset_std_m * normal(random);
+    for (const double force : {0.0, 5.0, 10.0, 20.0}) {
+      Step& step = push.steps.emplace_back();
+      const double give_m = rig.stiffness_n_per_m > 0 ? force / rig.stiffness_n_per_m : 0;
+      if (force > 0) {
+        Load load;
+        load.tool = "pad";
+        load.direction = direction;
+        load.contact_m = contact + 3e-4 * normal(random) * direction;
+        load.force_std_n = 0.01;
+        load.force_n = (force * (1 + rig.force_scale) + tare + load.force_std_n * normal(random)) * direction;
+        step.loads = {load};
+        ToolTravel travel;
+        travel.tool = "pad";
+        travel.sigma_m = 1e-4;
+        travel.travel_m = give_m + force * rig.compliance_m_per_n + zero + travel.sigma_m * normal(random);
+        step.observations = {travel};
+      }
+      auto& terms = out.inputs.emplace_back();
+      if (!rig.images) continue;
+      RayObservation image = stated;
+      image.pose_std_m = stated_pose_std_m;
+      image.pose_std_rad = stated_pose_std_rad;
+      std::vector<Index> keep;
+      for (Index i = 0; i < image.rays.range_m.size(); ++i) {
+        const Vec3 origin = camera.apply(image.rays.origins_m.row(i)) - give_m * direction;  // seen from the moved body
+        const auto hit = still.cast(origin, camera.rotation() * image.rays.directions.row(i).transpose());
+        if (!hit) continue;
+        image.rays.range_m(i) = hit->range_m + image.rays.sigma_m(i) * normal(random);
+        keep.push_back(i);
+      }
+      image.rays.origins_m = image.rays.origins_m(keep, Eigen::all).eval();
+      image.rays.directions = image.rays.directions(keep, Eigen::all).eval();
+      image.rays.range_m = image.rays.range_m(keep).eval();
+      image.rays.sigma_m = image.rays.sigma_m(keep).eval();
+      terms.push_back(image);
+    }
+    out.recording.pushes.push_back(push);
+  }
+  return out;
+}
+
+SelfCheck checked(const Rig& rig) {
+  const Measured rigged = measured(rig);
+  SelfCheckOptions options;
+  if (rig.stiffness_n_per_m > 0) options.stiffness_n_per_m = rig.stiffness_n_per_m;
+  return self_check(rigged.recording, rigged.body, rigged.inputs, options);
+}
+
+const CheckedError& error_named(const SelfCheck& check, const std::string& name) {
+  for (const auto& error : check.errors)
+    if (error.name == name) return error;
+  throw std::runtime_error("no error " + name);
+}
+
+bool says(const SelfCheck& check, const std::string& code) {
+  return std::any_of(check.verdicts.begin(), check.verdicts.end(), [&](const Verdict& v) { return v.code == code; });
+}
+
+Rig bad_rig() {
+  Rig rig;
+  rig.force_scale = 0.06;
+  rig.compliance_m_per_n = 1.5e-4;
+  rig.camera.translation_m = Vec3(0.004, -0.003, 0.005);
+  rig.camera.rotation_rad = Vec3(0.01, -0.015, 0.008);
+  return rig;
+}
+
+void expect_found(const SelfCheck& check, const Rig& rig, bool scale) {
+  const auto found = [&](const std::string& name, double truth) {
+    const CheckedError& error = error_named(check, name);
+    EXPECT_LT(std::abs(error.value - truth), 3 * error.std) << name << " " << error.value << " +- " << error.std;
+    EXPECT_TRUE(error.determined) << name;
+    EXPECT_FALSE(error.consistent) << name << " " << error.value << " +- " << error.std;
+  };
+  if (scale) found("force_scale", rig.force_scale);
+  found("compliance", rig.compliance_m_per_n);
+  for (int d = 0; d < 3; ++d) {
+    const std::string axis(1, static_cast<char>('x' + d));
+    found("hand_eye_" + axis, rig.camera.translation_m(d));
+    found("hand_eye_rotation_" + axis, rig.camera.rotation_rad(d));
+  }
+}
+
+TEST(SelfCheck, SpringFindsScaleComplianceAndCamera) {
+  Rig rig = bad_rig();
+  rig.stiffness_n_per_m = 800;
+  const SelfCheck check = checked(rig);
+  ASSERT_TRUE(check.converged);
+  expect_found(check, rig, true);
+  EXPECT_LT(error_named(check, "force_scale").std, 0.01);
+  EXPECT_TRUE(says(check, "force_scale_off"));
+  EXPECT_TRUE(says(check, "compliance_off"));
+  EXPECT_TRUE(says(check, "hand_eye_off"));
+  EXPECT_FALSE(says(check, "does_not_fit"));
+  EXPECT_NEAR(check.chi2_per_dof, 1, 0.1);
+}
+
+TEST(SelfCheck, RigidBlockFindsComplianceAndCameraAndSaysThatScaleIsOpen) {
+  Rig rig = bad_rig();
+  rig.force_scale = 0.005;  // within what is stated
+  const SelfCheck check = checked(rig);
+  ASSERT_TRUE(check.converged);
+  expect_found(check, rig, false);
+  EXPECT_FALSE(error_named(check, "force_scale").determined);
+  EXPECT_TRUE(says(check, "force_scale_not_determined"));
+  EXPECT_FALSE(says(check, "force_scale_off"));
+}
+
+TEST(SelfCheck, SpringWithoutImagesCannotTellScaleFromComplianceAndSaysSo) {
+  Rig rig = bad_rig();
+  rig.stiffness_n_per_m = 800;
+  rig.images = false;
+  const SelfCheck check = checked(rig);
+  EXPECT_TRUE(says(check, "force_scale_not_determined"));
+  EXPECT_TRUE(says(check, "hand_eye_not_determined"));
+  EXPECT_FALSE(says(check, "force_scale_off"));
+}
+
+TEST(SelfCheck, RigsAsStatedPassAndIntervalsHoldTheTruth) {
+  int inside = 0, all = 0, alarms = 0;
+  constexpr int rigs = 12;
+  for (unsigned seed = 1; seed <= rigs; ++seed) {
+    std::mt19937 random(1000 + seed);
+    std::normal_distribution<double> normal;
+    Rig rig;
+    rig.seed = seed;
+    rig.stiffness_n_per_m = 800;
+    rig.force_scale = stated_scale_std * normal(random);
+    for (int d = 0; d < 3; ++d) {
+      rig.camera.translation_m(d) = stated_pose_std_m * normal(random);
+      rig.camera.rotation_rad(d) = stated_pose_std_rad * normal(random);
+    }
+    const SelfCheck check = checked(rig);
+    const auto count = [&](const std::string& name, double truth) {
+      const CheckedError& error = error_named(check, name);
+      inside += error.lower_95 <= truth && truth <= error.upper_95;
+      ++all;
+    };
+    count("force_scale", rig.force_scale);
+    count("compliance", 0);
+    for (int d = 0; d < 3; ++d) {
+      const std::string axis(1, static_cast<char>('x' + d));
+      count("hand_eye_" + axis, rig.camera.translation_m(d));
+      count("hand_eye_rotation_" + axis, rig.camera.rotation_rad(d));
+    }
+    alarms += !check.verdicts.empty();
+  }
+  std::printf("%d of %d truths inside 95 %%, %d of %d good rigs with an alarm\n", inside, all, alarms, rigs);
+  EXPECT_GE(inside, 0.95 * all - 3 * std::sqrt(0.95 * 0.05 * all) - 0.5);
+  EXPECT_LE(alarms, 2);  // a dozen errors at three standard deviations: one good rig in thirty
+}
+
+TEST(SelfCheck, StatedComplianceIsNotAnError) {
+  Rig rig;
+  rig.compliance_m_per_n = 1.5e-4;
+  Measured rigged = measured(rig);
+  rigged.recording.tools[0].compliance_m_per_n = 1.5e-4;
+  const SelfCheck check = self_check(rigged.recording, rigged.body, rigged.inputs, {});
+  EXPECT_NEAR(error_named(check, "compliance").value, 0, 3 * error_named(check, "compliance").std);
+  EXPECT_FALSE(says(check, "compliance_off"));
+}
+
+TEST(SelfCheck, ASpringOfAnotherStiffnessDoesNotFitOrShowsAsScale) {
+  Rig rig;
+  rig.stiffness_n_per_m = 800;
+  const Measured rigged = measured(rig);
+  SelfCheckOptions options;
+  options.stiffness_n_per_m = 1000;
+  const SelfCheck check = self_check(rigged.recording, rigged.body, rigged.inputs, options);
+  EXPECT_TRUE(says(check, "force_scale_off") || says(check, "does_not_fit"));
+}
+
+TEST(SelfCheck, NothingToCheckIsAnError) {
+  Recording empty;
+  EXPECT_THROW(self_check(empty, block_object(1).surface.rest(), {}, {}), Error);
+  SelfCheckOptions options;
+  options.stiffness_n_per_m = -1;
+  const Measured rigged = measured({});
+  EXPECT_THROW(self_check(rigged.recording, rigged.body, rigged.inputs, options), Error);
+}
+
+}  // namespace
+}  // namespace palpate::estimation
