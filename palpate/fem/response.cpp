@@ -142,6 +142,10 @@ Certificate Response::certify(const ResponseState& state, double young_modulus_p
   out.difference = relative((full - state.watched_m).cwiseAbs().maxCoeff(), full.cwiseAbs().maxCoeff());
   out.stable = statics.is_stable(from_rest);
   if (statics.is_linear()) return out;
+  if (!out.stable && !statics.other_equilibria(from_rest).empty()) {
+    out.second_equilibrium = true;
+    return out;
+  }
   const Equilibrium stepped = statics.solve_stepwise(young_modulus_pa, poisson_ratio, force, motion);
   ++impl_->solves;
   // Two converged answers differ by rounding, or they are two states.

@@ -42,7 +42,8 @@ struct Certificate {
   std::string reason;
   double difference = 0;            ///< largest of the watched rows, relative to the largest value
   bool stable = false;              ///< no negative curvature of the energy at the full solution
-  bool second_equilibrium = false;  ///< loads stepped up from rest end in another state than the branch
+  bool second_equilibrium = false;  ///< loads stepped up from rest end in another state, or this one is unstable and leads
+                                    ///< to another
   int inverted_elements = 0;
 };
 

@@ -38,6 +38,8 @@ Equilibrium Statics::solve_stepwise(double young_modulus_pa, double poisson_rati
 
 bool Statics::is_stable(const Equilibrium& at) const { return impl_->is_stable(at); }
 
+std::vector<Equilibrium> Statics::other_equilibria(const Equilibrium& at) const { return impl_->other_equilibria(at); }
+
 SensitivityAlong Statics::sensitivity_along(const Equilibrium& at, const MatrixX& force_directions,
                                             const MatrixX& motion_directions) const {
   return impl_->sensitivity(at, force_directions, motion_directions);

@@ -65,6 +65,10 @@ struct Equilibrium {
   int newton_steps = 0;
   int factorisations = 0;
   int inverted_elements = 0;
+  /// Noticed on the way: the energy has a direction of negative curvature at this state, so that another state of less
+  /// energy exists (Statics::other_equilibria finds it). Also said in `reason`. Not looked for where Newton's method met no
+  /// sign of it.
+  bool unstable = false;
   double residual = 0;  ///< relative, as in StaticsOptions
   /// Mean pressure under the loads over E, weighted with force. Above about 0.3 co-rotational and St. Venant-Kirchhoff
   /// bodies lose stability under the tool, and every other law is far beyond small strain.
@@ -133,6 +137,10 @@ class Statics {
 
   /// True where the energy has no direction of negative curvature at `at` (its tangent is positive definite).
   bool is_stable(const Equilibrium& at) const;
+
+  /// Further equilibria that are reached from an unstable one along its direction of least curvature, to both sides; none
+  /// where `at` is stable, or where both sides lead to no other state.
+  std::vector<Equilibrium> other_equilibria(const Equilibrium& at) const;
 
   /// Re-factorises the tangent at `at` only if it is not the last one solved (linear material: once per nu).
   Sensitivity sensitivity(const Equilibrium& at) const;

@@ -2,7 +2,6 @@
 // What is done where Newton's method fails from the start: loads in steps, and near-incompressible bodies by way of
 // compressible ones.
 #include <cmath>
-#include <limits>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/statics/static_system.hpp"
@@ -96,17 +95,9 @@ Equilibrium StaticSystem::solve_stepwise(double young, double poisson, const Vec
   StaticState s;
   out.reason = continuation(p, s, out);
   out.converged = out.reason.empty();
+  if (out.converged) say_what_is_odd(p, s, out);
   finish(p, s, out);
   return out;
-}
-
-bool StaticSystem::is_stable(const Equilibrium& at) {
-  const StaticProblem p =
-      problem(at.young_modulus_pa, at.poisson_ratio, at.force_coefficients, at.motion_coefficients, at.extra);
-  factored_u.resize(0);
-  linear_poisson = std::numeric_limits<double>::quiet_NaN();
-  assembly.tangent(law, p.m, at.displacement_m, blocks);
-  return system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots());
 }
 
 Equilibrium StaticSystem::solve(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX* start,
@@ -126,9 +117,7 @@ Equilibrium StaticSystem::solve(double young, double poisson, const VectorX& a, 
   if (!reason.empty()) reason = continuation(p, s, out);
   out.converged = reason.empty();
   out.reason = reason;
-  if (out.converged && s.inverted > 0)
-    out.reason =
-        std::to_string(s.inverted) + " elements are inside out: the equilibrium of the equations is not one of a body";
+  if (out.converged) say_what_is_odd(p, s, out);
   finish(p, s, out);
   return out;
 }

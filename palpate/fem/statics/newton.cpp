@@ -8,7 +8,9 @@ namespace palpate::fem {
 namespace {
 
 constexpr double kStaleContraction = 0.2;  // of the residual, per step with an old factor
-constexpr double kLargestShift = 1e3;
+// Shifts are shares of the diagonal. A slender body needs tiny ones, a body that collapses under a tool large ones; each
+// step starts a little below the last one's.
+constexpr double kFirstShift = 1e-3, kSmallestShift = 1e-7, kLargestShift = 1e3;
 
 // Eisenstat & Walker 1996, choice 2: a linear solve no more exact than Newton's model is, near the end as exact as needed.
 double forcing_term(double residual, double last_residual, double last_forcing, double tolerance) {
@@ -27,10 +29,11 @@ bool StaticSystem::factorise_tangent(const StaticProblem& p, const VectorX& u, i
   factored_u.resize(0);
   // The exact tangent first; a shifted one only where it is not positive definite (clamping every element would destroy
   // quadratic convergence). Under a limit load the shift keeps descent towards a stable equilibrium.
-  for (double shift = 0; shift < kLargestShift; shift = shift == 0 ? 1e-3 : shift * 4) {
+  for (double shift = 0; shift < kLargestShift; shift = shift == 0 ? first_shift : shift * 4) {
     ++factorisations;
     if (system.factorise(assembly.pattern(), blocks, shift, assembly.expected_negative_pivots())) {
       if (shifted) *shifted = shift > 0;
+      if (shift > 0) first_shift = std::max(kSmallestShift, shift / 8);
       if (shift == 0) {
         factored_u = u;
         factored_moduli = p.m;
@@ -56,7 +59,7 @@ std::string StaticSystem::newton_step(const StaticProblem& p, const StaticState&
   assembly.tangent(law, p.m, s.u, blocks);
   factored_u.resize(0);
   const VectorX rhs = right_hand_side();
-  for (double shift = 0; shift < kLargestShift; shift = shift == 0 ? 1e-3 : shift * 4) {
+  for (double shift = 0; shift < kLargestShift; shift = shift == 0 ? first_shift : shift * 4) {
     system.set_matrix(assembly.pattern(), blocks, shift);
     MatrixX step;
     const LinearSolver::Outcome outcome = system.solve_by_any(rhs, forcing, step);
@@ -64,6 +67,7 @@ std::string StaticSystem::newton_step(const StaticProblem& p, const StaticState&
     if (outcome.solved) {
       d = step.col(0);
       shifted = shift > 0;
+      if (shifted) first_shift = std::max(kSmallestShift, shift / 8);
       return d.allFinite() ? "" : "the Newton step is not finite";
     }
     if (!outcome.not_positive_definite) return outcome.reason;
@@ -88,6 +92,8 @@ bool StaticSystem::stale_step(const StaticProblem& p, const VectorX& jump, bool 
 
 std::string StaticSystem::newton(const StaticProblem& p, StaticState& s, Equilibrium& out, int max_steps, bool near) {
   StaticState trial;
+  last_step_shifted = false;
+  first_shift = kFirstShift;
   double last_residual = 0, forcing = 0;
   for (double effort = 0;;) {
     const VectorX jump = p.prescribed - system.prescribed_part(s.u);
@@ -106,6 +112,7 @@ std::string StaticSystem::newton(const StaticProblem& p, StaticState& s, Equilib
     // Past a point of instability the energy falls slowly towards another state; that is progress all the same.
     effort += shifted ? 0.15 : 1;
     if (!failed.empty()) return failed;
+    last_step_shifted = shifted;
     ++out.newton_steps;
     const double slope = s.unbalanced.dot(d_free);  // negative for a descent direction
     bool accepted = false;

@@ -39,6 +39,7 @@ class StaticSystem {
                     const VectorX& extra);
   Equilibrium solve_stepwise(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra);
   bool is_stable(const Equilibrium& at);
+  std::vector<Equilibrium> other_equilibria(const Equilibrium& at);
   SensitivityAlong sensitivity(const Equilibrium& at, const MatrixX& along_force, const MatrixX& along_motion);
   std::vector<Equilibrium> solve_linear(double young, double poisson, const MatrixX& a, const MatrixX& b);
   UnitResponses unit_responses(double poisson, const Eigen::SparseMatrix<double>& watched);
@@ -57,6 +58,8 @@ class StaticSystem {
   BlockValues blocks, blocks_lambda, blocks_mu;
   VectorX factored_u;  // where the factor is the exact tangent; empty: nowhere
   Moduli factored_moduli;
+  bool last_step_shifted = false;  // of Newton's method
+  double first_shift = 1e-3;       // to try where the tangent is not positive definite
   double linear_poisson = std::numeric_limits<double>::quiet_NaN();
 
  private:
@@ -76,6 +79,8 @@ class StaticSystem {
   /// From s (evaluated) towards p; the reason why it did not converge, or nothing. @param near  s is close to a state that
   /// the last factor belongs to
   std::string newton(const StaticProblem& p, StaticState& s, Equilibrium& out, int max_steps, bool near);
+  /// Says of a converged state what is odd about it: inverted elements, negative curvature.
+  void say_what_is_odd(const StaticProblem& p, const StaticState& s, Equilibrium& out);
   /// Steps the loads from rest to p, shrinking the step when Newton fails.
   std::string continuation(const StaticProblem& p, StaticState& s, Equilibrium& out);
   /// Finds the shape where volume is cheap, and corrects it.
