@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/paths.hpp"
 #include "palpate/acquisition/from_streams.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_mapping.hpp"
@@ -22,6 +23,7 @@ fs::path mapping_of(const fs::path& bag) {
 }
 
 Recording load_recording_unchecked(Session& session, const fs::path& path, const fs::path& given) {
+  must_exist(path, "a recording is a folder with recording.yaml in it, or a bag (docs/recording-format.md)");
   if (!io::is_bag(path)) {
     if (!given.empty()) throw Error("is a recording; only a bag needs a mapping", path.string());
     return io::read_recording_unchecked(path);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/report/words.hpp"
@@ -54,6 +55,7 @@ void compare_with_truth(Session& session, const nlohmann::json& truth, const nlo
 
 int demonstrate(Session& session, const fs::path& out) {
   const fs::path recording = out / "recording", truth = out / "truth.json";
+  must_take_files(out);
   // A demonstration that was made here before is replaced; anything else of that name is not ours to remove.
   if (fs::exists(truth)) fs::remove_all(recording);
   fs::create_directories(out);

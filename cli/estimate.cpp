@@ -2,19 +2,25 @@
 // `palpate estimate RECORDING -o OUT`: result.json, model/ and report.html, and the answer in words.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <memory>
 
 #include "cli/bag_recording.hpp"
 #include "cli/live_report.hpp"
+#include "cli/mistyped.hpp"
+#include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/fem/materials.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
 #include "palpate/report/report.hpp"
+#include "palpate/report/words.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -63,27 +69,33 @@ IdentifyOptions identify_options(const Options& given, const Session& session) {
   return options;
 }
 
-std::string pascal(double value) {
-  if (value >= 1e6) return fmt::format("{:.4g} MPa", value / 1e6);
-  if (value >= 1e3) return fmt::format("{:.4g} kPa", value / 1e3);
-  return fmt::format("{:.4g} Pa", value);
+/// Before the recording is read and the object meshed, which may take minutes.
+void check_material(const std::string& material) {
+  std::vector<std::string> names;
+  for (const fem::MaterialLaw* law : fem::material_table()) names.emplace_back(law->name());
+  if (std::find(names.begin(), names.end(), material) != names.end()) return;
+  const auto meant = did_you_mean(material, names);
+  throw Error(fmt::format("no material is called '{}';{} they are {}", material,
+                          meant ? fmt::format(" did you mean '{}'?", *meant) : "", fmt::join(names, ", ")),
+              "--material");
 }
 
 void tell(Session& session, const Options& given, const Identification& answer) {
   for (const auto& parameter : answer.parameters) {
-    const bool young = parameter.name == "young_modulus";
-    const auto written = [&](double value) { return young ? pascal(value) : fmt::format("{:.4g}", value); };
-    const std::string label = young ? "Young's modulus E" : parameter.name == "poisson_ratio" ? "Poisson ratio nu" : parameter.name;
+    const bool young = parameter.name == "young_modulus" && parameter.region.empty();
+    const std::string label = young ? "Young's modulus E"
+                              : parameter.name == "poisson_ratio" ? "Poisson ratio nu" : report::parameter_title(parameter);
     if (!std::isfinite(parameter.lower_95)) {
-      session.say(fmt::format("{:<18} {}", label, written(parameter.value)));
+      session.say(fmt::format("{:<18} {}   (this method gives no interval)", label, report::quantity(parameter.value, parameter.unit)));
       continue;
     }
-    session.say(fmt::format("{:<18} {}   95 % interval {} to {}{}", label, written(parameter.value), written(parameter.lower_95),
-                            written(parameter.upper_95), parameter.determined ? "" : "   (hardly determined by these data)"));
+    const double resolution = (parameter.upper_95 - parameter.lower_95) / 30;
+    session.say(fmt::format("{:<18} {}   95 % interval {}{}", label, report::quantity(parameter.value, parameter.unit, resolution),
+                            report::interval(parameter.lower_95, parameter.upper_95, parameter.unit),
+                            parameter.determined ? "" : "   (hardly determined by these data)"));
   }
-  session.say(fmt::format("fit                rms {:.3g} mm over {} numbers, chi2 per degree of freedom {:.3g}, {} iterations, {} solves",
-                          1e3 * answer.fit.rms_m, answer.fit.points_used, answer.fit.chi2_per_dof, answer.fit.iterations,
-                          answer.fit.solves));
+  session.say(fmt::format("fit                residuals {} rms over {} values; chi2 per degree of freedom {:.3g}, 1 where noise is as stated",
+                          report::quantity(answer.fit.rms_m, "m"), answer.fit.points_used, answer.fit.chi2_per_dof));
   if (given.budget) {
     session.say("error budget       what each input's uncertainty does to E and nu:");
     for (const auto& entry : answer.budget) {
@@ -95,6 +107,8 @@ void tell(Session& session, const Options& given, const Identification& answer) 
 
 int estimate(Session& session, const Options& given) {
   StageClock clock;
+  must_take_files(given.out);
+  if (!given.material.empty()) check_material(given.material);
   LiveReport live(given.live, session, given.recording.filename().string());
   const OnProgress show = live.watch(session.progress());
   const OnProgress progress = [&](std::string_view stage, double share) {

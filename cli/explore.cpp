@@ -10,6 +10,8 @@
 #include <optional>
 
 #include "cli/lab_setup.hpp"
+#include "cli/live_report.hpp"
+#include "cli/paths.hpp"
 #include "cli/push_words.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -30,6 +32,7 @@ struct Options {
   std::string goal = "both", law, refine;
   double travel_limit_m = 0;
   bool compare = false;
+  LiveOptions live;
 };
 
 nlohmann::json json_of(const ExploredPush& push) {
@@ -48,9 +51,9 @@ nlohmann::json json_of(const ExploredPush& push) {
           {"poisson_ratio_within_95", poisson_ratio_half_width(push.poisson_ratio)}};
 }
 
-/// One whole loop on a lab of its own. `writer` and `truth` only where it is recorded.
+/// One whole loop on a lab of its own. `writer` and `truth` only where it is recorded, `live` where it may be watched.
 Explored run_loop(Session& session, const Options& given, PushOrder order, io::RecordingWriter* writer,
-                  nlohmann::json* truth) {
+                  nlohmann::json* truth, LiveReport* live) {
   lab::LabRobot robot(lab_options(given.lab, session.seed), lab_object(given.lab, session.seed));
   if (truth != nullptr) *truth = truth_json(robot);
   ExploreOptions options = given.explore;
@@ -86,6 +89,10 @@ Explored run_loop(Session& session, const Options& given, PushOrder order, io::R
   };
   hooks.keep_going = [] { return !Session::interrupted(); };
   hooks.on_progress = session.progress();
+  if (live != nullptr) {
+    hooks.on_progress = live->watch(hooks.on_progress);
+    options.identify.fit.on_estimate = live->on_estimate(scene);
+  }
   return explore(robot, scene, options, hooks);
 }
 
@@ -95,10 +102,12 @@ std::string count_of(const Explored& run) {
 }
 
 int run(const Options& given, Session& session) {
+  must_take_files(given.out);
   std::error_code code;
   if (fs::exists(given.out, code) && !fs::is_empty(given.out, code))
     throw Error("is there already; choose another folder or remove it", given.out.string());
   check(given.explore);
+  LiveReport live(given.live, session, given.out.filename().string());
   nlohmann::json truth;
   std::optional<io::RecordingWriter> writer;
   {
@@ -107,7 +116,7 @@ int run(const Options& given, Session& session) {
     if (!given.law.empty()) scene.model.material = given.law;
     writer.emplace(given.out / "recording", scene);
   }
-  Explored found = run_loop(session, given, PushOrder::next_best, &*writer, &truth);
+  Explored found = run_loop(session, given, PushOrder::next_best, &*writer, &truth, &live);
   write_json(truth, given.out / "truth.json");
   if (found.pushes.empty()) {
     session.warn(found.message);
@@ -126,6 +135,7 @@ int run(const Options& given, Session& session) {
   session.say(
       fmt::format("{} after {}. Next: open {}", found.message, count_of(found), (given.out / "report.html").string()));
 
+  live.finish(answer, found.recording, (given.out / "report.html").string());
   nlohmann::json json = {{"format", "palpate-exploration/1"}, {"reached", found.reached},
                          {"message", found.message},          {"fruitless", found.fruitless},
                          {"pushes", nlohmann::json::array()}, {"result", io::result_json(answer)}};
@@ -134,7 +144,7 @@ int run(const Options& given, Session& session) {
     for (const auto& [order, name] :
          {std::pair{PushOrder::random, "random order"}, {PushOrder::best_repeated, "best place repeated"}}) {
       session.say(fmt::format("the same lab, {}:", name));
-      const Explored other = run_loop(session, given, order, nullptr, nullptr);
+      const Explored other = run_loop(session, given, order, nullptr, nullptr, nullptr);
       if (Session::interrupted()) break;
       session.say(fmt::format("{}: {}; next best push: {}", name, count_of(other), count_of(found)));
       nlohmann::json one = {{"order", name}, {"reached", other.reached}, {"pushes", nlohmann::json::array()}};
@@ -184,6 +194,7 @@ Run verbs::explore(CLI::App& app) {
       ->capture_default_str();
   app.add_option("--law", given->law, "material law of the estimate (default: that of the true object)");
   app.add_option("--refine", given->refine, "none or auto: finer under the tool")->check(CLI::IsMember({"none", "auto"}));
+  given->live.add_to(app);
   return [given](Session& session) {
     Options chosen = *given;
     chosen.explore.suggest.goal = estimation::push_goal(given->goal);

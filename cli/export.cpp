@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "cli/learned_object.hpp"
+#include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/fem/statics.hpp"
@@ -97,6 +98,7 @@ double difference_to_calculix(io::ExportModel model, const fs::path& folder, int
 
 int run(const Options& given, Session& session) {
   const io::Exporter& exporter = io::exporter_named(given.to);
+  must_take_files(given.out);
   const LearnedObject learned = load_learned_object(given.result);
   const io::ExportModel model = model_of(given, learned);
   const io::ExportFiles files = io::export_files(exporter, model);

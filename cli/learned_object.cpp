@@ -3,6 +3,7 @@
 
 #include <set>
 
+#include "cli/paths.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/io/recording.hpp"
@@ -13,6 +14,7 @@ namespace palpate::cli {
 namespace fs = std::filesystem;
 
 LearnedObject load_learned_object(const fs::path& given) {
+  must_be_result(given);
   std::error_code code;
   const fs::path clean = given.lexically_normal();
   fs::path out = clean.filename().empty() ? clean.parent_path() : clean;

@@ -19,7 +19,7 @@ namespace {
 constexpr const char* three_things_to_try =
     "palpate learns how stiff an object is from a robot's pushes. Three things to try:\n"
     "\n"
-    "  palpate demo -o out                    a made-up foam cube, pushed, fitted and reported, in under a minute\n"
+    "  palpate demo -o out                    a made-up foam cube, pushed, fitted and reported, in a minute or two\n"
     "  palpate info RECORDING                 what is in a recording, and what is wrong with it\n"
     "  palpate estimate RECORDING -o out      Young's modulus and Poisson ratio with 95 % intervals\n"
     "\n"

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/file.hpp"
@@ -70,6 +71,8 @@ reconstruction::BuiltObject build(const Options& o, Session& session) {
 }
 
 int run(const Options& o, Session& session) {
+  must_exist(o.input, "give a mesh file, or the folder of a recording");
+  must_take_files(o.output);
   const auto start = std::chrono::steady_clock::now();
   const auto built = build(o, session);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -116,7 +119,7 @@ Run verbs::model(CLI::App& app) {
   app.add_option("INPUT", o->input,
                  "mesh file: a surface (OBJ, STL, PLY, ...), however broken, or a volume (MSH, VTK, VTU); or a recording")
       ->required();
-  app.add_option("-o,--output", o->output,
+  app.add_option("-o,--out,--output", o->output,
                  "folder for model.vtu, model.msh, model.vtk, model.png (a picture) and surface.ply")
       ->required();
   app.add_option("--tetrahedra", o->tetrahedra, "wished number of tetrahedra; 0 keeps those of a volume as they are")

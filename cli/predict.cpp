@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "cli/learned_object.hpp"
+#include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/held_body.hpp"
@@ -104,6 +105,7 @@ int run(const Options& given, Session& session) {
   if (given.force_n != 0) push.force_n = given.force_n;
   if (given.travel_m != 0) push.travel_m = given.travel_m;
   if (push.force_n.has_value() == push.travel_m.has_value()) throw Error("give either --force or --travel", "predict");
+  if (!given.out.empty()) must_take_files(given.out);
   fem::Boundary boundary = boundary_of(object, tool, load, push.background);
   const prediction::Elasticity elasticity = prediction::elasticity_of(learned.answer);
   fem::StaticsOptions options;

@@ -11,6 +11,7 @@
 
 #include "cli/lab_setup.hpp"
 #include "cli/logged_robot.hpp"
+#include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
@@ -169,7 +170,7 @@ Run verbs::record(CLI::App& app) {
   arguments->push.travel_limit_m = arguments->push.force_step_n = 0;
   add_lab_options(app, arguments->lab);
   app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
-  app.add_option("-o,--output", arguments->output, "folder to write; must not exist or be empty")->required();
+  app.add_option("-o,--out,--output", arguments->output, "folder to write; must not exist or be empty")->required();
   app.add_option("--views", arguments->views,
                  "look at the untouched object from this many sides and let `estimate` build its shape from that; 0: its shape is given")
       ->check(CLI::Range(0, 64))
@@ -186,6 +187,7 @@ Run verbs::record(CLI::App& app) {
   app.add_flag("--resume", arguments->resume, "go on with a recording that was cut off");
   return [arguments](Session& session) {
     std::error_code code;
+    must_take_files(arguments->output);
     for (const std::string& bag : {arguments->bag, arguments->raw_bag}) {
       if (!bag.empty() && std::filesystem::exists(bag, code) && !std::filesystem::is_empty(bag, code))
         throw Error("is there already; choose another folder or remove it", bag);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/report/figures.hpp"
 
@@ -25,8 +26,10 @@ Run verbs::report(CLI::App& app) {
   return [options](Session& session) {
     namespace fs = std::filesystem;
     fs::path page = options->result;
+    must_exist(page, "give the folder that `palpate estimate RECORDING -o FOLDER` wrote");
     if (fs::is_directory(page)) page /= "report.html";
     const fs::path folder = options->folder.empty() ? page.parent_path() / "figures" : fs::path(options->folder);
+    must_take_files(folder);
     const auto files = palpate::report::write_figures(palpate::report::read_report_data(page), folder);
     nlohmann::json names = nlohmann::json::array();
     for (const fs::path& file : files) {

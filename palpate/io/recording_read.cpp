@@ -119,7 +119,7 @@ Recording read_recording_unchecked(const fs::path& given) {
   const bool is_index = fs::is_regular_file(given, code);
   const fs::path root = is_index ? given.parent_path() : given;
   const fs::path index = is_index ? given : given / index_name;
-  if (!is_index && !fs::is_directory(given, code)) throw Error("there is no such folder", given.string());
+  if (!is_index && !fs::is_directory(given, code)) throw Error("there is no such folder; a recording is a folder with recording.yaml in it (docs/recording-format.md)", given.string());
   if (!fs::exists(index, code)) {
     throw Error("holds no recording.yaml; a recording is a folder with that file in it (docs/recording-format.md)",
                 given.string());

@@ -117,6 +117,43 @@ TEST(CommandLine, EveryVerbsHelpEndsWithAnExampleThatNamesIt) {
   }
 }
 
+TEST(CommandLine, EveryVerbTakesJsonAndAnswersWrongUsageInIt) {
+  for (const std::string& name : verbs()) {
+    const Outcome outcome = palpate(name + " --json --no-such-option");
+    EXPECT_EQ(outcome.exit_code, 2) << name;
+    EXPECT_TRUE(outcome.out.starts_with("{")) << name;
+    EXPECT_THAT(outcome.out, HasSubstr("no such option")) << name;
+  }
+}
+
+TEST(CommandLine, ProgressIsQuietLinesWhereThereIsNoTerminal) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / "palpate_quiet_lines";
+  std::filesystem::remove_all(folder);
+  const Outcome outcome = palpate("record --demo -o " + folder.string());
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("pressing the object ...\n"));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("\r")));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("%")));
+  std::filesystem::remove_all(folder);
+  EXPECT_THAT(palpate("record --demo --quiet -o " + folder.string()).err, IsEmpty());
+  std::filesystem::remove_all(folder);
+}
+
+TEST(CommandLine, ProgressOnATerminalSaysStageAndShare) {
+  if (std::system("script --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "no script(1): there is no terminal to show it on";
+  const auto folder = std::filesystem::path(testing::TempDir()) / "palpate_on_a_terminal";
+  std::filesystem::remove_all(folder);
+  const std::string command = "script -qec '" + std::string(PALPATE_CLI) + " record --demo -o " + folder.string() + "' /dev/null";
+  FILE* pipe = popen(command.c_str(), "r");
+  std::string seen;
+  std::array<char, 4096> buffer;
+  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) seen.append(buffer.data(), count);
+  pclose(pipe);
+  EXPECT_THAT(seen, testing::ContainsRegex("pressing the object +[0-9]+ %"));
+  EXPECT_THAT(seen, HasSubstr("\r"));
+  std::filesystem::remove_all(folder);
+}
+
 TEST(CommandLine, BashCompletionOffersVerbsAndTheirOptions) {
   const auto script = std::filesystem::path(testing::TempDir()) / "palpate_completion.bash";
   ASSERT_EQ(palpate("completion bash > " + script.string()).exit_code, 0);
