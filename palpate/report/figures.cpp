@@ -11,6 +11,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/report/axes.hpp"
+#include "palpate/report/figure_parts.hpp"
 #include "palpate/report/object_picture.hpp"
 #include "palpate/report/regions.hpp"
 #include "palpate/report/words.hpp"
@@ -19,29 +20,6 @@ namespace palpate::report {
 namespace {
 
 using nlohmann::json;
-
-constexpr double column_pt = 340;  // a column of a paper, a little wider
-
-double number(const json& value) { return value.is_number() ? value.get<double>() : std::nan(""); }
-
-/// Factor and name of the unit that suits the largest value, as `quantity` chooses it.
-std::pair<double, std::string> unit_for(double largest, const std::string& unit) {
-  const std::string text = quantity(largest, unit);
-  const std::size_t space = text.find(' ');
-  const std::string name = space == std::string::npos ? "" : text.substr(space + 1);
-  if (name == "mm") return {1e3, name};
-  if (name == "um") return {1e6, name};
-  if (name == "kPa") return {1e-3, name};
-  if (name == "MPa") return {1e-6, name};
-  if (name == "GPa") return {1e-9, name};
-  return {1, unit};
-}
-
-struct Sheet {
-  double width, height;
-};
-/// Says how large the figure is, or draws it when a canvas is given. Nothing to draw: height 0.
-using Draw = Sheet (*)(Canvas*, const json&);
 
 Sheet object(Canvas* canvas, const json& page) {
   const Sheet sheet{column_pt, 290};
@@ -102,6 +80,11 @@ Sheet force_travel(Canvas* canvas, const json& page) {
       if (!imposed && std::isfinite(sd)) {
         upper.push_back(axes.at(x * factor, f + 1.96 * sd));
         lower.push_back(axes.at(x * factor, f - 1.96 * sd));
+      }
+      const double sideways = 1.96 * number(s["travel_predicted_std_m"]);  // an imposed force is answered by a travel
+      if (imposed && std::isfinite(sideways)) {
+        upper.push_back(axes.at((x + sideways) * factor, f));
+        lower.push_back(axes.at((x - sideways) * factor, f));
       }
     }
     if (upper.size() > 1) {
@@ -192,70 +175,6 @@ Sheet residuals(Canvas* canvas, const json& page) {
   return sheet;
 }
 
-std::string shortened(const std::string& text) { return text.size() > 24 ? text.substr(0, 23) + "..." : text; }
-
-Sheet per_push(Canvas* canvas, const json& page) {
-  const json& list = page["per_push"];
-  if (list.size() < 2) return {0, 0};
-  const Sheet sheet{column_pt, 46 + 15.0 * static_cast<double>(list.size())};
-  if (canvas == nullptr) return sheet;
-  std::vector<double> ends;
-  for (const json& p : list) ends.insert(ends.end(), {number(p["lower_95"]), number(p["upper_95"]), number(p["value"])});
-  const Range reach = range_of(ends, false);
-  const auto [factor, unit] = unit_for(std::abs(reach.to), "Pa");
-  Axes axes(*canvas, sheet.width, sheet.height, fmt::format("Young's modulus ({})", unit),
-            {reach.from * factor, reach.to * factor}, "", {0, 1}, 110);
-  double y = axes.top + 7;
-  for (const json& p : list) {
-    if (!p["value"].is_number()) continue;
-    canvas->text({104, y + 3}, shortened(p["region"]), 8, Align::right, soft);
-    const std::array<Spot, 2> bar = {Spot{axes.x_of(number(p["lower_95"]) * factor), y},
-                                     {axes.x_of(number(p["upper_95"]) * factor), y}};
-    canvas->line(bar, category(0, 0.5), 1.8);
-    canvas->dot({axes.x_of(number(p["value"]) * factor), y}, 2.8, category(0));
-    y += 15;
-  }
-  return sheet;
-}
-
-Sheet bars(Canvas* canvas, const std::vector<std::tuple<std::string, double, std::string>>& rows, const std::string& label) {
-  const Sheet sheet{column_pt, 46 + 18.0 * static_cast<double>(rows.size())};
-  if (canvas == nullptr || rows.empty()) return rows.empty() ? Sheet{0, 0} : sheet;
-  double largest = 0;
-  for (const auto& row : rows) largest = std::max(largest, std::get<1>(row));
-  Axes axes(*canvas, sheet.width, sheet.height, label, {0, largest > 0 ? 1.3 * largest : 1}, "", {0, 1}, 118);
-  double y = axes.top + 3;
-  for (const auto& [name, value, text] : rows) {
-    canvas->text({112, y + 9}, shortened(name), 8, Align::right, soft);
-    canvas->box({axes.left, y}, std::max(0.5, axes.x_of(value) - axes.left), 12, category(0));
-    canvas->text({axes.x_of(value) + 4, y + 9}, text, 8, Align::left, ink);
-    y += 18;
-  }
-  return sheet;
-}
-
-Sheet budget(Canvas* canvas, const json& page) {
-  std::vector<std::tuple<std::string, double, std::string>> rows;
-  for (const json& b : page["budget"]) {
-    const double percent = std::abs(number(b["young_modulus_percent"]));
-    if (std::isfinite(percent)) rows.emplace_back(b["input"], percent, fmt::format("{:.2g} %", percent));
-  }
-  std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return std::get<1>(a) > std::get<1>(b); });
-  return bars(canvas, rows, "share of Young's modulus (%)");
-}
-
-Sheet held_out(Canvas* canvas, const json& page) {
-  const json& p = page["prediction"];
-  std::vector<std::tuple<std::string, double, std::string>> rows;
-  if (p["available"] != true || !p["surface_rms_m"].is_number()) return {0, 0};
-  for (const auto& [name, key] : {std::pair{"prediction", "surface_rms_m"},
-                                  {"as at the last step", "baseline_last_step_rms_m"},
-                                  {"no deformation", "baseline_no_deformation_rms_m"}}) {
-    if (p[key].is_number()) rows.emplace_back(name, p[key].get<double>() * 1e3, quantity(p[key], "m"));
-  }
-  return bars(canvas, rows, "rms distance to the surface that was seen (mm)");
-}
-
 struct Row {
   const char* name;
   Draw draw;
@@ -263,8 +182,8 @@ struct Row {
 /// The table of figures.
 constexpr Row table[] = {
     {"object", object},       {"force_travel", force_travel}, {"posterior", posterior},
-    {"residuals", residuals}, {"per_push", per_push},         {"budget", budget},
-    {"held_out", held_out},
+    {"residuals", residuals}, {"per_push", per_push},         {"per_site", per_site},
+    {"budget", budget},       {"held_out", held_out},         {"convergence", convergence},
 };
 
 }  // namespace

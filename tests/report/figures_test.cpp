@@ -92,7 +92,7 @@ TEST(ObjectPicture, ShowsTheStepThatMovedMost) {
 TEST(Figures, EveryFigureComesAsSvgAndPngAndTheSameTwice) {
   const std::string text = data(pressed_block::identification());
   const auto first = report::figures(text), second = report::figures(text);
-  ASSERT_EQ(first.size(), 7u);
+  ASSERT_EQ(first.size(), 9u);
   for (std::size_t i = 0; i < first.size(); ++i) {
     EXPECT_TRUE(first[i].svg.starts_with("<svg")) << first[i].name;
     EXPECT_TRUE(first[i].svg.ends_with("</svg>\n")) << first[i].name;
@@ -115,6 +115,12 @@ TEST(Figures, WithoutDataFiguresAreLeftOut) {
   EXPECT_TRUE(report::figures(data(id)).empty());
   EXPECT_THROW(report::figures("{}"), Error);
   EXPECT_THROW(report::figures("no json"), Error);
+}
+
+TEST(Figures, SitesThatWerePushedOnceAreNotShownTwice) {
+  auto id = pressed_block::identification({.cells = 3, .pushes = 2, .steps = 3, .points = 20});
+  id.per_site = id.per_push;
+  for (const auto& figure : report::figures(data(id))) EXPECT_NE(figure.name, "per_site");
 }
 
 TEST(Figures, HostileNamesStayText) {
