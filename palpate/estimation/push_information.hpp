@@ -4,10 +4,8 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 
 #include "palpate/estimation/next_push.hpp"
-#include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
 
@@ -29,13 +27,5 @@ class PushInformation {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// Rays of `view` that the stick (radius `radius_m`, from the contact backwards) does not cover.
-RayObservation without_stick(const RayObservation& view, const PushCandidate& candidate, double radius_m, double length_m);
-
-/// Share of the surface around the tool, one to three radii from the contact, that a view shows: facing it (nothing: any
-/// side), with none of the object in between, and with points that were seen beside it.
-double seen_share(const geometry::TriangleTree& surface, const Points& seen_m, const std::optional<Vec3>& eye_m,
-                  const PushCandidate& candidate, double radius_m, double spacing_m);
 
 }  // namespace palpate::estimation
