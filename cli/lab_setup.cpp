@@ -31,6 +31,9 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
   app.add_option("--young-modulus", arguments.young_modulus_pa,
                  "of the true object, Pa (default: drawn from the seed, 10 to 40 kPa; bar: ten times that)")
       ->check(CLI::PositiveNumber);
+  app.add_option("--region-ratio", arguments.region_ratio,
+                 "of the bear: its head is stiffer and its back softer by this factor; of the bar: its upper half is stiffer")
+      ->check(CLI::PositiveNumber);
   app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
 }
@@ -41,6 +44,7 @@ lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
   if (!arguments.material.empty()) options.material = arguments.material;
   if (arguments.young_modulus_pa != 0) options.young_modulus_pa = arguments.young_modulus_pa;
   if (arguments.poisson_ratio >= 0) options.poisson_ratio = arguments.poisson_ratio;
+  options.region_ratio = arguments.region_ratio;
   const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),
                                     [&](const lab::BuiltInObject& row) { return row.name == arguments.object; });
   if (built_in || !std::filesystem::exists(arguments.object)) return lab::make_object(arguments.object, options);
@@ -58,13 +62,16 @@ lab::LabOptions lab_options(const LabArguments& arguments, std::uint64_t seed) {
 
 nlohmann::json truth_json(const lab::LabRobot& robot) {
   const lab::LabObject& object = robot.object();
-  return {{"object", object.name},
+  nlohmann::json json = {{"object", object.name},
           {"young_modulus_pa", object.young_modulus_pa},
           {"poisson_ratio", object.poisson_ratio},
           {"material", object.material},
           {"extra", object.extra},
           {"force_scale", robot.true_force_scale()},
           {"steps", nlohmann::json::array()}};
+  for (const lab::TrueRegion& region : object.regions)
+    json["regions"].push_back({{"name", region.region.name}, {"young_modulus_pa", region.young_modulus_pa}});
+  return json;
 }
 
 nlohmann::json truth_json(const Push& push, const Step& step, const lab::LabRobot& robot) {

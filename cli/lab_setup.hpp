@@ -18,9 +18,10 @@ struct LabArguments {
   std::string object = "cube", material, depth_sensor = "realsense_d435", force_sensor = "generic";
   double young_modulus_pa = 0;  ///< 0: drawn from the seed
   double poisson_ratio = -1;    ///< below 0: drawn from the seed
+  double region_ratio = 1;      ///< 1: one stiffness everywhere
 };
 
-/// --object, --material, --depth-sensor, --force-sensor, --young-modulus, --poisson-ratio
+/// --object, --material, --depth-sensor, --force-sensor, --young-modulus, --poisson-ratio, --region-ratio
 void add_lab_options(CLI::App& app, LabArguments& arguments);
 
 /// A name of the lab's table, or a mesh file.

@@ -190,6 +190,18 @@ struct RobotModel {
   std::vector<RobotJoint> joints;
 };
 
+/// A part of the object with a stiffness of its own. An element belongs where its centre does: to the first region whose box
+/// (or list) holds it, else to the region with the nearest of the points, or to the one that takes the rest.
+enum class RegionSelection { box, points, elements, rest };
+struct Region {
+  std::string name;
+  RegionSelection select = RegionSelection::rest;
+  Vec3 box_min_m = Vec3::Zero(), box_max_m = Vec3::Zero();  ///< box: corners, in the frame of the rest mesh
+  Points points_m;                                          ///< points: sites that the region lies around
+  std::vector<Index> elements;                              ///< elements: rows of Rest::volume
+  std::string source;                                       ///< file and line, for messages
+};
+
 struct Recording {
   std::string name;
   std::string description;  ///< free text: source, licence, how to cite
@@ -201,6 +213,7 @@ struct Recording {
   bool accept_size = false;  ///< lets an object smaller than 1 mm or larger than 10 m pass
   std::vector<Support> supports;
   bool free = false;         ///< `supports: free`
+  std::vector<Region> regions;  ///< empty: one stiffness everywhere
   double density_kg_m3 = 0;  ///< 0 = unknown and not needed
   double density_std_kg_m3 = 0;
   double force_scale_std = 0;  ///< prior of the sensor's common scale error (0.01 = 1 %)

@@ -30,13 +30,18 @@ VectorX multiply(const BlockPattern& pattern, const BlockValues& values, const E
   return y;
 }
 
-Assembly::Assembly(const TetMesh& mesh, Dilatation dilatation) {
+Assembly::Assembly(const TetMesh& mesh, Dilatation dilatation, std::vector<int> region) : region_(std::move(region)) {
   const Index n = static_cast<Index>(mesh.nodes_m.rows());
   const Index elements = static_cast<Index>(mesh.tetrahedra.rows());
   const int nodes = static_cast<int>(mesh.tetrahedra.cols());
   if (nodes != 4 && nodes != 10) throw Error("needs 4 or 10 columns, has " + std::to_string(nodes), "mesh.tetrahedra");
   if (elements == 0) throw Error("is empty", "mesh.tetrahedra");
   if (!mesh.nodes_m.allFinite()) throw Error("holds NaN or infinity", "mesh.nodes_m");
+  if (!region_.empty()) {
+    if (static_cast<Index>(region_.size()) != elements) throw Error("needs one region an element", "StaticsOptions.region");
+    if (*std::min_element(region_.begin(), region_.end()) < 0) throw Error("regions count from 0", "StaticsOptions.region");
+    stiffness_ = VectorX::Ones(*std::max_element(region_.begin(), region_.end()) + 1);
+  }
   pattern_.nodes = nodes_ = n;
   connectivity_ = mesh.tetrahedra;
   const auto quadrature = nodes == 4 ? tet_quadrature_1() : tet_quadrature_4();
@@ -79,9 +84,23 @@ Assembly::Assembly(const TetMesh& mesh, Dilatation dilatation) {
       volume_ += volume;
     }
   }
+  if (!region_.empty()) volumes_ = weights_;
   if (dilatation == Dilatation::averaged && nodes == 4) build_patches();
   if (dilatation == Dilatation::averaged && nodes == 10) build_pressures(mesh);
   build_pattern();
+}
+
+void Assembly::set_region_stiffness(const VectorX& stiffness) {
+  if (stiffness.size() != stiffness_.size() || !stiffness.allFinite() || (stiffness.size() > 0 && !(stiffness.minCoeff() > 0)))
+    throw Error("needs one positive number for each of " + std::to_string(stiffness_.size()) + " regions",
+                "StaticsOptions.region_stiffness");
+  if (stiffness == stiffness_) return;
+  stiffness_ = stiffness;
+  const std::size_t points = weights_.size() / region_.size();
+  for (std::size_t k = 0; k < weights_.size(); ++k) weights_[k] = stiffness_(region_[k / points]) * volumes_[k];
+  for (Patch& patch : patches_) patch.volume = 0;
+  for (std::size_t e = 0; e < patch_of_.size(); ++e) patches_[patch_of_[e]].volume += weights_[e];
+  if (pressures_ > 0) factorise_pressure_mass();
 }
 
 void Assembly::build_pattern() {
@@ -369,6 +388,51 @@ VectorX Assembly::forces_d_poisson(const MaterialLaw& law, const Moduli& m, cons
       VolumetricPart part;
       law.volumetric_part(m, h, false, part);
       stress += part.modulus_d_poisson * (mean_[point] - part.theta) * part.gradient;
+    }
+    return stress;
+  });
+}
+
+VectorX Assembly::forces_d_log_stiffness(const MaterialLaw& law, const Moduli& m, const VectorX& u, int region) const {
+  const bool quadratic = connectivity_.cols() == 10;
+  const bool averaged = quadratic ? average_dilatation<10, 4>(law, m, u) : average_dilatation<4, 1>(law, m, u);
+  const std::size_t points = quadratic ? 4 : 1;
+  // The projection M p = s moves with the weights as well: M dp = ds - dM p, both of this region alone.
+  std::vector<double> mean_slope;
+  if (averaged) {
+    VolumetricPart part;
+    VectorX sum = VectorX::Zero(patches_.empty() ? pressures_ : static_cast<Index>(patches_.size()));
+    const auto quadrature = tet_quadrature_4();
+    const auto add = [&](Index e, int q, const auto&, double weight, const Mat3& h) {
+      if (region_[e] != region) return true;
+      law.volumetric_part(m, h, false, part);
+      const double off = weight * (part.theta - mean_[static_cast<std::size_t>(e) * points + q]);
+      if (!quadratic) {
+        sum(patch_of_[e]) += off / patches_[patch_of_[e]].volume;
+      } else {
+        for (int a = 0; a < 4; ++a) sum(pressure_of_[4 * static_cast<std::size_t>(e) + a]) += quadrature[q].barycentric(a) * off;
+      }
+      return true;
+    };
+    if (quadratic)
+      for_each_point<10, 4>(u, add);
+    else
+      for_each_point<4, 1>(u, add);
+    if (quadratic) mass_factor_.solve_in_place(sum);
+    mean_slope.assign(weights_.size(), 0);
+    for (std::size_t k = 0; k < mean_slope.size(); ++k) {
+      if (!quadratic) mean_slope[k] = sum(patch_of_[k]);
+      for (int a = 0; quadratic && a < 4; ++a) mean_slope[k] += quadrature[k % 4].barycentric(a) * sum(pressure_of_[4 * (k / 4) + a]);
+    }
+  }
+  return forces_of(u, [&](std::size_t point, const Mat3& h) {
+    Mat3 stress = Mat3::Zero();
+    const bool inside = region_[point / points] == region;
+    if (inside) law.energy_and_stress(m, h, stress);
+    if (averaged) {
+      VolumetricPart part;
+      law.volumetric_part(m, h, false, part);
+      stress += part.modulus * ((inside ? mean_[point] - part.theta : 0.0) + mean_slope[point]) * part.gradient;
     }
     return stress;
   });

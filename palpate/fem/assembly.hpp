@@ -32,8 +32,15 @@ VectorX multiply(const BlockPattern& pattern, const BlockValues& values, const E
 /// one more block node for every corner, of which the first unknown is the pressure and the two others are idle.
 class Assembly {
  public:
-  /// @throws Error on indices out of range, an inside-out or degenerate element, or a column count other than 4 or 10.
-  explicit Assembly(const TetMesh& mesh, Dilatation dilatation = Dilatation::pointwise);
+  /// @param region  an element: its region, 0 and up; empty: one
+  /// @throws Error on indices out of range, an inside-out or degenerate element, regions that do not fit the mesh, or a column
+  ///         count other than 4 or 10.
+  explicit Assembly(const TetMesh& mesh, Dilatation dilatation = Dilatation::pointwise, std::vector<int> region = {});
+
+  /// Factors on the regions' energies. With averaged dilatation they weigh the projection too, so that the energy stays one
+  /// function of u. Linear in the factors otherwise. @throws Error unless there is one positive number a region
+  void set_region_stiffness(const VectorX& stiffness);
+  int region_count() const { return static_cast<int>(stiffness_.size()); }  ///< 0: they were not given
 
   Index node_count() const { return nodes_; }
   Index element_count() const { return static_cast<Index>(connectivity_.rows()); }
@@ -60,6 +67,8 @@ class Assembly {
 
   /// d(internal forces)/dnu at constant E and u.
   VectorX forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const;
+  /// d(internal forces)/d log of a region's stiffness at constant u.
+  VectorX forces_d_log_stiffness(const MaterialLaw& law, const Moduli& m, const VectorX& u, int region) const;
   /// d(internal forces)/d extra[index] at constant u.
   VectorX forces_d_extra(const MaterialLaw& law, const Moduli& m, const VectorX& u, int index) const;
 
@@ -79,12 +88,16 @@ class Assembly {
   void build_pattern();
   void build_patches();
   void build_pressures(const TetMesh& mesh);
+  void factorise_pressure_mass();
   template <int N, int Q>
   void add_pressure_blocks(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
 
   Tetrahedra connectivity_;        // nodes of an element in ascending order: local block a >= b is then a lower block
   std::vector<double> gradients_;  // element, quadrature point, node, 3
-  std::vector<double> weights_;    // element, quadrature point
+  std::vector<double> weights_;    // element, quadrature point: volume times the region's stiffness
+  std::vector<double> volumes_;    // element, quadrature point; empty: weights_
+  std::vector<int> region_;        // element; empty: one region
+  VectorX stiffness_;              // a region
   std::vector<Index> block_of_;    // element, pairs a >= b
   BlockPattern pattern_;
   double volume_ = 0;

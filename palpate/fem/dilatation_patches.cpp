@@ -94,6 +94,10 @@ void Assembly::build_pressures(const TetMesh& mesh) {
       pressure_of_.push_back(p);
     }
   pattern_.nodes = nodes_ + pressures_;
+  factorise_pressure_mass();
+}
+
+void Assembly::factorise_pressure_mass() {
   std::vector<Eigen::Triplet<double>> triplets;
   const auto quadrature = tet_quadrature_4();
   for (Index e = 0; e < element_count(); ++e)

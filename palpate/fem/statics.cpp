@@ -16,6 +16,8 @@ Statics::~Statics() = default;
 Statics::Statics(Statics&&) noexcept = default;
 Statics& Statics::operator=(Statics&&) noexcept = default;
 
+void Statics::set_region_stiffness(const VectorX& stiffness) { impl_->set_region_stiffness(stiffness); }
+
 Equilibrium Statics::solve(double young_modulus_pa, double poisson_ratio, const VectorX& force_coefficients,
                            const VectorX& motion_coefficients, const VectorX* start, const VectorX& extra) const {
   if (is_linear())
@@ -53,11 +55,13 @@ Sensitivity Statics::sensitivity(const Equilibrium& at) const {
   out.d_log_young = std::move(along.d_log_young);
   out.d_poisson = std::move(along.d_poisson);
   out.d_extra = std::move(along.d_extra);
+  out.d_log_stiffness = std::move(along.d_log_stiffness);
   out.d_force = along.d_along.leftCols(k);
   out.d_motion = along.d_along.rightCols(m);
   out.reaction_d_log_young = std::move(along.reaction_d_log_young);
   out.reaction_d_poisson = std::move(along.reaction_d_poisson);
   out.reaction_d_extra = std::move(along.reaction_d_extra);
+  out.reaction_d_log_stiffness = std::move(along.reaction_d_log_stiffness);
   out.reaction_d_force = along.reaction_d_along.leftCols(k);
   out.reaction_d_motion = along.reaction_d_along.rightCols(m);
   return out;

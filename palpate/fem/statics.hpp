@@ -51,6 +51,8 @@ struct StaticsOptions {
   int max_newton_steps = 60;
   int max_load_steps = 400;  ///< in the continuation that is started when plain Newton fails
   int threads = 1;
+  std::vector<int> region;   ///< an element: its region, 0 and up; empty: one region
+  VectorX region_stiffness;  ///< a region: its moduli over those asked for (nu is shared); empty: 1
 };
 
 /// A state of the body. `converged` false is a result, not an exception; `reason` says why in plain words.
@@ -80,11 +82,13 @@ struct Sensitivity {
   VectorX d_log_young;           ///< 3n: du / d log E
   VectorX d_poisson;             ///< 3n: du / d nu
   MatrixX d_extra;               ///< 3n x e: du / d extra
+  MatrixX d_log_stiffness;       ///< 3n x r: du / d log of a region's stiffness (no columns where there is one region)
   MatrixX d_force;               ///< 3n x k: du / d a
   MatrixX d_motion;              ///< 3n x m: du / d b
   VectorX reaction_d_log_young;  ///< m
   VectorX reaction_d_poisson;    ///< m
   MatrixX reaction_d_extra;      ///< m x e
+  MatrixX reaction_d_log_stiffness;  ///< m x r
   MatrixX reaction_d_force;      ///< m x k
   MatrixX reaction_d_motion;     ///< m x m
 };
@@ -92,9 +96,9 @@ struct Sensitivity {
 /// The same along a few directions of the coefficients: (a, b) moves by column c of (force_directions, motion_directions).
 struct SensitivityAlong {
   VectorX d_log_young, d_poisson;                    ///< 3n
-  MatrixX d_extra, d_along;                          ///< 3n x e, 3n x c
+  MatrixX d_extra, d_log_stiffness, d_along;         ///< 3n x e, 3n x r, 3n x c
   VectorX reaction_d_log_young, reaction_d_poisson;  ///< m
-  MatrixX reaction_d_extra, reaction_d_along;        ///< m x e, m x c
+  MatrixX reaction_d_extra, reaction_d_log_stiffness, reaction_d_along;  ///< m x e, m x r, m x c
 };
 
 /// What watched rows W u and the motions' reactions of a linear material are for unit coefficients, at E = 1 Pa:
@@ -110,18 +114,21 @@ struct UnitResponses {
   double residual = 0;              ///< largest of any column, relative
 };
 
-/// Immutable description (mesh, element, material, boundary) plus the symbolic analysis that all solves share. Calls are
-/// const but share scratch memory and the last factor: use one Statics a thread.
+/// Description (mesh, element, material, boundary), immutable but for the regions' stiffness, plus the symbolic analysis that
+/// all solves share. Calls are const but share scratch memory and the last factor: use one Statics a thread.
 class Statics {
  public:
   /// @param mesh   linear (4 columns) or quadratic (10 columns) tetrahedra; the columns choose the element
   /// @param material  a name in the table of materials.hpp
-  /// @throws Error on an inside-out or degenerate element, an unknown material, a node index out of range, or supports that
-  ///         leave a rigid motion free (names which one) unless inertia_relief is set.
+  /// @throws Error on an inside-out or degenerate element, an unknown material, a node index out of range, regions that do
+  ///         not fit the mesh, or supports that leave a rigid motion free (names which one) unless inertia_relief is set.
   Statics(const TetMesh& mesh, const std::string& material, Boundary boundary, StaticsOptions options = {});
   ~Statics();
   Statics(Statics&&) noexcept;
   Statics& operator=(Statics&&) noexcept;
+
+  /// Solves from here on are with these. @throws Error unless there is one positive number a region
+  void set_region_stiffness(const VectorX& stiffness);
 
   /// @param extra  values of the material's further parameters (e.g. alpha of the foam law), in its table's order
   /// Newton's method with a line search on the potential energy; when it fails from `start`, the loads are stepped from

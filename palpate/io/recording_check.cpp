@@ -49,6 +49,7 @@ class Checker {
     check_size();
     if (recording_.rest.volume) check_tetrahedra(*recording_.rest.volume);
     for (const Support& support : recording_.supports) check_support(support);
+    for (const Region& region : recording_.regions) check_region(region);
     if (!recording_.free && recording_.supports.empty()) {
       add(recording_.source, "nothing says how the object is held; list 'supports', or write 'supports: free'");
     }
@@ -149,6 +150,22 @@ class Checker {
             fmt::format("the object is {} from '{}'; is the normal on the object's side, and the point in metres?",
                         length(lowest), support.name));
       }
+    }
+  }
+
+  /// Whether every element has a region is known once there are elements.
+  void check_region(const Region& region) {
+    if (!has_mesh_) return;
+    if (region.select == RegionSelection::box && ((region.box_min_m.array() > box_.max.array()).any() ||
+                                                  (region.box_max_m.array() < box_.min.array()).any())) {
+      add(region.source, fmt::format("the box of '{}' passes the object by, which reaches from [{}] to [{}]", region.name,
+                                     point(box_.min), point(box_.max)));
+    }
+    for (Eigen::Index i = 0; region.select == RegionSelection::points && i < region.points_m.rows(); ++i) {
+      const Vec3 at = region.points_m.row(i);
+      if ((at - at.cwiseMax(box_.min).cwiseMin(box_.max)).norm() <= 0.5 * box_.diagonal()) continue;
+      add(region.source, fmt::format("the point [{}] of '{}' is far from the object, which reaches from [{}] to [{}]; is it in metres?",
+                                     point(at), region.name, point(box_.min), point(box_.max)));
     }
   }
 

@@ -25,6 +25,10 @@ inline constexpr Names<ContactLaw, 3> contact_names = {
     {{"bonded", ContactLaw::bonded}, {"frictionless", ContactLaw::frictionless}, {"friction", ContactLaw::friction}}};
 inline constexpr Names<PoseVaries, 3> pose_varies_names = {
     {{"never", PoseVaries::never}, {"push", PoseVaries::push}, {"step", PoseVaries::step}}};
+inline constexpr Names<RegionSelection, 4> region_names = {{{"box", RegionSelection::box},
+                                                            {"points", RegionSelection::points},
+                                                            {"elements", RegionSelection::elements},
+                                                            {"rest", RegionSelection::rest}}};
 inline constexpr Names<ToolShape, 7> tool_names = {{{"vertices", ToolShape::vertices},
                                                     {"sphere", ToolShape::sphere},
                                                     {"disc", ToolShape::disc},

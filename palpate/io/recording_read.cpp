@@ -86,7 +86,7 @@ void read_object(YamlKeys& keys, RecordingContext& context) {
   // Keys are asked for in an order that lets each part refer to what it needs, and all before any is missed, so that a
   // mistyped key is recognised as such.
   const auto model = keys.optional("model"), robot = keys.optional("robot"), tools = keys.optional("tools"),
-             cameras = keys.optional("cameras");
+             cameras = keys.optional("cameras"), regions = keys.optional("regions");
   const YamlField rest = keys.required("rest", "say what the object looks like untouched");
   const YamlField supports =
       keys.required("supports", "say how the object is held, or 'supports: free' if nothing holds it");
@@ -96,6 +96,7 @@ void read_object(YamlKeys& keys, RecordingContext& context) {
   if (cameras) read_cameras(*cameras, context);
   read_rest(rest, context);
   read_supports(supports, context);
+  if (regions) read_regions(*regions, context);
   if (tools) read_tools(*tools, context);
 }
 

@@ -63,11 +63,12 @@ DepthNoise read_depth_noise(const YamlField& field);
 std::vector<Index> read_index_list(YamlKeys& keys, RecordingContext& context);
 ContactLaw read_contact(YamlKeys& keys, bool is_required, double& friction_coefficient);
 
-/// Everything of a recording but markers and pushes: name, rest, supports, environment, density, tools, cameras, robot,
+/// Everything of a recording but markers and pushes: name, rest, supports, regions, environment, density, tools, cameras, robot,
 /// model, ...: a bag's mapping has the same keys. Ask for the other keys of the map before: what is left is unknown.
 void read_object(YamlKeys& keys, RecordingContext& context);
 void read_rest(const YamlField& field, RecordingContext& context);
 void read_supports(const YamlField& field, RecordingContext& context);
+void read_regions(const YamlField& field, RecordingContext& context);
 void read_tools(const YamlField& field, RecordingContext& context);
 void read_cameras(const YamlField& field, RecordingContext& context);
 void read_markers(const YamlField& field, RecordingContext& context);

@@ -125,6 +125,7 @@ struct RecordingWriter::Pages {
   void set_head(const Recording& recording);
   std::string rest_text(const Rest& rest);
   std::string support_text(const Support& support, std::size_t number) const;
+  std::string region_text(const Region& region, std::size_t number) const;
   std::string tool_text(const Tool& tool, std::size_t number) const;
   void add_step(const Step& step);
   std::string observation_text(const Observation& observation, const std::string& stem, const Step& step);
@@ -217,6 +218,26 @@ std::string RecordingWriter::Pages::support_text(const Support& support, std::si
   return line.str();
 }
 
+std::string RecordingWriter::Pages::region_text(const Region& region, std::size_t number) const {
+  YamlLine line;
+  line.word("name", region.name).put("kind", name_of(region_names, region.select));
+  switch (region.select) {
+    case RegionSelection::box: line.vector("min_m", region.box_min_m).vector("max_m", region.box_max_m); break;
+    case RegionSelection::points: {
+      std::string points;
+      for (Eigen::Index i = 0; i < region.points_m.rows(); ++i)
+        points += (i > 0 ? ", " : "") + yaml_vector(region.points_m.row(i));
+      line.put("points_m", "[" + points + "]");
+      break;
+    }
+    case RegionSelection::elements:
+      line.put("file", index_text(region.elements, fmt::format("region_{}.csv", number)));
+      break;
+    case RegionSelection::rest: break;
+  }
+  return line.str();
+}
+
 std::string RecordingWriter::Pages::tool_text(const Tool& tool, std::size_t number) const {
   YamlLine line;
   line.word("name", tool.name).put("shape", name_of(tool_names, tool.shape));
@@ -261,6 +282,9 @@ void RecordingWriter::Pages::set_head(const Recording& recording) {
     for (std::size_t i = 0; i < recording.supports.size(); ++i)
       head += "  - " + support_text(recording.supports[i], i + 1) + "\n";
   }
+  if (!recording.regions.empty()) head += "regions:\n";
+  for (std::size_t i = 0; i < recording.regions.size(); ++i)
+    head += "  - " + region_text(recording.regions[i], i + 1) + "\n";
   head += "environment:\n  gravity_m_s2: " + yaml_vector(recording.environment.gravity_m_s2) + "\n";
   if (!recording.environment.planes.empty()) {
     head += "  planes:\n";

@@ -26,6 +26,7 @@ LabObject draw(const std::string& name, const ObjectOptions& o, double stiffer =
   };
   need(!o.young_modulus_pa || *o.young_modulus_pa > 0, "young_modulus_pa", "must be positive");
   need(!o.poisson_ratio || (*o.poisson_ratio >= 0 && *o.poisson_ratio < 0.4999), "poisson_ratio", "must be in [0, 0.4999)");
+  need(o.region_ratio > 0 && std::isfinite(o.region_ratio), "region_ratio", "must be positive");
   need(o.tetrahedra >= 200, "tetrahedra", "must be at least 200");
   need(o.cells_in_radius >= 1, "cells_in_radius", "must be at least 1");
   const auto& parameters = fem::material_law(o.material).extra_parameters();
@@ -83,12 +84,26 @@ void make_pressable(LabObject& object, const ObjectOptions& o) {
   pressed.extra = object.extra;
   pressed.tetrahedra = o.tetrahedra;
   pressed.cells_in_radius = o.cells_in_radius;
+  pressed.regions = object.regions;
   object.press = [pressed](const PushSite& at) {
     PressedObjectOptions here = pressed;
     here.contact_m = at.contact_m;
     here.direction = at.direction;
     return std::make_unique<PressedObject>(here);
   };
+}
+
+// A box relative to the foot; without one, what the others leave.
+TrueRegion region(const ObjectOptions& o, const std::string& name, double young_modulus_pa,
+                  const std::optional<std::pair<Vec3, Vec3>>& box_m = {}) {
+  TrueRegion out{{}, young_modulus_pa};
+  out.region.name = name;
+  if (box_m) {
+    out.region.select = RegionSelection::box;
+    out.region.box_min_m = o.base_centre_m + box_m->first;
+    out.region.box_max_m = o.base_centre_m + box_m->second;
+  }
+  return out;
 }
 
 LabObject shaped(const std::string& name, const ObjectOptions& o, const Implicit& body, const Vec3& min_m, const Vec3& max_m,
@@ -147,6 +162,10 @@ LabObject bar(const ObjectOptions& o) {
   size_pushes(object, 0.015);
   object.sites = {site(object, o, "side", {-0.03, 0, 0.14}, {0.866, 0, -0.5}, 0.06),
                   site(object, o, "end", {0.005, 0, 0.18}, -Vec3::UnitZ(), 0.4)};
+  if (o.region_ratio != 1) {
+    object.regions = {region(o, "upper", o.region_ratio * object.young_modulus_pa, {{Vec3(-1, -1, 0.09), Vec3(1, 1, 1)}}),
+                      region(o, "lower", object.young_modulus_pa)};
+  }
   make_pressable(object, o);
   return object;
 }
@@ -169,6 +188,11 @@ LabObject bear(const ObjectOptions& o) {
   object.sites = {site(object, o, "head", {0, -0.004, 0.155}, -Vec3::UnitZ(), 0.7),
                   site(object, o, "belly", {0, 0, 0.075}, {0, 0.866, -0.5}),
                   site(object, o, "back", {0, 0.02, 0.08}, {0, -0.5, -0.866})};
+  if (o.region_ratio != 1) {
+    object.regions = {region(o, "head", o.region_ratio * object.young_modulus_pa, {{Vec3(-1, -1, 0.118), Vec3(1, 1, 1)}}),
+                      region(o, "back", object.young_modulus_pa / o.region_ratio, {{Vec3(-1, 0.004, -1), Vec3(1, 1, 0.118)}}),
+                      region(o, "belly", object.young_modulus_pa)};
+  }
   make_pressable(object, o);
   return object;
 }

@@ -13,6 +13,7 @@
 
 #include "palpate/core/mesh.hpp"
 #include "palpate/lab/pressed.hpp"
+#include "palpate/lab/pressed_object.hpp"
 
 namespace palpate::lab {
 
@@ -30,6 +31,7 @@ struct ObjectOptions {
   std::optional<double> poisson_ratio;               ///< drawn uniformly from 0.1 to 0.45
   std::string material = "neo_hookean";              ///< a law of the solver's table
   std::vector<double> extra;                         ///< its further parameters, in the table's order; empty = their initial values
+  double region_ratio = 1;                           ///< of an object with regions: their stiffnesses differ by this factor
   Vec3 base_centre_m = Vec3(0.6, 0.0, 0.0);          ///< of the object's foot on the table, base frame
   Index tetrahedra = 5000;                           ///< of the true mesh, before refinement under the pad
   int cells_in_radius = 4;                           ///< edges across the pad's radius
@@ -49,6 +51,7 @@ struct LabObject {
   std::string material;
   double young_modulus_pa = 0, poisson_ratio = 0;
   std::vector<double> extra;
+  std::vector<TrueRegion> regions;  ///< empty: one stiffness everywhere
   std::function<std::unique_ptr<Pressed>(const PushSite&)> press;
 };
 

@@ -9,6 +9,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
@@ -123,6 +124,15 @@ struct PressedObject::Impl {
     fem::StaticsOptions statics_options;
     statics_options.residual_tolerance = 1e-7;  // far below the sensors' errors
     if (options.poisson_ratio > 0.45) statics_options.dilatation = fem::Dilatation::averaged;
+    if (!options.regions.empty()) {
+      std::vector<Region> regions;
+      statics_options.region_stiffness.resize(Eigen::Index(options.regions.size()));
+      for (const TrueRegion& one : options.regions) {
+        statics_options.region_stiffness(Eigen::Index(regions.size())) = one.young_modulus_pa / options.young_modulus_pa;
+        regions.push_back(one.region);
+      }
+      statics_options.region = fem::regions_of(mesh, regions);
+    }
     statics = std::make_unique<fem::Statics>(mesh, options.material, std::move(boundary), statics_options);
     TetMesh corners{mesh.nodes_m, mesh.tetrahedra.leftCols(4)};
     embedding = geometry::embed(options.surface.vertices_m, corners);

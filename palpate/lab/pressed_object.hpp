@@ -7,10 +7,16 @@
 #include <string>
 #include <vector>
 
-#include "palpate/core/mesh.hpp"
+#include "palpate/core/recording.hpp"
 #include "palpate/lab/pressed.hpp"
 
 namespace palpate::lab {
+
+/// A part of other stiffness.
+struct TrueRegion {
+  Region region;
+  double young_modulus_pa = 0;
+};
 
 struct PressedObjectOptions {
   TriMesh surface;                ///< base frame, closed
@@ -21,6 +27,7 @@ struct PressedObjectOptions {
   std::string material = "neo_hookean";
   double young_modulus_pa = 15e3, poisson_ratio = 0.3;
   std::vector<double> extra;                         ///< further parameters of the material, in its table's order
+  std::vector<TrueRegion> regions;                   ///< empty = young_modulus_pa everywhere
   Index tetrahedra = 5000;                           ///< before refinement under the pad
   int cells_in_radius = 4;                           ///< edges across the pad's radius
 };

@@ -308,6 +308,7 @@ Recording LabRobot::scene() const {
   recording.rest.surface = lab.object.surface;
   recording.rest.state = RestState::stress_free;
   recording.supports = lab.object.supports;
+  for (const TrueRegion& one : lab.object.regions) recording.regions.push_back(one.region);
   recording.environment.planes.push_back(lab.table);
   recording.force_scale_std = lab.options.force.scale_std;
   Tool pad;

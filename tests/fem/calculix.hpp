@@ -18,8 +18,10 @@ inline bool calculix_is_there() { return std::system("command -v ccx > /dev/null
 
 /// Displacements (3n, node-major; seven digits) of C3D4 or C3D10 elements, by the mesh's columns. Linear, or NLGEOM with its
 /// Neo-Hookean law (C10 = mu / 2, D1 = 2 / K). NaN where ccx gave no result.
+/// @param other, other_young_pa  elements that are of another E
 inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Index>& held, const VectorX& load,
-                                      bool nonlinear, double young_pa, double poisson) {
+                                      bool nonlinear, double young_pa, double poisson,
+                                      const std::vector<Index>& other = {}, double other_young_pa = 0) {
   const auto nodes = mesh.tetrahedra.cols();
   const auto folder = std::filesystem::temp_directory_path() /
                       ("palpate_ccx_" + std::to_string(nodes) + (nonlinear ? "n" : "l") + std::to_string(poisson) + "_" +
@@ -37,13 +39,29 @@ inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Ind
       for (int a = 0; a < nodes; ++a) out << ", " << mesh.tetrahedra(e, a) + 1;
       out << "\n";
     }
-    const Moduli m = moduli(young_pa, poisson);
-    out << "*MATERIAL, NAME=SOFT\n";
-    if (nonlinear)
-      out << "*HYPERELASTIC, NEO HOOKE\n" << m.mu / 2 << ", " << 2 / (m.lambda + 2.0 / 3 * m.mu) << "\n";
-    else
-      out << "*ELASTIC\n" << young_pa << ", " << poisson << "\n";
-    out << "*SOLID SECTION, ELSET=BODY, MATERIAL=SOFT\n*BOUNDARY\n";
+    const auto material = [&](const char* name, const char* elements, double stiffness_pa) {
+      const Moduli m = moduli(stiffness_pa, poisson);
+      out << "*MATERIAL, NAME=" << name << "\n";
+      if (nonlinear)
+        out << "*HYPERELASTIC, NEO HOOKE\n" << m.mu / 2 << ", " << 2 / (m.lambda + 2.0 / 3 * m.mu) << "\n";
+      else
+        out << "*ELASTIC\n" << stiffness_pa << ", " << poisson << "\n";
+      out << "*SOLID SECTION, ELSET=" << elements << ", MATERIAL=" << name << "\n";
+    };
+    if (other.empty()) {
+      material("SOFT", "BODY", young_pa);
+    } else {
+      std::vector<char> is_other(static_cast<std::size_t>(mesh.tetrahedra.rows()), 0);
+      for (Index e : other) is_other[static_cast<std::size_t>(e)] = 1;
+      for (const char which : {0, 1}) {
+        out << "*ELSET, ELSET=" << (which ? "THOSE" : "THESE") << "\n";
+        for (std::size_t e = 0; e < is_other.size(); ++e)
+          if (is_other[e] == which) out << e + 1 << ",\n";
+      }
+      material("SOFT", "THESE", young_pa);
+      material("OTHER", "THOSE", other_young_pa);
+    }
+    out << "*BOUNDARY\n";
     for (Index i : held) out << i + 1 << ", 1, 3, 0.\n";
     out << "*STEP" << (nonlinear ? ", NLGEOM, INC=200" : "") << "\n*STATIC\n" << (nonlinear ? "0.5, 1.\n" : "");
     if (nonlinear) out << "*CONTROLS, PARAMETERS=FIELD\n1.E-7, 1.E-7\n";

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "fem_meshes.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 
 namespace palpate::fem {
@@ -41,6 +42,39 @@ TEST_P(CalculiX, AgreesNodeByNode) {
   const double difference = (theirs - e.displacement_m).cwiseAbs().maxCoeff() / largest;
   RecordProperty("largest_difference", std::to_string(1e6 * difference) + "e-6");
   EXPECT_LT(difference, 2e-6);  // its file carries seven digits
+}
+
+// The upper part of the cube is of another stiffness, up to a slanted face through its middle.
+TEST_P(CalculiX, AgreesWithTwoStiffnesses) {
+  if (!calculix_is_there()) GTEST_SKIP() << "CalculiX (ccx) is not installed";
+  const Case c = GetParam();
+  TetMesh mesh = distorted(block_mesh(4, 4, 4, {0.15, 0.15, 0.15}), 0.006, 22);
+  if (c.nodes == 10) mesh = to_quadratic(mesh);
+  const std::vector<Index> held = nodes_where(mesh, [](const Vec3& x) { return x.z() < 1e-9; });
+  Boundary b;
+  b.constraints = clamp(held);
+  b.forces = spread_over_patch(mesh, {0.075, 0.075, 0.15}, 0.03);
+  const Vec3 force = 8 * Vec3(0.2, -0.1, -1).normalized();
+  const double young = 20000;
+  StaticsOptions options;
+  std::vector<Index> upper;
+  for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
+    const Vec3 at = element_centre(mesh, e);
+    options.region.push_back(at.z() > 0.05 + 0.4 * at.x() ? 1 : 0);
+    if (options.region.back() == 1) upper.push_back(e);
+  }
+  for (const double ratio : {5.0, 0.4}) {
+    options.region_stiffness = Eigen::Vector2d(1, ratio);
+    const VectorX theirs =
+        calculix_displacements(mesh, held, b.forces * force, c.nonlinear, young, c.poisson, upper, ratio * young);
+    ASSERT_TRUE(theirs.allFinite()) << "ccx gave no result";
+    const Equilibrium e = Statics(mesh, c.nonlinear ? "neo_hookean_isochoric" : "linear", b, options)
+                              .solve(young, c.poisson, force, VectorX());
+    ASSERT_TRUE(e.converged) << e.reason;
+    const double largest = e.displacement_m.cwiseAbs().maxCoeff();
+    EXPECT_GT(largest, 5e-4);
+    EXPECT_LT((theirs - e.displacement_m).cwiseAbs().maxCoeff(), 3e-6 * largest) << "ratio " << ratio;
+  }
 }
 
 std::vector<Case> cases() {

@@ -6,6 +6,7 @@
 
 #include "fem_meshes.hpp"
 #include "palpate/fem/materials.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 
 namespace palpate::fem {
@@ -41,12 +42,13 @@ class SensitivityContract : public testing::TestWithParam<Case> {
   // Parameters in one vector: log E, nu, extra, force coefficients, motion coefficients.
   struct Point {
     double log_young = std::log(20000.0), poisson = 0.35;
-    VectorX extra, force, motion;
+    VectorX extra, force, motion, log_stiffness;
   };
-  static Equilibrium solve(const Statics& s, const Point& p, const VectorX* start = nullptr) {
+  static Equilibrium solve(Statics& s, const Point& p, const VectorX* start = nullptr) {
+    if (p.log_stiffness.size() > 0) s.set_region_stiffness(p.log_stiffness.array().exp());
     return s.solve(std::exp(p.log_young), p.poisson, p.force, p.motion, start, p.extra);
   }
-  void compare(const Statics& statics, Point p) const {
+  void compare(Statics statics, Point p) const {
     p.extra.resize(static_cast<Index>(GetParam().law->extra_parameters().size()));
     for (Index i = 0; i < p.extra.size(); ++i) p.extra(i) = GetParam().law->extra_parameters()[i].initial;
     const Equilibrium e = solve(statics, p);
@@ -69,6 +71,10 @@ class SensitivityContract : public testing::TestWithParam<Case> {
     check("nu", 1e-4, s.d_poisson, s.reaction_d_poisson, [](Point& x, double h) { x.poisson += h; });
     for (Index k = 0; k < p.extra.size(); ++k)
       check("extra", 1e-3, s.d_extra.col(k), s.reaction_d_extra.col(k), [k](Point& x, double h) { x.extra(k) += h; });
+    ASSERT_EQ(s.d_log_stiffness.cols(), p.log_stiffness.size());
+    for (Index k = 0; k < p.log_stiffness.size(); ++k)
+      check("stiffness of a region", 1e-4, s.d_log_stiffness.col(k), s.reaction_d_log_stiffness.col(k),
+            [k](Point& x, double h) { x.log_stiffness(k) += h; });
     for (Index k = 0; k < p.force.size(); ++k)
       check("force", 3e-3, s.d_force.col(k), s.reaction_d_force.size() ? VectorX(s.reaction_d_force.col(k)) : VectorX(),
             [k](Point& x, double h) { x.force(k) += h; });
@@ -113,6 +119,34 @@ TEST_P(SensitivityContract, ObliqueSlideAndDrivenTop) {
   p.motion = VectorX(2);
   p.motion << -0.02, 0.01;
   compare(Statics(m, std::string(GetParam().law->name()), b, tight()), p);
+}
+
+// Three parts of different stiffness, one of them between the others, under a force and a motion.
+TEST_P(SensitivityContract, RegionsOfDifferentStiffness) {
+  const TetMesh m = mesh();
+  Boundary b;
+  std::vector<Eigen::Triplet<double>> motion;
+  for (Index i = 0; i < m.nodes_m.rows(); ++i) {
+    const Vec3 x = node_position(m, i);
+    if (x.z() < 1e-9) b.constraints.push_back({i, Mat3::Identity(), 3});
+    if (x.z() > 0.15 - 1e-9 && x.x() < 0.02) {
+      b.constraints.push_back({i, Mat3::Identity(), 3});
+      motion.emplace_back(3 * i + 2, 0, 1.0);
+    }
+  }
+  b.motions.resize(3 * m.nodes_m.rows(), 1);
+  b.motions.setFromTriplets(motion.begin(), motion.end());
+  b.forces = spread_over_patch(m, {0.1, 0.05, 0.07}, 0.03);
+  StaticsOptions options = tight();
+  for (Index e = 0; e < m.tetrahedra.rows(); ++e) {
+    const double height = element_centre(m, e).z();
+    options.region.push_back(height < 0.05 ? 1 : height < 0.09 ? 0 : 2);
+  }
+  Point p;
+  p.force = Vec3(-2, 1, 0.5);
+  p.motion = VectorX::Constant(1, -0.01);
+  p.log_stiffness = Vec3(0.4, -0.3, 0.7);
+  compare(Statics(m, std::string(GetParam().law->name()), b, options), p);
 }
 
 TEST_P(SensitivityContract, FreeBodyBetweenTwoPushes) {

@@ -60,6 +60,49 @@ TEST_F(BrokenRecording, FilesOutsideTheFolder) {
   expect_refused("recording.yaml:4", "outside the recording's folder");
 }
 
+TEST_F(BrokenRecording, Regions) {
+  const auto with = [&](const std::string& lines) {
+    folder.put("recording.yaml", replaced(index_text, "tools:\n", "regions:\n" + lines + "tools:\n"));
+  };
+  const std::string rest = "  - {name: b, kind: rest}\n";
+  with("  - {name: a, kind: elements, elements: [0, 4]}\n" + rest);
+  const Recording recording = read_recording(folder.path());
+  EXPECT_EQ(recording.regions.at(0).elements, (std::vector<Index>{0, 4}));
+  with(rest);
+  expect_refused("recording.yaml:9: regions", "two regions or more");
+  with("  - {name: b, kind: box, min_m: [0, 0, 0], max_m: [1, 1, 0.05]}\n" + rest);
+  expect_refused("regions[1].name", "already");
+  with("  - {name: a, kind: box, min_m: [0, 0, 0], max_m: [1, 0, 0.05]}\n" + rest);
+  expect_refused("regions[0].max_m", "larger than min_m");
+  with("  - {name: a, kind: box, min_m: [1, 0, 0], max_m: [2, 1, 1]}\n" + rest);
+  expect_refused("regions[0]", "passes the object by");
+  with("  - {name: a, kind: ball}\n" + rest);
+  expect_refused("regions[0].kind", "box");
+  with("  - {name: a, kind: elements, elements: [5]}\n" + rest);
+  expect_refused("regions[0].elements", "element 5 is not in the volume mesh, which has 5");
+  with("  - {name: a, kind: elements, elements: [1, 1]}\n" + rest);
+  expect_refused("regions[0]", "named twice");
+  with("  - {name: a, kind: elements}\n" + rest);
+  expect_refused("regions[0]", "either 'file' or 'elements'");
+  with("  - {name: a, kind: points}\n" + rest);
+  expect_refused("regions[0]", "'points_m'");
+  with("  - {name: a, kind: points, points_m: []}\n" + rest);
+  expect_refused("regions[0].points_m", "no point");
+  with("  - {name: a, kind: points, vertices: [8]}\n" + rest);
+  expect_refused("regions[0]", "vertex 8 is not in the rest mesh");
+  with("  - {name: a, kind: points, vertices: [1]}\n" + rest);
+  expect_refused("regions", "leave no rest");
+  with("  - {name: a, kind: points, points_m: [[50, 0, 0]]}\n  - {name: b, kind: points, vertices: [1]}\n");
+  expect_refused("regions[0]", "in metres?");
+  with("  - {name: a, kind: rest}\n" + rest);
+  expect_refused("regions[1].kind", "takes the rest already");
+  with("  - {name: a, kind: rest, young_modulus_pa: 3}\n" + rest);
+  expect_refused("regions[0]", "young_modulus_pa");
+  folder.put("part.csv", "0\n1,7\n");
+  with("  - {name: a, kind: elements, file: part.csv}\n" + rest);
+  expect_refused("part.csv", "element 7 is not in the volume mesh");
+}
+
 TEST_F(BrokenRecording, NotANumber) {
   folder.put("clouds/b.xyz", cloud_text() + "nan 0 0\n");
   expect_refused("b.xyz:26", "not finite");

@@ -51,6 +51,10 @@ supports:
   - {kind: clamp, name: base, point_m: [0, 0, 0], normal: [0, 0, 1], pose_std_m: 0.003, pose_std_rad: 0.03, pose_varies: push}
   - {kind: box, min_m: [-1, -1, -1], max_m: [1, 1, 0.001], contact: frictionless}
   - {kind: table, point_m: [0, 0, 0], normal: [0, 0, 1], contact: friction, friction_coefficient: 0.5}
+regions:
+  - {name: low, kind: box, min_m: [-1, -1, -1], max_m: [1, 1, 0.03]}
+  - {name: corner, kind: points, vertices: [6]}
+  - {name: sites, kind: points, points_m: [[0, 0, 0.1], [0.1, 0.1, 0.07]]}
 environment: {gravity_m_s2: [0, 0, -9.81], planes: [{point_m: [0, 0, 0], normal: [0, 0, 1]}]}
 density_kg_m3: {value: 1070, std: 10}
 force_scale_std: 0.01
@@ -156,6 +160,11 @@ TEST(ReadRecording, EveryKindOfKey) {
   EXPECT_EQ(recording.supports[0].pose_varies, PoseVaries::push);
   EXPECT_EQ(recording.supports.at(2).contact, ContactLaw::friction);
   EXPECT_EQ(recording.density_std_kg_m3, 10);
+  ASSERT_EQ(recording.regions.size(), 3u);
+  EXPECT_EQ(recording.regions[0].select, RegionSelection::box);
+  EXPECT_EQ(recording.regions[0].box_max_m, Vec3(1, 1, 0.03));
+  EXPECT_EQ(recording.regions[1].points_m.row(0), recording.rest.surface->vertices_m.row(6));
+  EXPECT_EQ(recording.regions[2].points_m.row(1), Vec3(0.1, 0.1, 0.07).transpose());
   ASSERT_TRUE(recording.robot);
   EXPECT_EQ(recording.robot->links.at(2).collision.at(0).mesh.vertices_m.maxCoeff(), 0.002);
   EXPECT_EQ(recording.joint_names, (std::vector<std::string>{"elbow", "shoulder"}));
@@ -203,6 +212,13 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
   EXPECT_EQ(back.rest.surface->vertices_m, recording.rest.surface->vertices_m);
   EXPECT_EQ(back.supports.size(), recording.supports.size());
   EXPECT_EQ(back.supports[0].pose_std_rad, recording.supports[0].pose_std_rad);
+  ASSERT_EQ(back.regions.size(), recording.regions.size());
+  for (std::size_t r = 0; r < back.regions.size(); ++r) {
+    EXPECT_EQ(back.regions[r].name, recording.regions[r].name);
+    EXPECT_EQ(back.regions[r].select, recording.regions[r].select);
+    EXPECT_EQ(back.regions[r].box_min_m, recording.regions[r].box_min_m);
+    EXPECT_EQ(back.regions[r].points_m, recording.regions[r].points_m);
+  }
   EXPECT_EQ(back.tools[1].axis, recording.tools[1].axis);
   EXPECT_EQ(back.tools[3].mesh->vertices_m, recording.tools[3].mesh->vertices_m);
   EXPECT_EQ(back.description, recording.description);

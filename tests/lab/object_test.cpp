@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "palpate/core/error.hpp"
@@ -46,6 +47,54 @@ TEST(ImplicitSurface, IsCutFlatAtItsFoot) {
   EXPECT_NEAR(foot / (M_PI * 0.04 * 0.04), 1, 0.01);
   EXPECT_THROW(implicit_surface([](const Vec3& p) { return p.norm() - 1; }, {{-0.1, -0.1, 0}, {0.1, 0.1, 0.1}, 0.01}), Error);
   EXPECT_THROW(implicit_surface([](const Vec3&) { return 1.0; }, {{-0.1, -0.1, 0}, {0.1, 0.1, 0.1}, 0.01}), Error);
+}
+
+// The bar's upper half is four times as stiff: pressed on its end it is two springs in a row, beside the dent that the pad
+// makes in the upper one.
+TEST(Regions, OfTheBarAreSpringsInARow) {
+  ObjectOptions options;
+  options.young_modulus_pa = 200e3;
+  options.poisson_ratio = 0.3;
+  options.material = "linear";
+  options.tetrahedra = 3000;
+  options.cells_in_radius = 2;
+  const auto travel_m = [&](double lower_pa, double upper_over_lower) {
+    options.young_modulus_pa = lower_pa;
+    options.region_ratio = upper_over_lower;
+    const LabObject bar = make_object("bar", options);
+    const auto pressed = bar.press(bar.sites[1]);
+    pressed->press(10);
+    return pressed->travel_m();
+  };
+  const double plain = travel_m(200e3, 1), stiff = travel_m(800e3, 1), both = travel_m(200e3, 4);
+  // What the lower half adds is F h / (E A) per E, with what its clamped end cannot stretch taken from the same difference.
+  const double spring_m = 10 * 0.09 / (200e3 * 0.0036);
+  EXPECT_NEAR((both - stiff) / (0.75 * spring_m), 1, 0.03);
+  EXPECT_NEAR(plain / stiff, 4, 1e-3);
+}
+
+TEST(Regions, AreInTheRecordingWithoutTheirStiffness) {
+  ObjectOptions options;
+  options.seed = 3;
+  options.region_ratio = 1.5;
+  const LabObject bear = make_object("bear", options);
+  ASSERT_EQ(bear.regions.size(), 3u);
+  EXPECT_EQ(bear.regions[0].young_modulus_pa, 1.5 * bear.young_modulus_pa);
+  EXPECT_EQ(bear.regions[1].young_modulus_pa, bear.young_modulus_pa / 1.5);
+  EXPECT_EQ(bear.regions[2].young_modulus_pa, bear.young_modulus_pa);
+  const Recording recording = LabRobot({}, bear).scene();
+  ASSERT_EQ(recording.regions.size(), 3u);
+  // Every site lies in the region of its name.
+  for (const PushSite& site : bear.sites) {
+    const auto inside = std::find_if(recording.regions.begin(), recording.regions.end(), [&](const Region& region) {
+      return region.select == RegionSelection::rest || ((site.contact_m.array() >= region.box_min_m.array()).all() &&
+                                                        (site.contact_m.array() <= region.box_max_m.array()).all());
+    });
+    EXPECT_EQ(inside->name, site.name);
+  }
+  EXPECT_TRUE(LabRobot({}, make_object("ball", options)).scene().regions.empty());
+  options.region_ratio = 0;
+  EXPECT_THROW(make_object("bear", options), Error);
 }
 
 class Objects : public testing::TestWithParam<std::string> {};

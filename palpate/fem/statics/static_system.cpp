@@ -32,7 +32,7 @@ StaticSystem::StaticSystem(const TetMesh& mesh_in, const std::string& material, 
     : mesh(mesh_in),
       law(material_law(material)),
       options(options_in),
-      assembly(mesh_in, options_in.dilatation),
+      assembly(mesh_in, options_in.dilatation, options_in.region),
       boundary(checked(mesh_in, std::move(boundary_in))),
       free(boundary.inertia_relief),
       system(assembly.pattern(), boundary.constraints,
@@ -43,15 +43,28 @@ StaticSystem::StaticSystem(const TetMesh& mesh_in, const std::string& material, 
   for (Index k = 0; k < motions.cols(); ++k) motions.col(k) = system.prescribed_part(motions.col(k));
   node_area_m2 = surface_shares(mesh);
   diameter_m = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
-  if (law.is_linear() && !assembly.is_mixed()) {
-    Moduli unit;
-    const VectorX rest = VectorX::Zero(3 * assembly.node_count());
-    unit.lambda = 1;
-    assembly.tangent(law, unit, rest, blocks_lambda);
-    unit.lambda = 0;
-    unit.mu = 1;
-    assembly.tangent(law, unit, rest, blocks_mu);
-  }
+  if (options.region_stiffness.size() > 0) assembly.set_region_stiffness(options.region_stiffness);
+  assemble_linear();
+}
+
+void StaticSystem::assemble_linear() {
+  if (!law.is_linear() || assembly.is_mixed()) return;
+  Moduli unit;
+  const VectorX rest = VectorX::Zero(3 * assembly.node_count());
+  unit.lambda = 1;
+  assembly.tangent(law, unit, rest, blocks_lambda);
+  unit.lambda = 0;
+  unit.mu = 1;
+  assembly.tangent(law, unit, rest, blocks_mu);
+}
+
+void StaticSystem::set_region_stiffness(const VectorX& stiffness) {
+  if (stiffness.size() == options.region_stiffness.size() && stiffness == options.region_stiffness) return;
+  assembly.set_region_stiffness(stiffness);
+  options.region_stiffness = stiffness;
+  factored_u.resize(0);
+  linear_poisson = std::numeric_limits<double>::quiet_NaN();
+  assemble_linear();
 }
 
 bool StaticSystem::evaluate(const StaticProblem& p, StaticState& s) const {

@@ -35,6 +35,7 @@ class StaticSystem {
  public:
   StaticSystem(const TetMesh& mesh, const std::string& material, Boundary boundary, StaticsOptions options);
 
+  void set_region_stiffness(const VectorX& stiffness);
   Equilibrium solve(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX* start,
                     const VectorX& extra);
   Equilibrium solve_stepwise(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra);
@@ -88,6 +89,8 @@ class StaticSystem {
   StaticProblem problem(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const;
   Equilibrium blank(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const;
   void finish(const StaticProblem& p, StaticState& s, Equilibrium& out) const;
+  /// The two parts of a linear material's stiffness, which do not depend on nu.
+  void assemble_linear();
   void factorise_linear(double poisson, int* factorisations);
   /// With the matrix of `factorise_linear`. @throws Error when it is not positive definite
   MatrixX solve_linear_system(const MatrixX& right_hand_sides);

@@ -1,0 +1,122 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// Regions of other stiffness: a bar of two halves is two springs in a row.
+#include <gtest/gtest.h>
+
+#include "fem/fem_meshes.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/fem/regions.hpp"
+#include "palpate/fem/statics.hpp"
+
+namespace palpate::fem {
+namespace {
+
+// A bar along x, held at x = 0 and drawn at its other end by a force.
+struct Bar {
+  TetMesh mesh = to_quadratic(block_mesh(6, 2, 2, Vec3(0.3, 0.1, 0.1)));
+  Boundary boundary;
+  std::vector<Index> end;
+  Bar() {
+    for (Index n = 0; n < mesh.nodes_m.rows(); ++n) {
+      if (mesh.nodes_m(n, 0) < 1e-9) boundary.constraints.push_back({n, Mat3::Identity(), 3});
+      if (mesh.nodes_m(n, 0) > 0.3 - 1e-9) end.push_back(n);
+    }
+    // Uniform traction on a flat quadratic face: a third of its force at each midpoint.
+    VectorX column = VectorX::Zero(3 * mesh.nodes_m.rows());
+    const Tetrahedra faces = boundary_faces(mesh);
+    for (Index f = 0; f < faces.rows(); ++f) {
+      const Vec3 a = mesh.nodes_m.row(faces(f, 0)), b = mesh.nodes_m.row(faces(f, 1)), c = mesh.nodes_m.row(faces(f, 2));
+      if (std::min({a.x(), b.x(), c.x()}) < 0.3 - 1e-9) continue;
+      for (int k = 3; k < 6; ++k) column(3 * faces(f, k)) += 0.5 * (b - a).cross(c - a).norm() / 0.01 / 3;
+    }
+    boundary.forces = MatrixX(column).sparseView();
+  }
+  std::vector<int> halves() const {
+    std::vector<int> region;
+    for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) region.push_back(element_centre(mesh, e).x() < 0.15 ? 0 : 1);
+    return region;
+  }
+};
+
+TEST(RegionStiffness, TwoHalvesAreSpringsInARow) {
+  const Bar bar;
+  for (const char* material : {"linear", "neo_hookean"})
+    for (const Dilatation dilatation : {Dilatation::pointwise, Dilatation::averaged}) {
+      StaticsOptions options;
+      options.dilatation = dilatation;
+      options.region = bar.halves();
+      options.region_stiffness = Eigen::Vector2d(1, 4);
+      const Statics statics(bar.mesh, material, bar.boundary, options);
+      const auto at = statics.solve(1e4, 0.0, VectorX::Constant(1, 0.01), VectorX(0));  // strain 1e-4: nu = 0, no necking
+      ASSERT_TRUE(at.converged) << at.reason;
+      double stretch = 0;
+      for (const Index n : bar.end) stretch += at.displacement_m(3 * n) / double(bar.end.size());
+      EXPECT_NEAR(stretch / (0.01 / (1e4 * 0.01) * (0.15 + 0.15 / 4)), 1, 3e-4) << material;
+    }
+}
+
+TEST(RegionStiffness, OneFactorEverywhereIsAnotherYoungModulus) {
+  const Bar bar;
+  for (const char* material : {"linear", "neo_hookean"})
+    for (const Dilatation dilatation : {Dilatation::pointwise, Dilatation::averaged}) {
+      StaticsOptions options;
+      options.dilatation = dilatation;
+      const Statics plain(bar.mesh, material, bar.boundary, options);
+      options.region = bar.halves();
+      Statics stiff(bar.mesh, material, bar.boundary, options);
+      const VectorX force = VectorX::Constant(1, 8.0);
+      stiff.solve(1e4, 0.3, force, VectorX(0));  // what it remembers must not survive the change
+      stiff.set_region_stiffness(Eigen::Vector2d(2.5, 2.5));
+      const auto a = stiff.solve(1e4, 0.3, force, VectorX(0)), b = plain.solve(2.5e4, 0.3, force, VectorX(0));
+      ASSERT_TRUE(a.converged && b.converged);
+      EXPECT_LT((a.displacement_m - b.displacement_m).norm(), 1e-7 * b.displacement_m.norm()) << material;
+      const Sensitivity one = stiff.sensitivity(a);
+      EXPECT_LT((one.d_log_stiffness.rowwise().sum() - one.d_log_young).norm(), 1e-7 * one.d_log_young.norm()) << material;
+    }
+}
+
+TEST(RegionStiffness, WhatDoesNotFitIsRefused) {
+  const Bar bar;
+  StaticsOptions options;
+  options.region = bar.halves();
+  Statics statics(bar.mesh, "linear", bar.boundary, options);
+  EXPECT_THROW(statics.set_region_stiffness(Eigen::Vector2d(1, 0)), Error);
+  EXPECT_THROW(statics.set_region_stiffness(Eigen::Vector3d(1, 1, 1)), Error);
+  options.region.pop_back();
+  EXPECT_THROW(Statics(bar.mesh, "linear", bar.boundary, options), Error);
+}
+
+// Boxes before points, and every element somewhere.
+TEST(RegionsOf, ElementsBelongWhereTheirCentresAre) {
+  const Bar bar;
+  Region low{"low", RegionSelection::box}, rest{"rest", RegionSelection::rest};
+  low.box_min_m = Vec3(-1, -1, -1);
+  low.box_max_m = Vec3(0.1, 1, 1);
+  const auto both = regions_of(bar.mesh, {rest, low});
+  for (Index e = 0; e < bar.mesh.tetrahedra.rows(); ++e) EXPECT_EQ(both[e], element_centre(bar.mesh, e).x() <= 0.1 ? 1 : 0);
+  Region left{"left", RegionSelection::points}, right{"right", RegionSelection::points};
+  left.points_m = Vec3(0.0, 0, 0).transpose();
+  right.points_m = Vec3(0.3, 0, 0).transpose();
+  const auto three = regions_of(bar.mesh, {left, right, low});
+  for (Index e = 0; e < bar.mesh.tetrahedra.rows(); ++e) {
+    const Vec3 at = element_centre(bar.mesh, e);
+    EXPECT_EQ(three[e], at.x() <= 0.1 ? 2 : at.x() < 0.15 ? 0 : 1);
+  }
+  Region listed{"listed", RegionSelection::elements};
+  for (Index e = 0; e < bar.mesh.tetrahedra.rows(); ++e)
+    if (element_centre(bar.mesh, e).x() < 0.2) listed.elements.push_back(e);
+  const TetMesh corners{bar.mesh.nodes_m, bar.mesh.tetrahedra.leftCols(4)};
+  const TetMesh finer = refine_uniform(corners);
+  const auto children = regions_of(finer, {listed, rest}, &bar.mesh);
+  int off = 0;
+  for (Index e = 0; e < finer.tetrahedra.rows(); ++e) off += children[e] != (element_centre(finer, e).x() < 0.2 ? 0 : 1);
+  EXPECT_LT(off, 0.05 * double(finer.tetrahedra.rows()));
+  EXPECT_THROW(regions_of(bar.mesh, {low, listed}), Error);             // no mesh to count in
+  EXPECT_THROW(regions_of(bar.mesh, {low, listed}, &bar.mesh), Error);  // nobody takes the end
+  low.box_max_m = Vec3(-0.5, 1, 1);
+  EXPECT_THROW(regions_of(bar.mesh, {rest, low}), Error);  // nothing in it
+}
+
+}  // namespace
+}  // namespace palpate::fem
