@@ -87,15 +87,23 @@ TEST(RegionStiffness, WhatDoesNotFitIsRefused) {
   EXPECT_THROW(Statics(bar.mesh, "linear", bar.boundary, options), Error);
 }
 
+Region part(const std::string& name, RegionSelection select) {
+  Region region;
+  region.name = name;
+  region.select = select;
+  return region;
+}
+
 // Boxes before points, and every element somewhere.
 TEST(RegionsOf, ElementsBelongWhereTheirCentresAre) {
   const Bar bar;
-  Region low{"low", RegionSelection::box}, rest{"rest", RegionSelection::rest};
+  Region low = part("low", RegionSelection::box);
+  const Region rest = part("rest", RegionSelection::rest);
   low.box_min_m = Vec3(-1, -1, -1);
   low.box_max_m = Vec3(0.1, 1, 1);
   const auto both = regions_of(bar.mesh, {rest, low});
   for (Index e = 0; e < bar.mesh.tetrahedra.rows(); ++e) EXPECT_EQ(both[e], element_centre(bar.mesh, e).x() <= 0.1 ? 1 : 0);
-  Region left{"left", RegionSelection::points}, right{"right", RegionSelection::points};
+  Region left = part("left", RegionSelection::points), right = part("right", RegionSelection::points);
   left.points_m = Vec3(0.0, 0, 0).transpose();
   right.points_m = Vec3(0.3, 0, 0).transpose();
   const auto three = regions_of(bar.mesh, {left, right, low});
@@ -103,7 +111,7 @@ TEST(RegionsOf, ElementsBelongWhereTheirCentresAre) {
     const Vec3 at = element_centre(bar.mesh, e);
     EXPECT_EQ(three[e], at.x() <= 0.1 ? 2 : at.x() < 0.15 ? 0 : 1);
   }
-  Region listed{"listed", RegionSelection::elements};
+  Region listed = part("listed", RegionSelection::elements);
   for (Index e = 0; e < bar.mesh.tetrahedra.rows(); ++e)
     if (element_centre(bar.mesh, e).x() < 0.2) listed.elements.push_back(e);
   const TetMesh corners{bar.mesh.nodes_m, bar.mesh.tetrahedra.leftCols(4)};
