@@ -16,6 +16,7 @@
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/reconstruction/build_object.hpp"
+#include "palpate/reconstruction/stand_on.hpp"
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/observe.hpp"
@@ -173,7 +174,13 @@ void fill_with_tetrahedra(Recording& recording, const OnProgress& progress) {
   }
   reconstruction::BuildOptions options;
   options.mesh.tetrahedra = default_tetrahedra;
-  if (recording.model.refine == "auto") options.mesh.finer = finer_under_tools(recording);
+  if (recording.model.refine == "auto") {
+    options.mesh.finer = finer_under_tools(recording);
+    for (const Support& support : recording.supports) {
+      if (!recording.rest.surface || (support.kind != SupportKind::plane && support.kind != SupportKind::table)) continue;
+      for (const auto& near : reconstruction::finer_at_feet(support.plane, *recording.rest.surface)) options.mesh.finer.push_back(near);
+    }
+  }
   auto built = recording.rest.surface
                    ? reconstruction::build_object(*recording.rest.surface, recording.supports, options, progress)
                    : build_from_views(recording, options, progress);

@@ -108,7 +108,7 @@ class PushRun {
       const auto contact = sensing::find_contact(samples, plan_.direction, free_air_std_n_, options_.contact);
       if (!contact) continue;
       report_.contact_m = samples[*contact].tip_m;
-      noticed_n_ = along(samples[*contact].force_n);
+      begins_late_ = true;
       history_.assign(samples.begin() + std::ptrdiff_t(*contact), samples.end());
       return;
     }
@@ -189,20 +189,32 @@ class PushRun {
     const double sigma = std::sqrt(std::max(variance.mean(), free_air_std_n_ * free_air_std_n_ * 0.01) / count);
     history_.insert(history_.end(), samples.begin(), samples.end());
     if (!unloading) watch_out();
-    begin_where_the_force_began(last, along(mean));
+    begin_where_the_force_began();
     record(last, mean, sigma, unloading);
   }
 
-  // Contact is noticed late, by what the threshold needs: the line through the force then and at the first settled step says
-  // where it began. Travel counts from there.
-  void begin_where_the_force_began(const RobotState& state, double settled_n) {
-    if (!(noticed_n_ > 0)) return;
-    const double slope = (settled_n - noticed_n_) / travel(state);
-    if (travel(state) > options_.increment_m && slope > 0) {
-      const double late_m = noticed_n_ / slope;
-      if (late_m < travel(state)) report_.contact_m -= late_m * plan_.direction;
+  // Contact is noticed late, by what the threshold needs: the line through all samples since then, depth on force, says where
+  // it began (the force is what the object really felt; the depth has the arm's errors). Travel counts from there.
+  void begin_where_the_force_began() {
+    if (!begins_late_) return;
+    begins_late_ = false;
+    double count = 0, force = 0, depth = 0;
+    const auto depth_of = [&](const sensing::ContactSample& s) { return plan_.direction.dot(s.tip_m - report_.contact_m); };
+    for (const auto& s : history_) {
+      ++count;
+      force += along(s.force_n);
+      depth += depth_of(s);
     }
-    noticed_n_ = 0;
+    force /= count;
+    depth /= count;
+    double squares = 0, products = 0;
+    for (const auto& s : history_) {
+      squares += std::pow(along(s.force_n) - force, 2);
+      products += (along(s.force_n) - force) * (depth_of(s) - depth);
+    }
+    if (!(squares > 0) || !(products > 0)) return;
+    const double late_m = force * products / squares - depth;
+    if (late_m > 0) report_.contact_m -= std::min(late_m, options_.search_distance_m) * plan_.direction;
   }
 
   void record(const RobotState& state, const std::optional<Vec3>& force_n, double sigma_n, bool unloading) {
@@ -268,7 +280,7 @@ class PushRun {
   PushReport report_;
   std::vector<sensing::ContactSample> history_;  // since contact
   double free_air_std_n_ = 0;
-  double noticed_n_ = 0;  // force at which contact was noticed, until the contact point is corrected for it
+  bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
   double at_m_ = 0;  // commanded, along the push from the expected contact
   int next_index_ = 0;
   double recorded_force_n_ = 0, recorded_travel_m_ = 0;

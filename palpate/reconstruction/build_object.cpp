@@ -2,14 +2,12 @@
 #include "palpate/reconstruction/build_object.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
-#include <set>
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/reconstruction/stand_on.hpp"
 #include "palpate/registration/views.hpp"
 
 namespace palpate::reconstruction {
@@ -25,48 +23,6 @@ double mean_edge(const TriMesh& m) {
 
 bool is_plane(SupportKind kind) {
   return kind == SupportKind::plane || kind == SupportKind::table || kind == SupportKind::wall;
-}
-
-double signed_volume(const TetMesh& mesh, Index t) {
-  const auto node = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(t, k))); };
-  return (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6;
-}
-
-/// Lays the boundary faces that run along a plane, within 0.15 of their longest edge, flat on it, so that a support holds whole
-/// faces whatever the size of the elements; but never an element below a fifth of its volume.
-void lay_on(const Plane& plane, TetMesh& volume) {
-  constexpr double reach = 0.15, least_volume = 0.2;
-  const TriMesh boundary = geometry::boundary_surface(volume).surface;  // in the volume's numbering or its own: matched by place
-  std::map<std::array<double, 3>, Index> node_at;
-  for (Index i = 0; i < volume.nodes_m.rows(); ++i) {
-    node_at[{volume.nodes_m(i, 0), volume.nodes_m(i, 1), volume.nodes_m(i, 2)}] = i;
-  }
-  std::set<Index> laid;
-  for (Index t = 0; t < boundary.triangles.rows(); ++t) {
-    const auto corner = [&](int k) { return Vec3(boundary.vertices_m.row(boundary.triangles(t, k))); };
-    const double edge =
-        std::max({(corner(1) - corner(0)).norm(), (corner(2) - corner(1)).norm(), (corner(0) - corner(2)).norm()});
-    bool along = std::abs((corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized().dot(plane.normal)) > 0.7;
-    for (int k = 0; k < 3; ++k) along = along && std::abs(plane.normal.dot(corner(k) - plane.point_m)) < reach * edge;
-    for (int k = 0; along && k < 3; ++k) laid.insert(node_at.at({corner(k).x(), corner(k).y(), corner(k).z()}));
-  }
-  const Points before = volume.nodes_m;
-  for (Index i : laid) {
-    const Vec3 node = before.row(i);
-    volume.nodes_m.row(i) -= plane.normal.dot(node - plane.point_m) * plane.normal.transpose();
-  }
-  for (bool again = true; again;) {
-    again = false;
-    const TetMesh old{before, volume.tetrahedra};
-    for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
-      if (signed_volume(volume, t) >= least_volume * signed_volume(old, t)) continue;
-      for (int k = 0; k < 4; ++k) {
-        const Index i = volume.tetrahedra(t, k);
-        again = again || volume.nodes_m.row(i) != before.row(i);
-        volume.nodes_m.row(i) = before.row(i);
-      }
-    }
-  }
 }
 
 bool found_by_place(SupportKind kind) {
@@ -141,7 +97,7 @@ BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& sup
   out.model.surface = surface;
   out.model.volume = std::move(filled.mesh);
   for (const Support& s : supports)
-    if (is_plane(s.kind)) lay_on(s.plane, out.model.volume);
+    if (is_plane(s.kind)) stand_on(s.plane, surface, out.model.volume);
   out.model.embedding = geometry::embed(surface.vertices_m, out.model.volume);
   out.model.supports = supports;
   out.model.unseen_share = filled.unseen_share;

@@ -107,7 +107,7 @@ PushEvent watch(std::span<const ContactSample> push, const Vec3& direction, doub
       depth_there = along.dot(s.tip_m - push.front().tip_m);
     }
   }
-  const bool deeper = along.dot(way) > depth_there - 1e-6;
+  const bool deeper = along.dot(way) > depth_there + options.deeper_m - 1e-9;
   if (highest > options.least_force_n && deeper && normal < (1 - options.force_drop) * highest) return PushEvent::force_drop;
   return PushEvent::none;
 }

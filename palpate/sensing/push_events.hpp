@@ -51,7 +51,8 @@ Settling settling(std::span<const ContactSample> samples, const Vec3& direction,
 struct SlipOptions {
   double tangential_m = 0.002;  ///< sideways motion of the tip beyond the line of the push
   double friction_limit = 0.8;  ///< tangential over normal force: beyond it the tool cannot stick
-  double force_drop = 0.2;      ///< share of the force lost while the tool moved on
+  double force_drop = 0.2;      ///< share of the force lost while the tool moved on ...
+  double deeper_m = 0.001;      ///< ... by this much: an arm that repeats to a millimetre moves a force up and down as well
   double least_force_n = 0.5;   ///< below it, ratios say nothing
 };
 void check(const SlipOptions& options);

@@ -8,6 +8,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
+#include "palpate/reconstruction/stand_on.hpp"
 
 namespace palpate::reconstruction {
 namespace {
@@ -33,6 +34,50 @@ TEST(BuildObject, a_surface_rides_on_its_volume_and_the_support_plane_finds_node
   // the bottom has 0.003 m2: about one node per squared edge
   EXPECT_GT(held, 15);
   EXPECT_EQ(built.model.unseen_share, 0);
+}
+
+/// Area of the volume's boundary faces that lie in a plane, m2.
+double area_on(const Plane& plane, const TetMesh& volume) {
+  const TriMesh boundary = geometry::boundary_surface(volume).surface;
+  double area = 0;
+  for (Index t = 0; t < boundary.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(boundary.vertices_m.row(boundary.triangles(t, k))); };
+    bool on = true;
+    for (int k = 0; k < 3; ++k) on = on && std::abs(plane.normal.dot(corner(k) - plane.point_m)) < 1e-9;
+    if (on) area += 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+  }
+  return area;
+}
+
+// A bar that is fine at its far end only: the mesher has cut the edges of its foot off, and the foot is what carries it.
+TEST(StandOn, a_slender_object_stands_on_its_whole_foot) {
+  const TriMesh bar = shapes::box(Vec3(0.06, 0.06, 0.18));
+  Support table;
+  table.kind = SupportKind::table;
+  table.plane = {Vec3::Zero(), Vec3::UnitZ()};
+  BuildOptions o;
+  o.mesh.tetrahedra = 3000;
+  o.mesh.finer.push_back({Vec3(0.03, 0.03, 0.18), 0.02, 0.005});
+  const auto coarse = build_object(bar, {table}, o);
+  for (const auto& near : finer_at_feet(table.plane, bar)) o.mesh.finer.push_back(near);
+  const auto built = build_object(bar, {table}, o);
+  EXPECT_EQ(built.check.inverted, 0);
+  const double foot_m2 = 0.06 * 0.06;
+  EXPECT_GT(area_on(table.plane, built.model.volume), 0.97 * foot_m2);
+  EXPECT_LT(area_on(table.plane, built.model.volume), 1.0001 * foot_m2);
+  EXPECT_GT(area_on(table.plane, coarse.model.volume), 0.7 * foot_m2);
+  EXPECT_LT(std::abs(built.check.volume_m3 / (foot_m2 * 0.18) - 1), 0.02);
+}
+
+TEST(StandOn, feet_are_told_apart) {
+  const TriMesh two = shapes::join(shapes::box(Vec3(0.02, 0.02, 0.05)), shapes::box(Vec3(0.05, 0.05, 0.05), Vec3(0.1, 0, 0)));
+  const auto finer = finer_at_feet({Vec3::Zero(), Vec3::UnitZ()}, two);
+  ASSERT_GE(finer.size(), 8u);
+  for (const auto& near : finer) {
+    EXPECT_EQ(near.point_m.z(), 0);
+    EXPECT_NEAR(near.edge_m, near.point_m.x() < 0.05 ? 0.004 : 0.01, 1e-9);
+  }
+  EXPECT_TRUE(finer_at_feet({Vec3(0, 0, -1), Vec3::UnitZ()}, two).empty());
 }
 
 TEST(BuildObject, a_given_volume_stays_as_it_is_and_a_broken_one_is_refused) {

@@ -83,6 +83,7 @@ TEST(Watch, NamesWhatHappens) {
   EXPECT_EQ(with(sample(11, 11, 0.011, {}, {0.001, 0, 0})), PushEvent::none);
   EXPECT_EQ(with(sample(11, 11, 0.011, {9.5, 0, 0})), PushEvent::slip_friction);
   EXPECT_EQ(with(sample(11, 7, 0.011)), PushEvent::force_drop);
+  EXPECT_EQ(with(sample(11, 7, 0.0105)), PushEvent::none) << "an arm that repeats to a millimetre";
   EXPECT_EQ(with(sample(11, 7, 0.006)), PushEvent::none) << "going back, the force may fall";
   EXPECT_EQ(with(sample(11, 0.05, 0.011)), PushEvent::contact_lost);
   EXPECT_EQ(watch({}, down, 0.1), PushEvent::none);

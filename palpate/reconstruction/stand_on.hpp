@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "palpate/core/mesh.hpp"
+#include "palpate/geometry/tetrahedralise.hpp"
+
+namespace palpate::reconstruction {
+
+/// Makes a filled object stand on a plane as its surface does, whatever the size of the elements: boundary faces that run along
+/// the plane, within 0.15 of their longest edge, are laid flat on it, and nodes around them go out to the outline of the
+/// surface's own faces in the plane, its corners first. Edges that the mesher cut off would else leave a foot that is too small:
+/// a bar then seems to be on a soft base. No element loses more than four fifths of its volume.
+void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume);
+
+/// Where a volume must be fine enough to stand on a plane: over each foot of the surface in it, edges of a fifth of the foot's
+/// size (the root of its area). A slender object else hangs on two or three elements.
+std::vector<geometry::FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface);
+
+}  // namespace palpate::reconstruction
