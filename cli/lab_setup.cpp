@@ -63,12 +63,12 @@ lab::LabOptions lab_options(const LabArguments& arguments, std::uint64_t seed) {
 nlohmann::json truth_json(const lab::LabRobot& robot) {
   const lab::LabObject& object = robot.object();
   nlohmann::json json = {{"object", object.name},
-          {"young_modulus_pa", object.young_modulus_pa},
-          {"poisson_ratio", object.poisson_ratio},
-          {"material", object.material},
-          {"extra", object.extra},
-          {"force_scale", robot.true_force_scale()},
-          {"steps", nlohmann::json::array()}};
+                         {"young_modulus_pa", object.young_modulus_pa},
+                         {"poisson_ratio", object.poisson_ratio},
+                         {"material", object.material},
+                         {"extra", object.extra},
+                         {"force_scale", robot.true_force_scale()},
+                         {"steps", nlohmann::json::array()}};
   for (const lab::TrueRegion& region : object.regions)
     json["regions"].push_back({{"name", region.region.name}, {"young_modulus_pa", region.young_modulus_pa}});
   return json;
