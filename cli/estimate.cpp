@@ -27,7 +27,7 @@ namespace {
 
 struct Options {
   std::filesystem::path recording, mapping, out;
-  std::string method = "palpate", material, element, refine;
+  std::string method = "palpate", material, element, refine, regions = "recorded";
   std::vector<double> poisson_range;
   double poisson_ratio = -2, young_start_pa = 0;
   int max_iterations = 60;
@@ -58,6 +58,7 @@ class StageClock {
 IdentifyOptions identify_options(const Options& given, const Session& session) {
   IdentifyOptions options;
   options.method = given.method;
+  options.regions = given.regions;
   if (!given.material.empty()) options.material = given.material;
   if (!given.element.empty()) options.element = given.element;
   if (!given.refine.empty()) options.refine = given.refine;
@@ -131,7 +132,7 @@ int estimate(Session& session, const Options& given) {
   }
   answer.timing_s = clock.finish();
   io::write_result(answer, given.out);
-  io::write_model(answer, found.volume, given.out / "model");
+  io::write_model(answer, found.volume, given.out / "model", found.region);
   { const io::RecordingWriter object(given.out / "model", found.object); }
   report::write_report(answer, &recording, given.out / "report.html");
   if (!answer.parameters.empty()) tell(session, given, answer);
@@ -156,6 +157,9 @@ Run verbs::estimate(CLI::App& app) {
       ->check(CLI::IsMember({"tet4", "tet10", "auto"}));
   app.add_option("--refine", given->refine, "none or auto: finer under the tool (overrides the recording's)")
       ->check(CLI::IsMember({"none", "auto"}));
+  app.add_option("--regions", given->regions,
+                 "parts with an E of their own: recorded (what the recording says), by-site (one around each site that was pushed) or none")
+      ->check(CLI::IsMember({"recorded", "by-site", "none"}));
   app.add_option("--poisson-range", given->poisson_range, "range of the uniform prior on nu, e.g. 0.3 0.4995")->expected(2);
   app.add_option("--poisson-ratio", given->poisson_ratio, "take nu as known");
   app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)");

@@ -12,6 +12,7 @@
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
@@ -133,6 +134,34 @@ std::vector<geometry::FinerNear> finer_under_tools(const Recording& recording) {
   return finer;
 }
 
+/// A region around every site that was pushed: its contacts, by the push's site, or by its name where no site is said.
+std::vector<Region> regions_by_site(const Recording& recording) {
+  std::vector<Region> regions;
+  for (const Push& push : recording.pushes) {
+    const std::string name = push.site.empty() ? push.name : push.site;
+    auto region = std::find_if(regions.begin(), regions.end(), [&](const Region& each) { return each.name == name; });
+    if (region == regions.end()) {
+      regions.emplace_back();
+      region = regions.end() - 1;
+      region->name = name;
+      region->select = RegionSelection::points;
+    }
+    for (const Step& step : push.steps) {
+      for (const Load& load : step.loads) {
+        if (!load.force_n || load.force_n->norm() == 0) continue;
+        const Points& known = region->points_m;
+        if (known.rows() > 0 && (known.rowwise() - load.contact_m.transpose()).rowwise().norm().minCoeff() < 1e-6) continue;
+        region->points_m.conservativeResize(region->points_m.rows() + 1, 3);
+        region->points_m.bottomRows<1>() = load.contact_m.transpose();
+      }
+    }
+    if (region->points_m.rows() == 0)
+      throw Error("no force acts at a place in push '" + push.name + "', so no region lies around it; give the regions in the recording",
+                  "regions by-site");
+  }
+  return regions;
+}
+
 /// Table that hides a side of the object from every view: where it rests, else the first plane of the environment.
 std::optional<Plane> hiding_plane(const Recording& recording) {
   for (const auto& support : recording.supports) {
@@ -230,11 +259,15 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
     model.poisson_fixed.reset();
   }
   if (options.poisson_fixed) model.poisson_fixed = options.poisson_fixed;
+  if (options.regions == "none") recording.regions.clear();
+  if (options.regions == "by-site") recording.regions = regions_by_site(recording);
   const auto demand = [](bool fine, const std::string& where, const std::string& cure) {
     if (!fine) throw Error(cure, where);
   };
   demand(model.element == "tet4" || model.element == "tet10" || model.element == "auto", "model.element " + model.element,
          "the elements are tet4, tet10 and auto");
+  demand(options.regions == "recorded" || options.regions == "by-site" || options.regions == "none", "regions " + options.regions,
+         "regions are those of the recording (recorded), one around each pushed site (by-site), or none");
   demand(model.refine == "none" || model.refine == "auto", "model.refine " + model.refine, "refinement is none or auto");
   demand(model.poisson_lower >= 0 && model.poisson_upper <= 0.4995 && model.poisson_lower < model.poisson_upper,
          "poisson_range", "the range must lie within 0 and 0.4995, the lower end first");
@@ -291,6 +324,10 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
     object.mesh = given.tetrahedra.cols() == 10 ? given : fem::to_quadratic(given);
   }
   recording.model.element = quadratic ? "tet10" : "tet4";
+  if (recording.regions.size() > 1) {
+    object.region = fem::regions_of(object.mesh, recording.regions, &given);
+    for (const Region& region : recording.regions) object.region_names.push_back(region.name);
+  }
   if (recording.rest.surface) {
     // Sensors see the given surface, not the mesh that fills it; its facets must follow the dent as well as elements do.
     double edge_m = 0.5 * typical_edge_m(object.mesh);
@@ -308,6 +345,7 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
 
 Identified identify(const Recording& given, const IdentifyOptions& options, const OnProgress& progress) {
   Recording recording = with_overrides(given, options);
+  if (options.method == "paper") recording.regions.clear();  // the paper fits one stiffness
   std::vector<Points> masked_m;
   const estimation::Inputs observed = observe(recording, &masked_m);               // sec. IV-B: point clouds, robot masked
   const estimation::SimulatedObject object = build_simulated_object(recording, progress);  // sec. IV-C: tetrahedral model
@@ -323,6 +361,7 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   out.answer.method = options.method;
   out.answer.provenance.merge(provenance(recording, options));
   out.volume = object.mesh;
+  out.region = object.region;
   out.object = std::move(recording);
   out.object.rest = {};
   out.object.rest.state = given.rest.state;

@@ -17,6 +17,7 @@ struct IdentifyOptions {
   std::string method = "palpate";  ///< or "paper": the paper's own algorithm, as a baseline
   // What is set here overrides the recording's `model`.
   std::optional<std::string> material, element, refine;
+  std::string regions = "recorded";  ///< or "by-site": one around each site that was pushed; or "none"
   std::optional<std::pair<double, double>> poisson_range;
   std::optional<double> poisson_fixed;
   estimation::FitOptions fit;
@@ -25,6 +26,7 @@ struct IdentifyOptions {
 struct Identified {
   Identification answer;
   TetMesh volume;  ///< the simulated mesh at rest, for a simulation-ready model
+  std::vector<int> region;  ///< an element of it: which of the answer's Young's moduli; empty: one
   Recording object;  ///< rest.volume = that mesh, with supports, tools, gravity and law as they were simulated; no pushes
 };
 

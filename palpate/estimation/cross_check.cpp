@@ -43,6 +43,9 @@ class CrossCheck {
       out.cancelled = true;
       return out;
     }
+    // A part of the data does not reach every region: its E is then the factor on all of them.
+    const bool regions = objective_.unknowns().ratio_count() > 0;
+    objective_.hold_ratios(true);
     std::vector<std::vector<char>> pushes;
     for (std::size_t s = 0; s < model_.step_count(); ++s) {
       const std::size_t p = model_.index(s).push;
@@ -55,7 +58,8 @@ class CrossCheck {
     if (!cancelled_) compare_sites(pushes, out);
     compare_levels(out);
     compare_ways(out);
-    if (!cancelled_) hold_out(pushes, out);
+    objective_.hold_ratios(false);
+    if (!cancelled_) hold_out(pushes, regions, out);
     if (!cancelled_) objective_.evaluate(optimum_.unknowns, loss_);
     out.cancelled = cancelled_;
     return out;
@@ -224,9 +228,21 @@ class CrossCheck {
     return other;
   }
 
-  void hold_out(const std::vector<std::vector<char>>& pushes, CrossChecks& out) {
+  void hold_out(const std::vector<std::vector<char>>& pushes, bool regions, CrossChecks& out) {
     std::vector<std::vector<char>> left_out;
-    if (pushes.size() > 1) {
+    if (regions) {  // what no other push reaches cannot be predicted from them
+      for (std::size_t p = 0; p < std::min(pushes.size(), most_held_out); ++p) {
+        std::size_t highest = model_.step_count();
+        for (std::size_t s = 0; s < model_.step_count(); ++s) {
+          if (pushes[p][s] == 0 || joint_rows_[s].empty()) continue;
+          if (highest == model_.step_count() || magnitude(model_.step(s)) > magnitude(model_.step(highest))) highest = s;
+        }
+        if (highest == model_.step_count()) continue;
+        left_out.emplace_back(model_.step_count(), 0);
+        left_out.back()[highest] = 1;
+      }
+      out.held_out.what = "the highest load of each push in turn";
+    } else if (pushes.size() > 1) {
       left_out.assign(pushes.begin(), pushes.begin() + static_cast<std::ptrdiff_t>(std::min(pushes.size(), most_held_out)));
       out.held_out.what = pushes.size() <= most_held_out ? "each push in turn"
                                                          : "each of the first " + std::to_string(most_held_out) + " pushes in turn";
@@ -268,8 +284,10 @@ class CrossCheck {
       // Statics depend on F / E: the force that would bend the object as seen is the measured one times E of the others over E
       // of this part alone.
       if (force_driven) {
-        const bool known = !out.pushes.empty();
+        const bool known = !out.pushes.empty() && !regions;
+        if (regions) objective_.hold_ratios(true);
         const PartialYoung alone = known ? out.pushes[static_cast<std::size_t>(&held - left_out.data())] : young_of(held, "");
+        if (regions) objective_.hold_ratios(false);
         if (cancelled_) return;
         if (alone.usable) {
           force_error2 += std::pow(std::exp(others.unknowns(log_young) - alone.log_young) - 1, 2);

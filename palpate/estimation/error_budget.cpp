@@ -38,7 +38,7 @@ std::vector<BudgetEntry> error_budget(const Unknowns& unknowns, const MatrixX& h
   std::map<std::string, std::vector<bool>> groups;
   std::vector<bool> all(moving.size(), false);
   for (std::size_t k = 0; k < moving.size(); ++k) {
-    if (moving[k] <= poisson) continue;
+    if (moving[k] < unknowns.parameter_count()) continue;
     auto& members = groups[group_of(unknowns[moving[k]].name)];
     members.resize(moving.size(), false);
     members[k] = true;

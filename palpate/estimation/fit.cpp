@@ -20,12 +20,17 @@ namespace {
 
 constexpr double z_95 = 1.959963984540054;
 
-std::vector<Parameter> parameters_from(const Posterior& posterior, const Unknown& nu) {
-  Parameter young{"young_modulus", "", "Pa"};
+Parameter young_from(const Posterior& posterior, const std::string& region) {
+  Parameter young{"young_modulus", region, "Pa"};
   young.value = std::exp(posterior.log_young_quantile(0.5));
   young.std = young.value * posterior.log_young_std_total();
   young.lower_95 = std::exp(posterior.log_young_quantile(0.025));
   young.upper_95 = std::exp(posterior.log_young_quantile(0.975));
+  young.determined = posterior.log_young_std_total() < 0.5;
+  return young;
+}
+
+Parameter ratio_from(const Posterior& posterior, const Unknown& nu) {
   Parameter ratio{"poisson_ratio", "", "1"};
   ratio.value = posterior.poisson_quantile(0.5);
   ratio.std = posterior.poisson_std();
@@ -33,15 +38,35 @@ std::vector<Parameter> parameters_from(const Posterior& posterior, const Unknown
   ratio.upper_95 = posterior.poisson_quantile(0.975);
   // A uniform prior has the standard deviation range / sqrt(12); data that leave 60 % of it say little.
   ratio.determined = nu.fixed || ratio.std < 0.6 * (nu.upper - nu.lower) / std::sqrt(12.0);
-  young.determined = posterior.log_young_std_total() < 0.5;
-  return {young, ratio};
+  return ratio;
+}
+
+/// (log E of the first region, nu, log E of the others), in the order of the parameters.
+MatrixX covariance_of(const std::vector<Posterior>& regions) {
+  const Index count = static_cast<Index>(regions.size());
+  MatrixX out = MatrixX::Zero(1 + count, 1 + count);
+  const auto place = [](Index region) { return region == 0 ? 0 : region + 1; };
+  const Posterior& first = regions.front();
+  const auto about_mean = [&](const VectorX& values) { return VectorX(values.array() - first.weight.dot(values)); };
+  out(1, 1) = first.covariance(1, 1);
+  for (Index a = 0; a < count; ++a) {
+    const Posterior& one = regions[static_cast<std::size_t>(a)];
+    out(place(a), 1) = out(1, place(a)) = one.covariance(0, 1);
+    for (Index b = 0; b < count; ++b) {
+      const Posterior& other = regions[static_cast<std::size_t>(b)];
+      const VectorX given_poisson = first.correlation(a, b) * one.log_young_std.cwiseProduct(other.log_young_std);
+      out(place(a), place(b)) =
+          first.weight.dot(about_mean(one.log_young_mean).cwiseProduct(about_mean(other.log_young_mean)) + given_poisson);
+    }
+  }
+  return out;
 }
 
 std::vector<Nuisance> nuisances_from(const Unknowns& list, const Optimum& optimum, const MatrixX& covariance,
                                      const std::vector<int>& moving) {
   std::vector<Nuisance> out;
   for (std::size_t k = 0; k < moving.size(); ++k) {
-    if (moving[k] <= poisson || list[moving[k]].name.rfind("rest_surface[", 0) == 0) continue;
+    if (moving[k] < list.parameter_count() || list[moving[k]].name.rfind("rest_surface[", 0) == 0) continue;
     const Unknown& unknown = list[moving[k]];
     Nuisance nuisance;
     nuisance.name = unknown.name;
@@ -238,21 +263,26 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   if (finer != nullptr && optimum.termination == Termination::converged) {
     mesh = mesh_shift(recording, objective, optimum, loss, *finer, options, progress);
   }
-  Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
+  const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;
     answer.message = "stopped by the caller";
     return answer;
   }
+  std::vector<Posterior> regions{posterior};
+  for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));
   if (mesh) {
-    widen(posterior, *mesh, unknowns[poisson].lower, unknowns[poisson].upper);
+    for (std::size_t r = 0; r < regions.size(); ++r)
+      widen(regions[r], mesh->of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
     answer.budget.push_back({"mesh", 100 * std::abs(mesh->log_young), std::abs(mesh->poisson)});
     std::stable_sort(answer.budget.begin(), answer.budget.end(),
                      [](const auto& a, const auto& b) { return a.young_modulus_percent > b.young_modulus_percent; });
   }
-  answer.parameters = parameters_from(posterior, unknowns[poisson]);
-  answer.covariance = posterior.covariance;
-  answer.posterior = posterior_grid(posterior);
+  const auto region_name = [&](std::size_t r) { return object.region_names.empty() ? std::string() : object.region_names[r]; };
+  answer.parameters = {young_from(regions.front(), region_name(0)), ratio_from(regions.front(), unknowns[poisson])};
+  for (std::size_t r = 1; r < regions.size(); ++r) answer.parameters.push_back(young_from(regions[r], region_name(r)));
+  answer.covariance = covariance_of(regions);
+  answer.posterior = posterior_grid(regions.front());
   if (options.on_estimate) options.on_estimate(answer);
   const auto stopped = [&] {
     answer.termination = Termination::cancelled;
@@ -266,8 +296,10 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     checks = cross_check(objective, optimum, loss, factor, progress);
     if (checks.cancelled) return stopped();
     answer.prediction = checks.held_out;
-    answer.per_push = young_of_parts(checks.pushes);
-    answer.per_site = young_of_parts(checks.sites);
+    if (regions.size() == 1) {  // of one region each, else
+      answer.per_push = young_of_parts(checks.pushes);
+      answer.per_site = young_of_parts(checks.sites);
+    }
   }
   answer.fit.solves = model.solves();
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks});

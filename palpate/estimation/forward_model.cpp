@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
@@ -25,6 +26,11 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   unknowns.add({"young_modulus", "log Pa", 0, std::numeric_limits<double>::infinity(), std::log(1e-2), std::log(1.2e12)});
   unknowns.add({"poisson_ratio", "1", 0, std::numeric_limits<double>::infinity(), recording.model.poisson_lower,
                 recording.model.poisson_upper});
+  if (object_.region_names.size() > 1) {
+    unknowns.add_ratios({object_.region_names.begin() + 1, object_.region_names.end()});
+    options_.region = object_.region;
+  }
+  parameters_ = unknowns.parameter_count();
   force_scale_ = unknowns.add_block("force_scale", "1", recording.force_scale_std, {""});
   const bool weight_acts = recording.rest.state == RestState::stress_free && recording.environment.gravity_m_s2.norm() > 0;
   if (weight_acts) {
@@ -102,7 +108,8 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   memory_.resize(steps_.size());
   followed_.assign(steps_.size(), 0);
   workers_ = std::clamp<std::size_t>(static_cast<std::size_t>(std::max(options_.threads, 1)), 1, steps_.size());
-  linear_ = fem::material_law(object_.material).is_linear();
+  // Unit responses are for one set of ratios; with regions a linear body is solved for at every step.
+  linear_ = fem::material_law(object_.material).is_linear() && parameters_ == first_ratio;
   poisson_lower_ = unknowns[poisson].lower;
   poisson_upper_ =
       recording.model.poisson_fixed ? poisson_lower_ : unknowns[poisson].upper;  // one ratio needs no polynomial
@@ -111,6 +118,12 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   bodies_.resize(linear_ ? 1 : workers_);
   solves_.assign(workers_, 0);
   for (std::size_t s = 0; s < steps_.size(); ++s) body_of(push(s), worker_of(s));
+}
+
+std::vector<int> ForwardModel::parameter_columns() const {
+  std::vector<int> columns(static_cast<std::size_t>(parameters_));
+  std::iota(columns.begin(), columns.end(), 0);
+  return columns;
 }
 
 std::size_t ForwardModel::worker_of(std::size_t s) const {
@@ -197,8 +210,16 @@ bool ForwardModel::follow(std::size_t s, const VectorX& unknowns, Watched& watch
   return true;
 }
 
+void ForwardModel::set_ratios(Body& body, const VectorX& unknowns) const {
+  if (parameters_ == first_ratio) return;
+  VectorX stiffness = VectorX::Ones(1 + parameters_ - first_ratio);
+  stiffness.tail(stiffness.size() - 1) = unknowns.segment(first_ratio, parameters_ - first_ratio).array().exp();
+  body.statics->set_region_stiffness(stiffness);
+}
+
 int ForwardModel::inverted_elements(std::size_t s, const VectorX& unknowns) {
   Body& body = body_of(push(s), worker_of(s));
+  set_ratios(body, unknowns);
   const Coefficients c = coefficients(s, body, unknowns);
   const auto at = body.statics->solve(std::exp(unknowns(log_young)), unknowns(poisson), c.force, c.motion);
   return at.inverted_elements;
@@ -222,6 +243,7 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
     start = memory_[s - 1].displacement_m;
   }
 
+  set_ratios(body, unknowns);
   const double young_pa = std::exp(unknowns(log_young));
   const auto solve = [&](const VectorX* guess) {
     auto at = body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion, guess);
@@ -242,15 +264,17 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
   }
   const fem::SensitivityAlong d = body.statics->sensitivity_along(at, c.d_force, c.d_motion);
   const Index others = static_cast<Index>(c.columns.size());
-  MatrixX field(at.displacement_m.size(), 2 + others);
-  field << d.d_log_young, d.d_poisson, d.d_along;
+  const Index ratios = parameters_ - first_ratio;  // of the further regions: the first one's stiffness is E itself
+  MatrixX field(at.displacement_m.size(), parameters_ + others);
+  field << d.d_log_young, d.d_poisson, d.d_log_stiffness.rightCols(ratios), d.d_along;
   watched.d_moved = object_.surface.restrict(field);
   watched.conjugate_m = body.forces.transpose() * at.displacement_m;
   watched.d_conjugate = body.forces.transpose() * field;
   watched.reaction_n = at.motion_reaction;
-  watched.d_reaction.resize(c.motion.size(), 2 + others);
-  watched.d_reaction << d.reaction_d_log_young, d.reaction_d_poisson, d.reaction_d_along;
-  memory = {true, unknowns, at.displacement_m, {log_young, poisson}, std::move(field), watched, at.inverted_elements};
+  watched.d_reaction.resize(c.motion.size(), parameters_ + others);
+  watched.d_reaction << d.reaction_d_log_young, d.reaction_d_poisson, d.reaction_d_log_stiffness.rightCols(ratios),
+      d.reaction_d_along;
+  memory = {true, unknowns, at.displacement_m, parameter_columns(), std::move(field), watched, at.inverted_elements};
   memory.columns.insert(memory.columns.end(), c.columns.begin(), c.columns.end());
   return true;
 }
@@ -298,7 +322,7 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
   place_surface(s, unknowns, at.moved_m, out);
   if (!derivatives) return out;
 
-  out.columns = {log_young, poisson};
+  out.columns = parameter_columns();
   out.columns.insert(out.columns.end(), c.columns.begin(), c.columns.end());
   const Index count = static_cast<Index>(out.columns.size());
 
@@ -312,7 +336,7 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
     const auto add_rigid = [&](const Points& at_m, MatrixX& derivative) {
       for (Index v = 0; v < at_m.rows(); ++v) {
         const auto rigid = clamp.derivative(clamp.apply_inverse(at_m.row(v)));
-        for (Index k = 2; k < count; ++k) {
+        for (Index k = parameters_; k < count; ++k) {
           const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s];
           if (component >= 0 && component < 6) derivative.block<3, 1>(3 * v, k) += rigid.col(component);
         }
@@ -344,11 +368,11 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
       const Eigen::RowVectorXd d_reaction = at.d_reaction.row(m);
       out.force_n[at_load] = scale * reaction * direction;
       out.d_force[at_load] = scale * direction * d_reaction;
-      for (Index k = 2; k < count; ++k) {
+      for (Index k = parameters_; k < count; ++k) {
         if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += reaction * direction;
       }
       out.travel_m(l) = c.motion(m);
-      for (Index k = 2; k < count; ++k) out.d_travel(l, k) = c.d_motion(m, k - 2);
+      for (Index k = parameters_; k < count; ++k) out.d_travel(l, k) = c.d_motion(m, k - parameters_);
     } else {
       out.force_n[at_load] = load.force_n.value_or(Vec3::Zero());
       const LoadParts parts = load_parts(s, at_load, body, unknowns);
@@ -368,7 +392,7 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
       if (clamp_[s] < 0) continue;
       // A turned clamp turns the object under the tool's direction.
       const Mat3 turn = clamp.inverse_rotation_derivative(load.direction.normalized());
-      for (Index k = 2; k < count; ++k) {
+      for (Index k = parameters_; k < count; ++k) {
         const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s] - 3;
         if (component >= 0 && component < 3) out.d_travel(l, k) += mean_motion_m.dot(turn.col(component));
       }

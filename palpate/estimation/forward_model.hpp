@@ -50,6 +50,8 @@ struct SimulatedObject {
   TetMesh mesh;
   SimulatedSurface surface;
   std::string material = "neo_hookean";
+  std::vector<int> region;                ///< an element: which of `region_names`; empty: one
+  std::vector<std::string> region_names;  ///< empty: one
 };
 
 class ForwardModel {
@@ -109,6 +111,8 @@ class ForwardModel {
   Watched superpose(const Body& body, const Coefficients& c, const VectorX& unknowns, StepPrediction& out) const;
 
   std::size_t worker_of(std::size_t s) const;
+  void set_ratios(Body& body, const VectorX& unknowns) const;
+  std::vector<int> parameter_columns() const;
   void place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const;
   Body& body_of(const Push& push, std::size_t worker);
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
@@ -135,6 +139,7 @@ class ForwardModel {
   std::vector<int> tare_, travel_offset_;      // a push: first of three, the one; or -1
   std::vector<Vec3> tare_axis_;                // a push: zero = three unknowns, else one along this axis
   int force_scale_ = -1, density_ = -1;
+  int parameters_ = first_ratio;  ///< log E, nu and the regions' ratios: the first columns of every derivative
   std::optional<SurfaceField> field_;
   int field_unknown_ = -1;
   std::vector<int> solves_;  // a worker

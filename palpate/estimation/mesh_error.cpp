@@ -9,6 +9,7 @@
 
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/discretisation.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/geometry/embedding.hpp"
 
 namespace palpate::estimation {
@@ -98,6 +99,10 @@ std::optional<FinerModel> finer_model(const Recording& recording, const Simulate
   }
   finer.object.mesh = fem::to_quadratic(volume);
   finer.object.material = object.material;
+  if (!object.region.empty()) {
+    finer.object.region = fem::regions_of(finer.object.mesh, recording.regions, &*recording.rest.volume);
+    finer.object.region_names = object.region_names;
+  }
   const TriMesh& surface = object.surface.rest();  // the same vertices on both meshes
   finer.object.surface =
       SimulatedSurface::embedded(finer.object.mesh, surface, geometry::embed(surface.vertices_m, finer.object.mesh));
@@ -148,10 +153,15 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
   if (!change.allFinite()) return std::nullopt;
   const double whole = 1 / (1 - std::pow(2.0, -order));
   AnswerShift shift;
+  shift.region_log_young = VectorX::Zero(objective.unknowns().ratio_count());
   for (std::size_t k = 0; k < moving.size(); ++k) {
-    if (moving[k] == log_young) shift.log_young = whole * change(static_cast<Index>(k));
-    if (moving[k] == poisson) shift.poisson = whole * change(static_cast<Index>(k));
+    const double moved = whole * change(static_cast<Index>(k));
+    if (moving[k] == log_young) shift.log_young = moved;
+    if (moving[k] == poisson) shift.poisson = moved;
+    if (moving[k] >= first_ratio && moving[k] < objective.unknowns().parameter_count())
+      shift.region_log_young(moving[k] - first_ratio) = moved;
   }
+  shift.region_log_young.array() += shift.log_young;
   return shift;
 }
 

@@ -25,6 +25,8 @@ std::optional<FinerModel> finer_model(const Recording& recording, const Simulate
 /// Change of an answer.
 struct AnswerShift {
   double log_young = 0, poisson = 0;
+  VectorX region_log_young;  ///< of further regions
+  AnswerShift of_region(Index region) const { return {region == 0 ? log_young : region_log_young(region - 1), poisson, {}}; }
 };
 
 /// What the change of the simulated surfaces and travels between the two meshes, at the highest loads, does to the optimum: one

@@ -74,6 +74,10 @@ class Objective {
   const Unknowns& unknowns() const { return unknowns_; }
   /// Keeps nu where it is in the fits that follow (conditional optima of the quadrature).
   void hold_poisson(bool held) { unknowns_[poisson].fixed = held; }
+  /// The same for the ratios between regions (fits of a part of the data, which may not reach every region).
+  void hold_ratios(bool held) {
+    for (int k = first_ratio; k < unknowns_.parameter_count(); ++k) unknowns_[k].fixed = held;
+  }
   ForwardModel& model() { return model_; }
   const ForwardModel& model() const { return model_; }
   /// Median over robust terms of |residual| in standard deviations, of the last evaluation (closest points).

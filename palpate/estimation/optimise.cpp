@@ -78,8 +78,9 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
       }
       VectorX next = best.unknowns;
       for (std::size_t k = 0; k < moving.size(); ++k) next(moving[k]) += move(static_cast<Index>(k));
-      // A step of log E beyond a factor of five leaves every linearisation behind.
-      const double jump = std::abs(next(log_young) - best.unknowns(log_young));
+      // A step of log E, in any region, beyond a factor of five leaves every linearisation behind.
+      double jump = std::abs(next(log_young) - best.unknowns(log_young));
+      for (int k = first_ratio; k < unknowns.parameter_count(); ++k) jump = std::max(jump, std::abs(next(k) - best.unknowns(k)));
       if (jump > 1.6) next = best.unknowns + (1.6 / jump) * (next - best.unknowns);
       for (int k : moving) {
         const Unknown& unknown = unknowns[k];
@@ -107,7 +108,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
       const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
       double largest = 0;
       for (std::size_t k = 0; k < moving.size(); ++k) {
-        if (moving[k] > poisson) continue;
+        if (moving[k] >= unknowns.parameter_count()) continue;
         const double std_dev = std::sqrt(std::max(covariance(static_cast<Index>(k), static_cast<Index>(k)), 1e-24));
         largest = std::max(largest, std::abs(next(moving[k]) - best.unknowns(moving[k])) / std::max(std_dev, 1e-9));
       }

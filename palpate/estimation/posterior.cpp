@@ -14,7 +14,9 @@ double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
 /// Mean, standard deviation of log E and log determinant, all given nu, from the Hessian.
 struct Conditional {
-  double log_young = 0, std_dev = 0, log_determinant = 0, cost = 0, slope = 0;
+  double log_determinant = 0, cost = 0;
+  VectorX log_young, std_dev, slope;  // a region; slope: d log E / d nu along the ridge
+  MatrixX correlation;
 };
 
 /// Order: every free unknown but nu.
@@ -26,14 +28,24 @@ Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& un
   const MatrixX information = evaluation.information(factor);
   const VectorX cross = information.col(poisson)(others);
   const Eigen::LDLT<MatrixX> factorised(information(others, others));
-  VectorX unit = VectorX::Zero(static_cast<Index>(others.size()));
-  unit(0) = 1;  // log E comes first
+  // log E of the first region comes first, then the log ratios of the others: a region's log E is the sum of two.
+  const Index regions = 1 + list.ratio_count();
+  MatrixX sum = MatrixX::Zero(static_cast<Index>(others.size()), regions);
   Conditional out;
-  out.log_young = unknowns(log_young);
-  out.std_dev = std::sqrt(std::max(factorised.solve(unit)(0), 1e-30));
+  out.log_young = VectorX::Constant(regions, unknowns(log_young));
+  sum.row(0).setOnes();
+  for (Index r = 1; r < regions; ++r) {
+    const int ratio = first_ratio + static_cast<int>(r) - 1;
+    out.log_young(r) += unknowns(ratio);
+    const auto at = std::find(others.begin(), others.end(), ratio);
+    if (at != others.end()) sum(static_cast<Index>(at - others.begin()), r) = 1;
+  }
+  const MatrixX covariance = sum.transpose() * factorised.solve(sum);
+  out.std_dev = covariance.diagonal().cwiseMax(1e-30).cwiseSqrt();
+  out.correlation = out.std_dev.cwiseInverse().asDiagonal() * covariance * out.std_dev.cwiseInverse().asDiagonal();
   out.log_determinant = factorised.vectorD().array().abs().max(1e-300).log().sum();
   out.cost = evaluation.information_cost(factor);
-  out.slope = -factorised.solve(cross)(0);  // d log E / d nu along the ridge
+  out.slope = -sum.transpose() * factorised.solve(cross);
   return out;
 }
 
@@ -60,6 +72,14 @@ VectorX spline(const VectorX& x, const VectorX& y, const VectorX& at) {
   return out;
 }
 
+/// Moments given nu: a grid node a row, a region a column.
+void fill(Posterior& posterior, const MatrixX& mean, const MatrixX& std_dev) {
+  posterior.log_young_mean = mean.col(0);
+  posterior.log_young_std = std_dev.col(0);
+  posterior.region_mean = mean.rightCols(mean.cols() - 1);
+  posterior.region_std = std_dev.rightCols(std_dev.cols() - 1);
+}
+
 void finish(Posterior& posterior, const VectorX& log_density) {
   posterior.weight = (log_density.array() - log_density.maxCoeff()).exp();
   posterior.weight /= posterior.weight.sum();
@@ -78,6 +98,15 @@ void update_covariance(Posterior& posterior) {
   posterior.covariance(0, 1) = posterior.covariance(1, 0) = posterior.weight.dot(off_e.cwiseProduct(off_nu));
 }
 
+
+Posterior Posterior::of_region(Index region) const {
+  if (region == 0) return *this;
+  Posterior out = *this;
+  out.log_young_mean = region_mean.col(region - 1);
+  out.log_young_std = region_std.col(region - 1);
+  update_covariance(out);
+  return out;
+}
 
 double Posterior::poisson_quantile(double probability) const {
   if (poisson.size() == 1) return poisson(0);
@@ -115,10 +144,10 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   const double nu = optimum.unknowns(poisson);
   const double lower = list[poisson].lower, upper = list[poisson].upper;
   Posterior posterior;
+  posterior.correlation = at.correlation;
   if (list[poisson].fixed) {
     posterior.poisson = VectorX::Constant(1, nu);
-    posterior.log_young_mean = VectorX::Constant(1, at.log_young);
-    posterior.log_young_std = VectorX::Constant(1, at.std_dev);
+    fill(posterior, at.log_young.transpose(), at.std_dev.transpose());
     finish(posterior, VectorX::Zero(1));
     return posterior;
   }
@@ -134,8 +163,7 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   if (inside && std_nu < 0.03) {
     posterior.poisson = VectorX::LinSpaced(grid_size, nu - 5 * std_nu, nu + 5 * std_nu);
     const VectorX off = posterior.poisson.array() - nu;
-    posterior.log_young_mean = (at.log_young + at.slope * off.array()).matrix();
-    posterior.log_young_std = VectorX::Constant(grid_size, at.std_dev);
+    fill(posterior, (off * at.slope.transpose()).rowwise() + at.log_young.transpose(), at.std_dev.transpose().replicate(grid_size, 1));
     finish(posterior, -0.5 * (off / std_nu).cwiseAbs2());
     return posterior;
   }
@@ -144,7 +172,8 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   posterior.quadrature = true;
   const double from = std::max(lower, nu - 6 * std_nu), to = std::min(upper, nu + 6 * std_nu);
   constexpr int nodes = 9;
-  VectorX node(nodes), density(nodes), mean(nodes), std_dev(nodes);
+  VectorX node(nodes), density(nodes);
+  MatrixX mean(nodes, at.log_young.size()), std_dev(nodes, at.log_young.size());  // a region a column
   for (int i = 0; i < nodes; ++i) node(i) = 0.5 * (from + to) - 0.5 * (to - from) * std::cos(EIGEN_PI * i / (nodes - 1));
   Index nearest = 0;
   (node.array() - nu).abs().minCoeff(&nearest);
@@ -166,14 +195,14 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
     if (posterior.cancelled) return start;
     if (!conditional.evaluation.usable) {
       density(i) = -1e6;
-      mean(i) = start(log_young);
-      std_dev(i) = at.std_dev;
+      mean.row(i) = at.log_young.transpose();
+      std_dev.row(i) = at.std_dev.transpose();
       return start;
     }
     const Conditional c = condition_on_poisson(conditional.evaluation, conditional.unknowns, list, information_factor);
     density(i) = -c.cost - 0.5 * c.log_determinant;
-    mean(i) = c.log_young;
-    std_dev(i) = c.std_dev;
+    mean.row(i) = c.log_young.transpose();
+    std_dev.row(i) = c.std_dev.transpose();
     return conditional.unknowns;
   };
   VectorX here = visit(nearest, optimum.unknowns);
@@ -186,8 +215,12 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   posterior.poisson = VectorX::LinSpaced(grid_size, from, to);
   density.array() -= density.maxCoeff();
   density = density.cwiseMax(-200);
-  posterior.log_young_mean = spline(node, mean, posterior.poisson);
-  posterior.log_young_std = spline(node, std_dev, posterior.poisson).cwiseMax(1e-3 * std_dev.minCoeff());
+  MatrixX fine_mean(grid_size, mean.cols()), fine_std(grid_size, mean.cols());
+  for (Index r = 0; r < mean.cols(); ++r) {
+    fine_mean.col(r) = spline(node, mean.col(r), posterior.poisson);
+    fine_std.col(r) = spline(node, std_dev.col(r), posterior.poisson).cwiseMax(1e-3 * std_dev.col(r).minCoeff());
+  }
+  fill(posterior, fine_mean, fine_std);
   finish(posterior, spline(node, density, posterior.poisson));
   return posterior;
 }

@@ -12,10 +12,15 @@ struct Posterior {
   VectorX weight;             ///< of each grid node, sums to one
   VectorX log_young_mean;     ///< given nu
   VectorX log_young_std;
+  MatrixX region_mean;        ///< grid x further regions: their log E given nu, and its standard deviation
+  MatrixX region_std;
+  MatrixX correlation;        ///< of log E of all regions given nu, at the optimum (1 x 1 where there is one)
   MatrixX covariance;         ///< 2 x 2 of (log E, nu)
   bool cancelled = false;     ///< the caller asked to stop: nothing else is filled
   bool quadrature = false;    ///< conditional optima were solved at several nu (else Laplace, cut at the bounds)
 
+  /// The same distribution of nu with log E of a region (0: the first, which is this one).
+  Posterior of_region(Index region) const;
   double poisson_quantile(double probability) const;
   double log_young_quantile(double probability) const;
   double poisson_std() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The vector that the fit moves: log E, nu, then every nuisance with its prior. One entry a scalar.
+// The vector that the fit moves: log E, nu, log ratios of regions, then every nuisance with its prior. One entry a scalar.
 #pragma once
 
 #include <limits>
@@ -20,9 +20,11 @@ struct Unknown {
   bool fixed = false;
 };
 
-/// Indices of the two parameters that everything is about.
+/// Indices of the parameters that everything is about. With regions log E is that of the first one, and those from
+/// `first_ratio` on are log (E of a further region / E of the first).
 inline constexpr int log_young = 0;
 inline constexpr int poisson = 1;
+inline constexpr int first_ratio = 2;
 
 class Unknowns {
  public:
@@ -37,6 +39,16 @@ class Unknowns {
     for (const auto& suffix : suffixes) add({name + suffix, unit, 0, prior_std});
     return first;
   }
+  /// The ratios of `count` further regions; right after log E and nu. Their prior is wide, and keeps a region that no push
+  /// reaches from drifting off.
+  void add_ratios(const std::vector<std::string>& regions) {
+    constexpr double prior_std = 2.3;  // a factor of ten
+    for (const auto& region : regions) add({"log_young_ratio[" + region + "]", "1", 0, prior_std});
+    ratios_ = static_cast<int>(regions.size());
+  }
+  int ratio_count() const { return ratios_; }
+  /// log E, nu and the ratios: what is asked for; everything from here on is a nuisance.
+  int parameter_count() const { return first_ratio + ratios_; }
   int size() const { return static_cast<int>(entries_.size()); }
   const Unknown& operator[](int i) const { return entries_[static_cast<std::size_t>(i)]; }
   Unknown& operator[](int i) { return entries_[static_cast<std::size_t>(i)]; }
@@ -48,6 +60,7 @@ class Unknowns {
 
  private:
   std::vector<Unknown> entries_;
+  int ratios_ = 0;
 };
 
 }  // namespace palpate::estimation

@@ -22,7 +22,9 @@ void judge_young(const VerdictInput& in, std::vector<Verdict>& out) {
   for (const auto& parameter : in.answer.parameters) {
     if (parameter.name != "young_modulus" || parameter.determined) continue;
     out.push_back({"e_not_determined",
-                   "These data hardly determine Young's modulus: its interval spans a factor of " +
+                   "These data hardly determine Young's modulus" +
+                       (parameter.region.empty() ? "" : " of region '" + parameter.region + "' (does a push reach it?)") +
+                       ": its interval spans a factor of " +
                        number(parameter.upper_95 / parameter.lower_95, "{:.2g}") +
                        ". A motion without its force, or a force without a visible deformation, cannot: press harder, and "
                        "record both."});
@@ -122,7 +124,12 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
   for (const auto& parameter : in.answer.parameters) {
     if (parameter.name == "poisson_ratio") poisson_std = parameter.std;
   }
-  if (homogeneity_p_value(in.checks.pushes, poisson_std) < rare) {
+  const bool regions = in.objective.unknowns().ratio_count() > 0;
+  if (regions && homogeneity_p_value(in.checks.pushes, poisson_std) < rare) {
+    out.push_back({"not_homogeneous",
+                   "The pushes disagree even with a stiffness for each region: a region is not the same everywhere, its border "
+                   "lies elsewhere, or a contact point or support is wrong."});
+  } else if (homogeneity_p_value(in.checks.pushes, poisson_std) < rare) {
     const PartialYoung *softest = nullptr, *stiffest = nullptr;
     for (const auto& part : in.checks.pushes) {
       if (!part.usable) continue;

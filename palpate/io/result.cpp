@@ -92,13 +92,22 @@ Identification read_result(const fs::path& given) {
   return answer;
 }
 
-void write_model(const Identification& answer, const TetMesh& volume, const fs::path& folder) {
+void write_model(const Identification& answer, const TetMesh& volume, const fs::path& folder, const std::vector<int>& region) {
   make_folder(folder);
   const double young = value_of(answer, "young_modulus"), poisson = value_of(answer, "poisson_ratio");
   MeshData mesh;
   mesh.points_m = volume.nodes_m;
   mesh.tetrahedra = volume.tetrahedra;
   if (std::isfinite(young)) mesh.cell_fields["young_modulus_pa"] = MatrixX::Constant(volume.tetrahedra.rows(), 1, young);
+  if (!region.empty()) {
+    std::vector<double> by_region;
+    for (const Parameter& one : answer.parameters)
+      if (one.name == "young_modulus") by_region.push_back(one.value);
+    MatrixX& values = mesh.cell_fields["young_modulus_pa"];
+    values.resize(volume.tetrahedra.rows(), 1);
+    for (Eigen::Index e = 0; e < values.rows(); ++e)
+      values(e) = by_region.at(static_cast<std::size_t>(region.at(static_cast<std::size_t>(e))));
+  }
   if (std::isfinite(poisson)) mesh.cell_fields["poisson_ratio"] = MatrixX::Constant(volume.tetrahedra.rows(), 1, poisson);
   write_mesh(folder / "object.vtu", mesh);
   write_mesh(folder / "object.msh", mesh);

@@ -22,6 +22,8 @@ Identification read_result(const std::filesystem::path& folder);
 
 /// A simulation-ready model: FOLDER/object.vtu and object.msh (mesh; E and nu as cell data), surface.obj, and material.json
 /// (law, small-strain E and nu with intervals, Lame parameters, bulk modulus, density if the answer knows it).
-void write_model(const Identification& answer, const TetMesh& volume, const std::filesystem::path& folder);
+/// @param region  an element: which of the answer's Young's moduli, in their order; empty: the object has one
+void write_model(const Identification& answer, const TetMesh& volume, const std::filesystem::path& folder,
+                 const std::vector<int>& region = {});
 
 }  // namespace palpate::io

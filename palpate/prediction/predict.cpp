@@ -55,6 +55,13 @@ Elasticity elasticity_of(const Identification& answer) {
       extra.push_back(parameter.value);
     }
   }
+  const bool by_region = std::any_of(answer.parameters.begin(), answer.parameters.end(), [](const Parameter& parameter) {
+    return parameter.name == "young_modulus" && !parameter.region.empty();
+  });
+  if (young < 0 && by_region)
+    throw Error("E was estimated by region, and only objects of one stiffness are taken on so far: estimate with --regions none, or "
+                "take the moduli and elements from model/object.vtu",
+                "result: parameters");
   if (young < 0 || poisson < 0)
     throw Error("holds no Young's modulus and Poisson ratio of the whole object", "result: parameters");
   elasticity.extra = Eigen::Map<const VectorX>(extra.data(), Index(extra.size()));

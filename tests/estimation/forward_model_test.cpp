@@ -14,14 +14,17 @@
 namespace palpate::estimation {
 namespace {
 
-class Derivatives : public testing::TestWithParam<std::tuple<const char*, std::size_t, bool>> {};
+class Derivatives : public testing::TestWithParam<std::tuple<const char*, std::size_t, bool, bool>> {};
 
 TEST_P(Derivatives, AreThoseOfSurfaceForceAndTravel) {
-  const auto& [material, step, weight] = GetParam();
+  const auto& [material, step, weight, regions] = GetParam();
   const TetMesh mesh = kuhn_block(3, 2, 2, block_size_m);
   const Recording recording = clamped_block(mesh, weight);
   Unknowns unknowns;
-  ForwardModel model(recording, simulated(mesh, material), unknowns, tight());
+  SimulatedObject object = simulated(mesh, material);
+  if (regions) put_three_regions(object);
+  ForwardModel model(recording, object, unknowns, tight());
+  ASSERT_EQ(unknowns.ratio_count(), regions ? 2 : 0);
   const VectorX at = away_from_rest(unknowns);
   const StepPrediction here = model.predict(step, at);
   ASSERT_TRUE(here.converged) << here.reason;
@@ -75,7 +78,7 @@ TEST_P(Derivatives, AreThoseOfSurfaceForceAndTravel) {
 
 INSTANTIATE_TEST_SUITE_P(Clamped, Derivatives,
                          testing::Combine(testing::Values("neo_hookean", "linear"), testing::Values(0, 1, 2, 3),
-                                          testing::Bool()));
+                                          testing::Bool(), testing::Bool()));
 
 /// A bar that lies on z = 0 without friction, under a platen without friction at its top.
 Recording bar_under_platen(const Vec3& size_m, double travel_m) {

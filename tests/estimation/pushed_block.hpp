@@ -19,7 +19,14 @@ struct PushedBlock {
   RigidOffset clamp;  ///< where the clamp really is
   unsigned seed = 7;
   std::string material = "neo_hookean";
+  double free_half = 1;  ///< stiffness of x > 30 mm over that of the rest
 };
+
+inline void put_two_halves(SimulatedObject& object) {
+  for (Index e = 0; e < object.mesh.tetrahedra.rows(); ++e)
+    object.region.push_back(fem::element_centre(object.mesh, e).x() > 0.03 ? 1 : 0);
+  object.region_names = {"clamped half", "free half"};
+}
 
 inline Recording pushed_block_recording() {
   Recording recording;
@@ -54,11 +61,13 @@ inline SimulatedObject coarse_block(const std::string& material = "neo_hookean")
   return simulated(fem::to_quadratic(kuhn_block(4, 3, 2, block_size_m)), material);
 }
 
-inline Inputs clouds_of(const PushedBlock& truth) {
-  const Recording recording = pushed_block_recording();
+inline Inputs clouds_of(const PushedBlock& truth, const Recording& recording = pushed_block_recording()) {
   Unknowns unknowns;
-  ForwardModel model(recording, simulated(fem::to_quadratic(kuhn_block(8, 6, 4, block_size_m)), truth.material), unknowns);
+  SimulatedObject object = simulated(fem::to_quadratic(kuhn_block(8, 6, 4, block_size_m)), truth.material);
+  if (truth.free_half != 1) put_two_halves(object);
+  ForwardModel model(recording, object, unknowns);
   VectorX at = unknowns.prior_mean();
+  if (truth.free_half != 1) at(first_ratio) = std::log(truth.free_half);
   at(log_young) = std::log(truth.young_pa);
   at(poisson) = truth.poisson;
   std::mt19937 random(truth.seed);

@@ -13,6 +13,7 @@
 #include "palpate/core/recording.hpp"
 #include "palpate/estimation/forward_model.hpp"
 #include "palpate/estimation/terms/term.hpp"
+#include "palpate/fem/regions.hpp"
 
 namespace palpate::estimation {
 
@@ -60,6 +61,16 @@ inline std::vector<Index> nodes_where(const TetMesh& mesh, const std::function<b
 
 inline SimulatedObject simulated(const TetMesh& mesh, const std::string& material) {
   return {mesh, SimulatedSurface::boundary_of(mesh, nullptr), material};
+}
+
+/// Thirds of the block along x, the middle one first.
+inline void put_three_regions(SimulatedObject& object) {
+  const double length_m = object.mesh.nodes_m.col(0).maxCoeff();
+  for (Index e = 0; e < object.mesh.tetrahedra.rows(); ++e) {
+    const double third = 3 * fem::element_centre(object.mesh, e).x() / length_m;
+    object.region.push_back(third < 1 ? 1 : third < 2 ? 0 : 2);
+  }
+  object.region_names = {"middle", "clamped", "free"};
 }
 
 inline Support sliding(const std::string& name, const Vec3& point_m, const Vec3& normal) {
