@@ -15,12 +15,22 @@ VectorX ForwardModel::von_mises_pa(std::size_t s, const VectorX& unknowns) {
   } else {
     Body& body = body_of(push(s), worker_of(s));
     const Coefficients c = coefficients(s, body, unknowns);
+    set_ratios(body, unknowns);
     const auto at = body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion,
                                         memory.valid ? &memory.displacement_m : nullptr);
     if (!at.converged) return {};
     displacement_m = at.displacement_m;
   }
-  const VectorX at_nodes = fem::von_mises(object_.mesh, object_.material, young_pa, unknowns(poisson), {}, displacement_m);
+  VectorX stiffness;
+  if (parameters_ > first_ratio) {
+    stiffness = VectorX::Ones(object_.mesh.tetrahedra.rows());
+    for (Index e = 0; e < stiffness.size(); ++e) {
+      const int region = object_.region[static_cast<std::size_t>(e)];
+      if (region > 0) stiffness(e) = std::exp(unknowns(first_ratio + region - 1));
+    }
+  }
+  const VectorX at_nodes =
+      fem::von_mises(object_.mesh, object_.material, young_pa, unknowns(poisson), {}, displacement_m, stiffness);
   // The surface hangs on the nodes by weights that serve any nodal field: stresses travel as first components.
   VectorX carried = VectorX::Zero(3 * at_nodes.size());
   for (Index n = 0; n < at_nodes.size(); ++n) carried(3 * n) = at_nodes(n);

@@ -39,7 +39,7 @@ double von_mises_of(const Mat3& cauchy) {
 }  // namespace
 
 VectorX von_mises(const TetMesh& mesh, const std::string& material, double young_modulus_pa, double poisson_ratio,
-                  const VectorX& extra, const VectorX& displacement_m) {
+                  const VectorX& extra, const VectorX& displacement_m, const VectorX& stiffness) {
   const MaterialLaw& law = material_law(material);
   const Moduli constants = moduli(young_modulus_pa, poisson_ratio, extra);
   const Index nodes = Index(mesh.tetrahedra.cols());
@@ -72,6 +72,7 @@ VectorX von_mises(const TetMesh& mesh, const std::string& material, double young
       stress += w * von_mises_of(cauchy);
       volume += w;
     }
+    if (stiffness.size() > 0) stress *= stiffness(t);  // every energy of the table is proportional to E
     for (Index k = 0; k < nodes; ++k) {
       sum(mesh.tetrahedra(t, k)) += stress;
       weight(mesh.tetrahedra(t, k)) += volume;
