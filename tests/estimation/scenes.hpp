@@ -60,7 +60,7 @@ inline std::vector<Index> nodes_where(const TetMesh& mesh, const std::function<b
 }
 
 inline SimulatedObject simulated(const TetMesh& mesh, const std::string& material) {
-  return {mesh, SimulatedSurface::boundary_of(mesh, nullptr), material};
+  return {mesh, SimulatedSurface::boundary_of(mesh, nullptr), material, {}, {}};
 }
 
 /// Thirds of the block along x, the middle one first.
