@@ -65,7 +65,7 @@ Posterior normal_posterior(double log_young, double nu, double var_e, double cov
 }
 
 TEST(Widening, AddsTheOuterProductOfTheShiftToANormalPosterior) {
-  for (const AnswerShift shift : {AnswerShift{0.02, 0.01}, AnswerShift{-0.03, 0.004}, AnswerShift{0.01, 0}, AnswerShift{0, 0.02}}) {
+  for (const AnswerShift& shift : {AnswerShift{0.02, 0.01, {}}, AnswerShift{-0.03, 0.004, {}}, AnswerShift{0.01, 0, {}}, AnswerShift{0, 0.02, {}}}) {
     Posterior p = normal_posterior(9.5, 0.25, 4e-4, -1.2e-4, 1e-4);
     const MatrixX before = p.covariance;
     widen(p, shift, 0, 0.4995);
