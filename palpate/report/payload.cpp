@@ -303,6 +303,7 @@ void add_geometry(json& page, const Identification& identification, const Payloa
 json payload(const Identification& identification, const Recording* recording, const PayloadOptions& options) {
   std::string title = options.title;
   if (title.empty() && recording != nullptr) title = file_name_of(recording->source);
+  if (title.empty() && recording != nullptr) title = recording->name;
   if (title.empty()) title = "palpate";
 
   json page;

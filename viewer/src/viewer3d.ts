@@ -43,7 +43,9 @@ export class Viewer {
 
   constructor(private report: Report, private readonly changed: (step: Step) => void) {
     this.steps = shownSteps(report);
-    this.step = this.steps[this.steps.length - 1];
+    // First what was pushed hardest: the last step may be one after the tool has left.
+    const force = (s: Step): number => Math.hypot(...s.force_n.map((f) => f ?? 0));
+    this.step = this.steps.reduce((a, b) => (force(b) >= force(a) ? b : a), this.steps[0]);
     this.fields = new Fields(report);
     if (this.empty()) {
       this.node.append(el("p", { class: "note" }, "This result carries no surfaces, so there is nothing to show in 3D."));
