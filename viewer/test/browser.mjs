@@ -11,9 +11,9 @@ const quiet = [
 ];
 const software = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
 
-/** Opens a page file (or a live view's address), hands it and what it complained about to `use`, and cleans up. */
+/** Opens a page file (or the address that `file()` gives once the browser runs), hands it and what it complained about to `use`, and cleans up. */
 export async function withPage(file, { webgl = true, ...context } = {}, use) {
-  const live = file.startsWith("http://127.0.0.1:");
+  const live = typeof file === "function";
   const profile = mkdtempSync(join(tmpdir(), "palpate-browser-"));
   const browser = await chromium.launchPersistentContext(profile, {
     executablePath: process.env.PALPATE_CHROMIUM ?? "/usr/bin/chromium",
@@ -26,13 +26,14 @@ export async function withPage(file, { webgl = true, ...context } = {}, use) {
   const complaints = [];
   try {
     const page = await browser.newPage();
+    const address = live ? await file() : `file://${file}`;
     page.on("console", (message) => ["error", "warning"].includes(message.type()) && complaints.push(message.text()));
     page.on("pageerror", (error) => complaints.push(String(error)));
     page.on("request", (request) => {
-      const own = live ? request.url().startsWith(file) : /^file:/.test(request.url());
+      const own = live ? request.url().startsWith(address) : /^file:/.test(request.url());
       if (!own && !/^(data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`);
     });
-    await page.goto(live ? file : `file://${file}`);
+    await page.goto(address);
     await page.waitForSelector("html[data-ready=true]", { timeout: 120000 });
     return await use(page, complaints);
   } finally {

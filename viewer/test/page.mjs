@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // usage: node page.mjs CHECK REPORT.html     exit code 0: holds
-//        node page.mjs live ADDRESS RESULT.json
+//        node page.mjs live RESULT.json COMMAND...     starts the command, and looks at the address that it prints
 import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { withPage } from "./browser.mjs";
@@ -136,8 +137,21 @@ const checks = {
 };
 
 /** The page of a running estimate: looked at from its first estimate to its end. */
-async function live(address, result) {
-  await withPage(address, {}, async (page, complaints) => {
+async function live(result, command) {
+  let ended;
+  // The browser takes seconds to start; the program begins when it is there.
+  const start = () => new Promise((found, fail) => {
+    const program = spawn(command[0], command.slice(1), { stdio: ["ignore", "inherit", "pipe"] });
+    let said = "";
+    program.stderr.on("data", (text) => {
+      process.stderr.write(text);
+      const address = /(http:\S+)\s/.exec((said += text));
+      if (address) found(address[1]);
+    });
+    ended = new Promise((done) => program.on("close", done));
+    ended.then((code) => fail(new Error(`the program ended with ${code} and named no address`)));
+  });
+  await withPage(start, {}, async (page, complaints) => {
     const lead = () => page.locator(".lead").textContent();
     assert.match(await lead(), /^So far: Young's modulus /);
     assert.ok(!existsSync(result), "the first estimate was shown after the end");
@@ -168,8 +182,9 @@ async function live(address, result) {
       assert.ok((await page.locator("figure h3", { hasText: name }).count()) > 0, `no figure ${name}`);
     }
     assert.deepEqual(real(complaints), []);
+    assert.equal(await ended, 0); // by itself, once the page has everything
   });
 }
 
-const [name, file, result] = process.argv.slice(2);
-await (name === "live" ? live(file, result) : checks[name](resolve(file)));
+const [name, file, ...command] = process.argv.slice(2);
+await (name === "live" ? live(resolve(file), command) : checks[name](resolve(file)));
