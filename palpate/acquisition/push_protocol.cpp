@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 
@@ -109,6 +111,7 @@ class PushRun {
       if (!contact) continue;
       report_.contact_m = samples[*contact].tip_m;
       begins_late_ = true;
+      approach_.assign(samples.begin(), samples.begin() + std::ptrdiff_t(*contact));
       history_.assign(samples.begin() + std::ptrdiff_t(*contact), samples.end());
       return;
     }
@@ -193,28 +196,31 @@ class PushRun {
     record(last, mean, sigma, unloading);
   }
 
-  // Contact is noticed late, by what the threshold needs: the line through all samples since then, depth on force, says where
-  // it began (the force is what the object really felt; the depth has the arm's errors). Travel counts from there.
+  // Contact is noticed late, by what the threshold needs. Where the force really began is where the best line through zero
+  // ends among all samples of the approach and of the rise: force k (depth - begin) beyond it, none before. Travel counts from
+  // there.
   void begin_where_the_force_began() {
     if (!begins_late_) return;
     begins_late_ = false;
-    double count = 0, force = 0, depth = 0;
+    approach_.insert(approach_.end(), history_.begin(), history_.end());
     const auto depth_of = [&](const sensing::ContactSample& s) { return plan_.direction.dot(s.tip_m - report_.contact_m); };
-    for (const auto& s : history_) {
-      ++count;
-      force += along(s.force_n);
-      depth += depth_of(s);
+    const double least_m = -0.2 * options_.increment_m, step_m = 0.1 * options_.increment_m;
+    double best_m = 0, least_squares = std::numeric_limits<double>::infinity();
+    for (double late_m = least_m; late_m < options_.search_distance_m; late_m += step_m) {
+      double products = 0, squares = 0, total = 0;
+      for (const auto& s : approach_) {
+        const double force = along(s.force_n), beyond = std::max(0.0, depth_of(s) + late_m);
+        products += force * beyond;
+        squares += beyond * beyond;
+        total += force * force;
+      }
+      const double left = squares > 0 ? total - products * products / squares : total;
+      if (left >= least_squares) continue;
+      least_squares = left;
+      best_m = late_m;
     }
-    force /= count;
-    depth /= count;
-    double squares = 0, products = 0;
-    for (const auto& s : history_) {
-      squares += std::pow(along(s.force_n) - force, 2);
-      products += (along(s.force_n) - force) * (depth_of(s) - depth);
-    }
-    if (!(squares > 0) || !(products > 0)) return;
-    const double late_m = force * products / squares - depth;
-    if (late_m > 0) report_.contact_m -= std::min(late_m, options_.search_distance_m) * plan_.direction;
+    report_.contact_m -= best_m * plan_.direction;
+    approach_.clear();
   }
 
   void record(const RobotState& state, const std::optional<Vec3>& force_n, double sigma_n, bool unloading) {
@@ -280,6 +286,7 @@ class PushRun {
   PushReport report_;
   std::vector<sensing::ContactSample> history_;  // since contact
   double free_air_std_n_ = 0;
+  std::vector<sensing::ContactSample> approach_;  // before contact was noticed
   bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
   double at_m_ = 0;  // commanded, along the push from the expected contact
   int next_index_ = 0;
