@@ -127,7 +127,7 @@ int run(const Options& given, Session& session) {
   answer.provenance["seed"] = std::to_string(session.seed);
   answer.provenance["recording path"] = fs::absolute(given.out / "recording").lexically_normal().string();
   io::write_result(answer, given.out);
-  io::write_model(answer, found.identified.volume, given.out / "model");
+  io::write_model(answer, found.identified.volume, given.out / "model", found.identified.region);
   { const io::RecordingWriter object(given.out / "model", found.identified.object); }
   report::write_report(answer, &found.recording, given.out / "report.html");
   session.say(report::answer(answer));
