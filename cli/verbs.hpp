@@ -32,6 +32,7 @@ using SetUp = Run(CLI::App& app);
   VERB(predict,    "use",     "deformation, force and stress of a new push, with bands",               "palpate predict result --contact 0.58 0 0.15 --force 5 -o pressed") \
   VERB(export_,    "use",     "the learned object for other simulators",                               "palpate export result --to calculix -o calculix --verify") \
   VERB(report,     "show",    "the figures of a result as SVG and PNG files, without a display",       "palpate report out --png figures") \
+  VERB(paper,      "show",    "the experiments of the founding paper, by its method and by ours",      "palpate paper -o paper --quick") \
   VERB(doctor,     "set up",  "check the installation and say what to do about what is missing",      "palpate doctor") \
   VERB(completion, "set up",  "print the completion script of a shell: bash, zsh or fish",            "palpate completion bash > ~/.local/share/bash-completion/completions/palpate")
 
