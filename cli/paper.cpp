@@ -82,7 +82,7 @@ int remake(Session& session, const PaperArguments& arguments) {
     for (int k = 0; k < seeds && !Session::interrupted(); ++k) {
       TrialOptions options;
       options.threads = session.thread_count();
-      options.samples = k == 0;
+      options.every_sample = k > 0 ? 0 : arguments.quick ? 2 : 1;
       options.surface_points = k > 0 ? 0 : arguments.quick ? 9 : 25;
       const TrialAnswer trial = run_trial(*scene, session.seed + static_cast<std::uint64_t>(k), options, session.progress());
       if (Session::interrupted()) break;

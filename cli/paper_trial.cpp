@@ -117,7 +117,7 @@ ErrorSurface error_surface(const Prepared& given, const MethodAnswer& found, dou
   return out;
 }
 
-void answer_samples(const Prepared& given, const estimation::FitOptions& options, TrialAnswer& out, const OnProgress& progress) {
+void answer_samples(const Prepared& given, int every, const estimation::FitOptions& options, TrialAnswer& out, const OnProgress& progress) {
   estimation::FitOptions alone = options;
   alone.cross_checks = alone.stresses = false;
   std::size_t count = 0, done = 0;
@@ -126,7 +126,7 @@ void answer_samples(const Prepared& given, const estimation::FitOptions& options
     const Push& push = given.recording.pushes[p];
     for (std::size_t s = 0; s < push.steps.size(); ++s) {
       if (progress && !progress("samples alone", static_cast<double>(done++) / static_cast<double>(count))) return;
-      if (!loaded(push.steps[s])) continue;
+      if (!loaded(push.steps[s]) || s % static_cast<std::size_t>(every) != 0) continue;
       const Load& load = push.steps[s].loads[0];
       SampleAnswer sample;
       sample.push = push.name;
@@ -156,6 +156,7 @@ void hold_out(const Prepared& given, const estimation::FitOptions& options, Tria
   estimation::PaperError distance(held.recording, held.object, held.inputs, options);
   const auto rms = [&](double young_pa, double nu) { return std::sqrt(distance(young_pa, nu)); };
   const MethodAnswer paper = by_paper(others, alone, progress), palpate = by_palpate(others, alone, progress);
+  if (!std::isfinite(paper.young_modulus_pa) || !std::isfinite(palpate.young_modulus_pa)) return;  // stopped
   out.held_out_paper_m = rms(paper.young_modulus_pa, paper.poisson_ratio);
   out.held_out_palpate_m = rms(palpate.young_modulus_pa, palpate.poisson_ratio);
   out.held_out_still_m = rms(1e12, 0.3);
@@ -184,8 +185,8 @@ TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const Tr
   out.paper_coarse = by_paper(prepare(std::move(coarse), progress), fit, progress);
 
   hold_out(given, fit, out, progress);
-  if (options.samples) answer_samples(given, fit, out, progress);
-  if (options.surface_points > 1)
+  if (options.every_sample > 0) answer_samples(given, options.every_sample, fit, out, progress);
+  if (options.surface_points > 1 && std::isfinite(out.paper.young_modulus_pa))
     out.surface = error_surface(given, out.paper, out.young_modulus_pa, options.surface_points, fit, progress);
   return out;
 }

@@ -48,7 +48,7 @@ struct TrialAnswer {
 };
 
 struct TrialOptions {
-  bool samples = false;
+  int every_sample = 0;    ///< alone: 1 = each, 2 = every second, ...; 0 = none
   int surface_points = 0;  ///< a side of the error surface; 0 = none
   int threads = 1;
 };

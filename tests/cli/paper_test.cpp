@@ -1,0 +1,48 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// `palpate paper`: both methods on one seed of a scene whose truth is known, the page and what it claims of the baseline.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+int palpate(const std::string& arguments) {
+  const int status = std::system((std::string(PALPATE_CLI) + " " + arguments).c_str());
+  return WEXITSTATUS(status);
+}
+
+TEST(Paper, BothMethodsAnswerAndTheBaselineReachesItsOwnMinimum) {
+  const fs::path out = fs::temp_directory_path() / "palpate_paper_test";
+  fs::remove_all(out);
+  ASSERT_EQ(palpate("--quiet --threads 2 paper --quick --scene balloon -o " + out.string()), 0);
+  nlohmann::json told;
+  std::ifstream(out / "paper.json") >> told;
+  const auto& trial = told.at("scenes").at(0).at("trials").at(0);
+  const double truth = trial.at("true_young_modulus_pa");
+  EXPECT_GT(trial.at("paper").at("young_modulus_pa").get<double>(), 0.2 * truth);
+  EXPECT_LT(trial.at("paper").at("young_modulus_pa").get<double>(), 5 * truth);
+  EXPECT_GT(trial.at("palpate").at("young_modulus_pa").get<double>(), 0.5 * truth);
+  EXPECT_LT(trial.at("palpate").at("young_modulus_pa").get<double>(), 2 * truth);
+  // An honest baseline: a grid finds no value of its error function that is clearly below where it ended.
+  const auto& grid = trial.at("grid_search");
+  EXPECT_LT(grid.at("at_found_m2").get<double>(), 1.01 * grid.at("smallest_m2").get<double>());
+  EXPECT_GE(trial.at("samples").size(), 3u);
+  std::stringstream page;
+  page << std::ifstream(out / "paper.html").rdbuf();
+  EXPECT_NE(page.str().find("<svg"), std::string::npos);
+  EXPECT_EQ(page.str().find("http"), page.str().find("http://www.w3.org/2000/svg"));  // nothing is fetched
+  fs::remove_all(out);
+}
+
+TEST(Paper, UnknownSceneIsNamedWithTheOnesThereAre) {
+  EXPECT_EQ(palpate("--quiet paper --quick --scene penguin -o /nonexistent/out 2>/dev/null"), 3);
+}
+
+}  // namespace
