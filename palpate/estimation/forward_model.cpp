@@ -200,11 +200,18 @@ bool ForwardModel::follow(std::size_t s, const VectorX& unknowns, Watched& watch
   const VectorX change = anchor.change_to(unknowns);
   watched = anchor.watched;
   watched.moved_m += watched.d_moved * change;
-  const double moved_m = (watched.moved_m - anchor.watched.moved_m).lpNorm<Eigen::Infinity>();
-  if (moved_m > reuse_ * anchor.watched.moved_m.lpNorm<Eigen::Infinity>()) return false;
-  if (moved_m > 0) followed_[s] = moved_m / anchor.watched.moved_m.lpNorm<Eigen::Infinity>();
+  watched.reaction_n += watched.d_reaction * change;  // imposed motions do not move with E, but their reactions do
+  double share = 0;
+  const auto within = [&](const VectorX& now, const VectorX& before) {
+    if (now.size() == 0) return true;
+    const double moved = (now - before).lpNorm<Eigen::Infinity>(), size = before.lpNorm<Eigen::Infinity>();
+    if (moved > reuse_ * size) return false;
+    if (moved > 0) share = std::max(share, moved / size);
+    return true;
+  };
+  if (!within(watched.moved_m, anchor.watched.moved_m) || !within(watched.reaction_n, anchor.watched.reaction_n)) return false;
+  followed_[s] = share;
   watched.conjugate_m += watched.d_conjugate * change;
-  watched.reaction_n += watched.d_reaction * change;
   out.converged = true;
   out.inverted_elements = anchor.inverted_elements;
   return true;

@@ -81,7 +81,7 @@ TEST(Widening, AddsTheOuterProductOfTheShiftToANormalPosterior) {
 
 TEST(Widening, KeepsTheBoundsOfNu) {
   Posterior p = normal_posterior(9.5, 0.45, 4e-4, -1.2e-4, 1e-4);
-  widen(p, {0.02, 0.03}, 0, 0.4995);
+  widen(p, {0.02, 0.03, {}}, 0, 0.4995);
   EXPECT_LE(p.poisson_quantile(0.999), 0.4995);
   EXPECT_LT(p.poisson_quantile(0.025), 0.42);
 }

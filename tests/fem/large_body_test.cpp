@@ -40,7 +40,9 @@ TEST(LargeBody, CorotationalCubeMeetsVega) {
 // state with inverted elements under the rim, and both are said.
 TEST(LargeBody, LosesStabilityAndSaysSo) {
   const Cube cube(13);
-  const Statics statics(cube.mesh, "corotational", cube.boundary, {.residual_tolerance = 1e-8});
+  StaticsOptions options;
+  options.residual_tolerance = 1e-8;
+  const Statics statics(cube.mesh, "corotational", cube.boundary, options);
   const Equilibrium e = statics.solve(kYoung, 0.3, Vec3(0, 0, -20), VectorX());
   ASSERT_TRUE(e.converged) << e.reason;
   EXPECT_GT(e.factorisations, e.newton_steps);
