@@ -82,10 +82,9 @@ void hand_on_uncertainty(BuiltObject& out, const FusedViews& fused) {
   }
 }
 
-}  // namespace
-
-BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options,
-                         const OnProgress& progress) {
+/// @param loose_facets  the surface is a heap of facets that share no vertices
+BuiltObject fill(const TriMesh& surface, bool loose_facets, const std::vector<Support>& supports, const BuildOptions& options,
+                 const OnProgress& progress) {
   for (const Support& s : supports)
     if (!s.vertices.empty())
       throw Error(
@@ -96,8 +95,11 @@ BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& sup
   BuiltObject out;
   out.model.surface = surface;
   out.model.volume = std::move(filled.mesh);
-  for (const Support& s : supports)
-    if (is_plane(s.kind)) stand_on(s.plane, surface, out.model.volume);
+  for (const Support& s : supports) {
+    if (!is_plane(s.kind)) continue;
+    if (loose_facets) lay_on(s.plane, out.model.volume);
+    else stand_on(s.plane, surface, out.model.volume);
+  }
   out.model.embedding = geometry::embed(surface.vertices_m, out.model.volume);
   out.model.supports = supports;
   out.model.unseen_share = filled.unseen_share;
@@ -112,6 +114,13 @@ BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& sup
   out.surface_rms_m = filled.surface_rms_m;
   out.hausdorff_m = filled.hausdorff_m;
   return out;
+}
+
+}  // namespace
+
+BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options,
+                         const OnProgress& progress) {
+  return fill(surface, false, supports, options, progress);
 }
 
 BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions& fuse, const std::vector<Support>& supports,
@@ -138,7 +147,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
     }
   }
   const FusedViews fused = fuse_views(clouds, fuse);
-  BuiltObject out = build_object(fused.facets, supports, options, progress);
+  BuiltObject out = fill(fused.facets, true, supports, options, progress);
   out.model.surface = geometry::boundary_surface(out.model.volume).surface;
   out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
   hand_on_uncertainty(out, fused);

@@ -158,6 +158,8 @@ std::vector<geometry::FinerNear> finer_at_feet(const Plane& plane, const TriMesh
   return finer;
 }
 
+void lay_on(const Plane& plane, TetMesh& volume) { lay_faces(plane, boundary_of(volume), volume); }
+
 void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume) {
   const Triangles faces = boundary_of(volume);
   const std::set<Index> laid = lay_faces(plane, faces, volume);

@@ -14,6 +14,9 @@ namespace palpate::reconstruction {
 /// a bar then seems to be on a soft base. No element loses more than four fifths of its volume.
 void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume);
 
+/// Its first half alone, for surfaces of loose facets, whose foot has no outline.
+void lay_on(const Plane& plane, TetMesh& volume);
+
 /// Where a volume must be fine enough to stand on a plane: over each foot of the surface in it, edges of a fifth of the foot's
 /// size (the root of its area). A slender object else hangs on two or three elements.
 std::vector<geometry::FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface);
