@@ -283,7 +283,7 @@ std::vector<DepthFrame> LabRobot::look_around(int views) const {
   for (int k = 0; k < views; ++k) {
     const double around = 2 * M_PI * k / std::max(1, views - 1) + M_PI / 4, down = M_PI / 6;
     Vec3 eye = middle + away_m * Vec3(std::cos(down) * std::cos(around), std::cos(down) * std::sin(around), std::sin(down));
-    if (k > 0 && k == views - 1) eye = middle + away_m * Vec3(0.05, 0, 1).normalized();
+    if (k == views - 1) eye = middle + away_m * Vec3(0.05, 0, 1).normalized();
     DepthFrame frame;
     frame.camera = lab.camera;
     frame.T_base_camera = look_at(eye, middle);

@@ -21,7 +21,7 @@ int palpate(const std::string& arguments) {
 TEST(Paper, BothMethodsAnswerAndTheBaselineReachesItsOwnMinimum) {
   const fs::path out = fs::temp_directory_path() / "palpate_paper_test";
   fs::remove_all(out);
-  ASSERT_EQ(palpate("--quiet --threads 2 paper --quick --scene balloon -o " + out.string()), 0);
+  ASSERT_EQ(palpate("--quiet --threads 2 paper --quick --scene cube -o " + out.string()), 0);
   nlohmann::json told;
   std::ifstream(out / "paper.json") >> told;
   const auto& trial = told.at("scenes").at(0).at("trials").at(0);
