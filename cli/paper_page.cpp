@@ -221,7 +221,7 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::strin
       "Manipulation Robot</i>, IROS 2010. Its experiments, made again by palpate {} on objects of the software lab, whose E is "
       "known. The paper's method is its algorithm 1: iterative closest points, squared distance to the nearest vertex, gradient "
       "descent with numerical derivatives. It gets palpate's mesh, solver, points, start and {} thread{}; a second row gives it linear "
-      "tetrahedra, as the paper had. Both see at most 3000 pixels of an image. All truths are linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
+      "tetrahedra, as the paper had. Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the object at rest. All truths are linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
       version, threads, threads == 1 ? "" : "s", command);
   for (const SceneAnswers& scene : scenes) html += section(scene);
   return html + "</body></html>\n";
