@@ -53,6 +53,8 @@ const SurveyedTopic* first_of(const BagSurvey& survey, const std::string& use) {
   return nullptr;
 }
 
+constexpr const char* fill_in = "FILL_IN";  // what the bag does not tell and its owner has to
+
 const SurveyedTopic* camera_info_of(const BagSurvey& survey, const std::string& image) {
   const SurveyedTopic* best = nullptr;
   for (const SurveyedTopic& topic : survey.topics) {
@@ -66,7 +68,7 @@ std::string guess_frame(const std::vector<std::string>& frames, std::initializer
   for (const char* word : words)
     for (const std::string& frame : frames)
       if (frame.find(word) != std::string::npos) return frame;
-  return "TODO";
+  return fill_in;
 }
 
 std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& frames,
@@ -74,15 +76,15 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
   const SurveyedTopic *force = first_of(survey, "force"), *joints = first_of(survey, "joints"),
                       *robot = first_of(survey, "robot description");
   std::string text =
-      "# What nobody can guess from the bag is marked TODO. docs/recording-format.md explains every key.\n"
+      "# Write your own in place of every FILL_IN, and look at every line marked check. docs/recording-format.md explains every key.\n"
       "format: palpate-mapping/1\n"
-      "rest: {surface_mesh: TODO.stl, state: stress_free}   # the object untouched, in the base frame; beside this file\n"
+      "rest: {surface_mesh: FILL_IN.stl, state: stress_free}   # the object untouched, in the base frame; beside this file\n"
       "supports:                                            # how it is held\n"
-      "  - {kind: table, point_m: [0, 0, 0], normal: [0, 0, 1], contact: frictionless}   # TODO\n"
+      "  - {kind: table, point_m: [0, 0, 0], normal: [0, 0, 1], contact: frictionless}   # check: plane and contact\n"
       "tools:\n"
-      "  - {name: tool, shape: sphere, radius_m: 0.01, contact: bonded}   # TODO: what touched the object\n"
+      "  - {name: tool, shape: sphere, radius_m: 0.01, contact: bonded}   # check: what touched the object\n"
       "topics:\n";
-  text += "  wrench: " + (force ? force->name : std::string("TODO")) + "\n";
+  text += "  wrench: " + (force ? force->name : std::string(fill_in)) + "\n";
   if (joints) text += "  joints: " + joints->name + "\n";
   if (robot) text += "  robot_description: " + robot->name + "\n";
   std::string depth, clouds;
@@ -90,20 +92,20 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
     if (topic.messages == 0) continue;
     if (topic.use == "depth images") {
       const SurveyedTopic* info = camera_info_of(survey, topic.name);
-      depth += "    - {image: " + topic.name + ", info: " + (info ? info->name : std::string("TODO")) +
-               ", noise: {model: constant, sigma_m: 0.003}}   # TODO: noise of the sensor\n";
+      depth += "    - {image: " + topic.name + ", info: " + (info ? info->name : std::string(fill_in)) +
+               ", noise: {model: constant, sigma_m: 0.003}}   # check: noise of the sensor\n";
     }
     if (topic.use == "clouds")
-      clouds += "    - {topic: " + topic.name + ", sigma_m: 0.003}   # TODO: standard deviation of a point\n";
+      clouds += "    - {topic: " + topic.name + ", sigma_m: 0.003}   # check: standard deviation of a point\n";
   }
   if (!depth.empty()) text += "  depth:\n" + depth;
   if (!clouds.empty() && depth.empty()) text += "  clouds:\n" + clouds;  // both would show the same points twice
   const std::string base = std::find(frames.begin(), frames.end(), "base_link") != frames.end() ? "base_link"
-                           : roots.empty()                                                      ? "TODO"
+                           : roots.empty()                                                      ? fill_in
                                                                                                 : roots.front();
   text += "frames: {base: " + base +
           ", tip: " + guess_frame(frames, {"tool_tip", "tip", "tcp", "tool", "ee", "hand", "flange"}) + "}\n";
-  text += "wrench: {reports: force_on_sensor}   # TODO: or force_on_object; check the sign with one push\n";
+  text += "wrench: {reports: force_on_sensor}   # check: or force_on_object; the sign shows in one push\n";
   return text + "clocks: {camera_offset_s: estimate}\nsteps: {by: detection, travel_sigma_m: 0.0005}\n";
 }
 

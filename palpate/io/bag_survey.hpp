@@ -23,7 +23,7 @@ struct BagSurvey {
   double duration_s = 0;
   std::vector<std::string> frames;   ///< "child of parent", of all transforms
   std::vector<std::string> missing;  ///< what a recording needs and the bag does not have, in plain words with the cure
-  std::string mapping;               ///< a mapping to start from; what nobody can guess is marked TODO
+  std::string mapping;               ///< a mapping to start from; what nobody can guess says FILL_IN
 };
 
 BagSurvey survey(const MessageSource& bag);

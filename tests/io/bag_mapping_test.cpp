@@ -127,10 +127,10 @@ TEST_F(Mapping, ASurveySuggestsAMappingThatNamesWhatIsThere) {
   for (const char* part :
        {"wrench: /wrench", "image: /camera_1/depth/image, info: /camera_1/depth/camera_info", "base: base, tip: tip"})
     EXPECT_THAT(found.mapping, HasSubstr(part));
-  // Filled in at its TODOs, it is a mapping.
+  // Filled in, it is a mapping.
   std::string filled = found.mapping;
-  const std::string todo = "TODO.stl";
-  filled.replace(filled.find("surface_mesh: " + todo), 14 + todo.size(), "volume_mesh: rest.vtu");
+  const std::string mesh = "FILL_IN.stl";
+  filled.replace(filled.find("surface_mesh: " + mesh), 14 + mesh.size(), "volume_mesh: rest.vtu");
   folder.put("bag/filled.yaml", filled);
   EXPECT_NO_THROW(read_mapping(folder.path() / "bag/filled.yaml"));
 }
@@ -141,7 +141,7 @@ TEST(Survey, SaysWhatIsMissing) {
   EXPECT_THAT(found.missing, Contains(HasSubstr("no force")));
   EXPECT_THAT(found.missing, Contains(HasSubstr("/tf")));
   EXPECT_THAT(found.missing, Contains(HasSubstr("depth image")));
-  EXPECT_THAT(found.mapping, HasSubstr("wrench: TODO"));
+  EXPECT_THAT(found.mapping, HasSubstr("wrench: FILL_IN"));
 }
 
 }  // namespace
