@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `palpate explore -o OUT`: the lab's robot pushes, estimates and chooses the next best push until E and nu are known as
+// `palpate explore -o OUT`: the lab's robot, or a driver's, pushes, estimates and chooses the next best push until E and nu are known as
 // well as was asked for. OUT/recording grows step by step; result, model and report come at the end.
 #include "palpate/explore.hpp"
 
@@ -7,11 +7,10 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 
-#include "cli/lab_setup.hpp"
 #include "cli/live_report.hpp"
 #include "cli/paths.hpp"
+#include "cli/push_robot.hpp"
 #include "cli/push_words.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -26,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-  LabArguments lab;
+  RobotArguments robot;
   ExploreOptions explore;
   fs::path out;
   std::string goal = "both", law, refine;
@@ -51,14 +50,13 @@ nlohmann::json json_of(const ExploredPush& push) {
           {"poisson_ratio_within_95", poisson_ratio_half_width(push.poisson_ratio)}};
 }
 
-/// One whole loop on a lab of its own. `writer` and `truth` only where it is recorded, `live` where it may be watched.
-Explored run_loop(Session& session, const Options& given, PushOrder order, io::RecordingWriter* writer,
+/// One whole loop; in the lab, on an object of its own. `writer` and `truth` only where it is recorded, `live` where it may be watched.
+Explored run_loop(Session& session, const Options& given, PushRobot& robot, PushOrder order, io::RecordingWriter* writer,
                   nlohmann::json* truth, LiveReport* live) {
-  lab::LabRobot robot(lab_options(given.lab, session.seed), lab_object(given.lab, session.seed));
-  if (truth != nullptr) *truth = truth_json(robot);
+  if (truth != nullptr) *truth = robot.truth().value_or(nlohmann::json());
   ExploreOptions options = given.explore;
   options.order = order;
-  options.push.travel_limit_m = given.travel_limit_m > 0 ? given.travel_limit_m : robot.object().travel_limit_m;
+  options.push.travel_limit_m = given.travel_limit_m > 0 ? given.travel_limit_m : robot.travel_limit_m();
   options.suggest.candidates.reachable = [&](const Vec3& contact_m, const Vec3& direction) {
     return robot.reaches(contact_m, direction, options.push.start_distance_m);
   };
@@ -73,7 +71,7 @@ Explored run_loop(Session& session, const Options& given, PushOrder order, io::R
   hooks.on_step = [&](const Push& push, const Step& step) {
     if (writer == nullptr) return;
     writer->add_step(step);
-    (*truth)["steps"].push_back(truth_json(push, step, robot));
+    if (truth != nullptr && truth->is_object()) (*truth)["steps"].push_back(robot.truth_of(push, step));
     session.say(fmt::format("{}, {:.1f} s: {:.2f} N{}", push.name, step.time_s,
                             step.loads.empty() ? 0.0 : step.loads[0].force_n->norm(), step.unloading ? ", going back" : ""));
   };
@@ -93,7 +91,7 @@ Explored run_loop(Session& session, const Options& given, PushOrder order, io::R
     hooks.on_progress = live->watch(hooks.on_progress);
     options.identify.fit.on_estimate = live->on_estimate(scene);
   }
-  return explore(robot, scene, options, hooks);
+  return explore(robot.robot(), scene, options, hooks);
 }
 
 std::string count_of(const Explored& run) {
@@ -107,17 +105,16 @@ int run(const Options& given, Session& session) {
   if (fs::exists(given.out, code) && !fs::is_empty(given.out, code))
     throw Error("is there already; choose another folder or remove it", given.out.string());
   check(given.explore);
+  if (given.compare && !given.robot.driver.empty())
+    throw Error("compares orders on fresh objects of the lab, and a driver's world has one only; leave it out", "--compare");
   LiveReport live(given.live, session, given.out.filename().string());
   nlohmann::json truth;
-  std::optional<io::RecordingWriter> writer;
-  {
-    const lab::LabRobot robot(lab_options(given.lab, session.seed), lab_object(given.lab, session.seed));
-    Recording scene = robot.scene();
-    if (!given.law.empty()) scene.model.material = given.law;
-    writer.emplace(given.out / "recording", scene);
-  }
-  Explored found = run_loop(session, given, PushOrder::next_best, &*writer, &truth, &live);
-  write_json(truth, given.out / "truth.json");
+  const auto robot = push_robot(given.robot, session.seed);
+  Recording scene = robot->scene();
+  if (!given.law.empty()) scene.model.material = given.law;
+  io::RecordingWriter writer(given.out / "recording", scene);
+  Explored found = run_loop(session, given, *robot, PushOrder::next_best, &writer, &truth, &live);
+  if (truth.is_object()) write_json(truth, given.out / "truth.json");
   if (found.pushes.empty()) {
     session.warn(found.message);
     session.result({{"format", "palpate-exploration/1"}, {"reached", false}, {"message", found.message}});
@@ -144,7 +141,8 @@ int run(const Options& given, Session& session) {
     for (const auto& [order, name] :
          {std::pair{PushOrder::random, "random order"}, {PushOrder::best_repeated, "best place repeated"}}) {
       session.say(fmt::format("the same lab, {}:", name));
-      const Explored other = run_loop(session, given, order, nullptr, nullptr, nullptr);
+      const auto another = push_robot(given.robot, session.seed);  // its noise starts anew
+      const Explored other = run_loop(session, given, *another, order, nullptr, nullptr, nullptr);
       if (Session::interrupted()) break;
       session.say(fmt::format("{}: {}; next best push: {}", name, count_of(other), count_of(found)));
       nlohmann::json one = {{"order", name}, {"reached", other.reached}, {"pushes", nlohmann::json::array()}};
@@ -165,7 +163,7 @@ Run verbs::explore(CLI::App& app) {
   app.add_option("-o,--out", given->out,
                  "folder for recording/, result.json, model/, report.html, exploration.json and truth.json")
       ->required();
-  add_lab_options(app, given->lab);
+  add_robot_options(app, given->robot);
   app.add_option("--young-modulus-within", options.young_modulus_within, "goal: half of the 95 % interval over E")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

@@ -25,7 +25,8 @@ void LoggedRobot::put(const std::string& topic, const std::string& type, double 
 }
 
 acquisition::RobotState LoggedRobot::read() {
-  const acquisition::RobotState state = robot_.read();
+  acquisition::RobotState state = robot_.read();
+  state.time_s += later_s_;
   const std::int64_t stamp = stamp_of(state.time_s);
   put("/wrench", "geometry_msgs/msg/WrenchStamped", state.time_s,
       io::encode(io::RosWrench{{stamp, "base"}, state.force_n, Vec3::Zero()}));
@@ -39,6 +40,7 @@ acquisition::RobotState LoggedRobot::read() {
 
 DepthFrame LoggedRobot::take_depth_image() {
   DepthFrame frame = robot_.take_depth_image();
+  frame.time_s += later_s_;
   const std::int64_t stamp = stamp_of(frame.time_s);
   put("/tf", "tf2_msgs/msg/TFMessage", frame.time_s,
       io::encode(std::vector<io::RosTransform>{{{stamp, "base"}, "camera", frame.T_base_camera}}));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -16,8 +17,10 @@ namespace palpate::cli {
 /// tared), poses of tip and camera, depth images. Nothing in the bag says what a push or a step is.
 class LoggedRobot : public acquisition::Robot {
  public:
-  LoggedRobot(acquisition::Robot& robot, std::vector<std::string> joint_names)
-      : robot_(robot), joint_names_(std::move(joint_names)) {}
+  /// @param not_before_s  the clock begins no earlier: a recording that goes on must not go back in time, a robot may have been
+  ///                      switched off in between
+  LoggedRobot(acquisition::Robot& robot, std::vector<std::string> joint_names, double not_before_s)
+      : robot_(robot), joint_names_(std::move(joint_names)), later_s_(not_before_s > 0 ? std::max(0.0, not_before_s - robot.read().time_s) : 0) {}
 
   acquisition::RobotState read() override;
   acquisition::Motion move(const Pose& T_base_tip, double speed_m_s) override { return robot_.move(T_base_tip, speed_m_s); }
@@ -38,6 +41,7 @@ class LoggedRobot : public acquisition::Robot {
   std::map<std::string, std::uint16_t> channels_;
   DepthFrame camera_;  ///< of the last image, without its pixels
   std::vector<std::string> joint_names_;
+  double later_s_ = 0;
 };
 
 }  // namespace palpate::cli

@@ -7,11 +7,12 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 
-#include "cli/lab_setup.hpp"
 #include "cli/logged_robot.hpp"
 #include "cli/paths.hpp"
+#include "cli/push_robot.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
@@ -24,7 +25,7 @@ namespace {
 
 struct RecordArguments {
   bool demo = false;
-  LabArguments lab;
+  RobotArguments robot;
   std::string output;
   std::string truth;
   bool resume = false;
@@ -54,36 +55,39 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   const bool exists = std::filesystem::exists(folder) && !std::filesystem::is_empty(folder);
   if (exists && !arguments.resume)
     throw Error("is there already; say --resume to go on, or choose another folder", folder.string());
-  lab::LabRobot robot(lab_options(arguments.lab, session.seed), lab_object(arguments.lab, session.seed));
-  const lab::LabObject& object = robot.object();
+  const auto robot = push_robot(arguments.robot, session.seed);
+  if (robot->sites() == 0) throw Error("say where to push: --contact X Y Z, in metres, base frame", "--driver");
   acquisition::PushOptions protocol = arguments.push;
-  if (!(protocol.travel_limit_m > 0)) protocol.travel_limit_m = object.travel_limit_m;
-  Recording recording = robot.scene();
+  if (!(protocol.travel_limit_m > 0)) protocol.travel_limit_m = robot->travel_limit_m();
+  Recording recording = robot->scene();
   if (arguments.views > 0) {
+    recording.rest.views = robot->look_around(arguments.views);
     recording.rest.surface.reset();
-    recording.rest.views = robot.look_around(arguments.views);
   }
-  nlohmann::json truth = truth_json(robot);
+  std::optional<nlohmann::json> truth = robot->truth();
+  if (!truth && !arguments.truth.empty()) throw Error("nobody knows the truth of a driver's world; leave it out", "--truth");
   const std::filesystem::path truth_file =
       std::filesystem::path(arguments.truth.empty() ? folder.string() + ".truth.json" : arguments.truth);
+  double not_before_s = 0;
   if (exists) {
     recording = io::read_recording_unchecked(folder);
-    std::ifstream file(truth_file);
-    const nlohmann::json before = nlohmann::json::parse(file, nullptr, false);
-    if (before.is_object() && before.contains("steps")) truth["steps"] = before["steps"];
-    // The recording's clock goes on from its last step.
+    if (truth) {
+      std::ifstream file(truth_file);
+      const nlohmann::json before = nlohmann::json::parse(file, nullptr, false);
+      if (before.is_object() && before.contains("steps")) (*truth)["steps"] = before["steps"];
+    }
     if (!recording.pushes.empty() && !recording.pushes.back().steps.empty())
-      robot.wait(recording.pushes.back().steps.back().time_s + 1);
+      not_before_s = recording.pushes.back().steps.back().time_s + 1;
   }
   const std::vector<Push> recorded = recording.pushes;
   io::RecordingWriter writer(folder, recording);
-  LoggedRobot logged(robot, recording.joint_names);
+  LoggedRobot logged(robot->robot(), recording.joint_names, not_before_s);
   nlohmann::json told = nlohmann::json::array();
   int steps = 0;
   bool fine = true;
-  for (std::size_t site = 0; site < object.sites.size() && !Session::interrupted(); ++site) {
-    const acquisition::PushPlan plan = robot.plan(site);
-    if (!(arguments.push.force_step_n > 0)) protocol.force_step_n = object.force_step_at(object.sites[site]);
+  for (std::size_t site = 0; site < robot->sites() && !Session::interrupted(); ++site) {
+    const acquisition::PushPlan plan = robot->plan(site);
+    if (!(arguments.push.force_step_n > 0)) protocol.force_step_n = robot->force_step_n(site);
     const Push* so_far = nullptr;
     bool finished = false;
     for (std::size_t p = 0; p < recorded.size(); ++p)
@@ -99,7 +103,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
           if (!begun) writer.begin_push(push);
           begun = true;
           writer.add_step(step);
-          truth["steps"].push_back(truth_json(push, step, robot));
+          if (truth) (*truth)["steps"].push_back(robot->truth_of(push, step));
           const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
           session.say(fmt::format("{} ({}), {:.1f} s: {:.2f} N{}", push.name, plan.site, step.time_s, force,
                                   step.unloading ? ", going back" : ""));
@@ -121,22 +125,20 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
     fine = fine && (report.stop == acquisition::StopReason::force_limit || report.stop == acquisition::StopReason::travel_limit ||
                     report.stop == acquisition::StopReason::slip || report.stop == acquisition::StopReason::contact_lost);
   }
-  write_json(truth, truth_file);
-  session.say(fmt::format("{}: {} steps; the truth is in {}. Next: palpate estimate {} -o RESULT", arguments.output, steps,
-                          truth_file.string(), arguments.output));
+  if (truth) write_json(*truth, truth_file);
+  session.say(fmt::format("{}: {} steps{}. Next: palpate estimate {} -o RESULT", arguments.output, steps,
+                          truth ? "; the truth is in " + truth_file.string() : "", arguments.output));
   if (!arguments.raw_bag.empty()) {
-    Recording scene = robot.scene();
+    Recording scene = robot->scene();
     scene.robot.reset();  // the masks are in the bag
     scene.joint_names.clear();
     logged.write_bag(scene, arguments.raw_bag);
     session.say(fmt::format("{}: all that the sensors said, as a robot's recorder keeps it", arguments.raw_bag));
   }
-  session.result({{"recording", arguments.output},
-                  {"truth", truth_file.string()},
-                  {"object", object.name},
-                  {"steps", steps},
-                  {"pushes", told},
-                  {"seed", session.seed}});
+  nlohmann::json json = {
+      {"recording", arguments.output}, {"object", recording.name}, {"steps", steps}, {"pushes", told}, {"seed", session.seed}};
+  if (truth) json["truth"] = truth_file.string();
+  session.result(json);
   return fine && !Session::interrupted() ? exit_done : exit_numbers;
 }
 
@@ -146,8 +148,8 @@ int record_demo(Session& session, const RecordArguments& arguments) {
   lab::DemoOptions options;
   options.seed = session.seed;
   options.threads = session.thread_count();
-  if (arguments.lab.young_modulus_pa != 0) options.young_modulus_pa = arguments.lab.young_modulus_pa;
-  if (arguments.lab.poisson_ratio >= 0) options.poisson_ratio = arguments.lab.poisson_ratio;
+  if (arguments.robot.lab.young_modulus_pa != 0) options.young_modulus_pa = arguments.robot.lab.young_modulus_pa;
+  if (arguments.robot.lab.poisson_ratio >= 0) options.poisson_ratio = arguments.robot.lab.poisson_ratio;
   const lab::Demo demo = lab::make_demo(options, session.progress());
   io::write_recording(demo.recording, arguments.output);
   if (!arguments.truth.empty()) {
@@ -168,7 +170,8 @@ Run verbs::record(CLI::App& app) {
   auto arguments = std::make_shared<RecordArguments>();
   // The object says how deep a soft pad can press it and in which steps: less than the paper's 10 cm.
   arguments->push.travel_limit_m = arguments->push.force_step_n = 0;
-  add_lab_options(app, arguments->lab);
+  add_robot_options(app, arguments->robot);
+  add_contact_options(app, arguments->robot);
   app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
   app.add_option("-o,--out,--output", arguments->output, "folder to write; must not exist or be empty")->required();
   app.add_option("--views", arguments->views,
@@ -192,6 +195,8 @@ Run verbs::record(CLI::App& app) {
       if (!bag.empty() && std::filesystem::exists(bag, code) && !std::filesystem::is_empty(bag, code))
         throw Error("is there already; choose another folder or remove it", bag);
     }
+    if (arguments->demo && !arguments->robot.driver.empty())
+      throw Error("the built-in recording is made without a robot; leave --demo out", "--driver");
     if (arguments->demo && !arguments->raw_bag.empty())
       throw Error("the built-in recording is made without a robot; leave --demo out", "--raw-bag");
     const int outcome = arguments->demo ? record_demo(session, *arguments) : record_pushes(session, *arguments);

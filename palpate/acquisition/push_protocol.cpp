@@ -296,6 +296,15 @@ class PushRun {
 
 }  // namespace
 
+Mat3 tip_along(const Vec3& direction) {
+  Mat3 rotation;
+  const Vec3 x = (Vec3::UnitX() - direction.x() * direction).norm() > 0.1 ? Vec3::UnitX() : Vec3::UnitY();
+  rotation.col(2) = direction;
+  rotation.col(0) = (x - x.dot(direction) * direction).normalized();
+  rotation.col(1) = direction.cross(rotation.col(0));
+  return rotation;
+}
+
 void check(const PushOptions& o) {
   const auto need = [](bool good, const char* field, const char* rule) {
     if (!good) throw Error(rule, std::string("PushOptions.") + field);

@@ -21,6 +21,9 @@ struct PushPlan {
   Mat3 R_base_tip = Mat3::Identity();  ///< orientation of the tip throughout
 };
 
+/// A tip's orientation for a push: z along it, x as near to the base's forward as that allows (a round tip's roll is free).
+Mat3 tip_along(const Vec3& direction);
+
 struct PushOptions {
   double force_limit_n = 50.0;      ///< the paper's
   double travel_limit_m = 0.10;     ///< the paper's

@@ -90,16 +90,6 @@ LabObject cube_of(const PressedBlockOptions& block) {
   return object;
 }
 
-// The tip's z along the push; its x as near to the robot's forward as that allows.
-Mat3 facing(const Vec3& direction) {
-  Mat3 rotation;
-  const Vec3 x = (Vec3::UnitX() - direction.x() * direction).norm() > 0.1 ? Vec3::UnitX() : Vec3::UnitY();
-  rotation.col(2) = direction;
-  rotation.col(0) = (x - x.dot(direction) * direction).normalized();
-  rotation.col(1) = direction.cross(rotation.col(0));
-  return rotation;
-}
-
 }  // namespace
 
 void check(const LabOptions& o) {
@@ -333,7 +323,7 @@ acquisition::PushPlan LabRobot::plan(std::size_t site) {
   plan.tool = "stick";
   plan.contact_m = lab.site().contact_m;
   plan.direction = lab.site().direction;
-  plan.R_base_tip = facing(plan.direction);
+  plan.R_base_tip = acquisition::tip_along(plan.direction);
   return plan;
 }
 
@@ -350,7 +340,7 @@ acquisition::PushPlan LabRobot::plan_at(const Vec3& contact_m, const Vec3& direc
 bool LabRobot::reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m) const {
   const Impl& lab = *impl_;
   Pose pose = Pose::Identity();
-  pose.linear() = facing(direction);
+  pose.linear() = acquisition::tip_along(direction);
   std::vector<double> joints = lab.commanded;
   for (const double before_m : {start_distance_m, 0.0}) {
     pose.translation() = contact_m - before_m * direction;

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/push_robot.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "cli/driver_library.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/io/recording.hpp"
+
+namespace palpate::cli {
+namespace {
+
+class FromLab : public PushRobot {
+ public:
+  FromLab(const LabArguments& arguments, std::uint64_t seed) : lab_(lab_options(arguments, seed), lab_object(arguments, seed)) {}
+  acquisition::Robot& robot() override { return lab_; }
+  Recording scene() const override { return lab_.scene(); }
+  std::size_t sites() const override { return lab_.object().sites.size(); }
+  acquisition::PushPlan plan(std::size_t site) override { return lab_.plan(site); }
+  acquisition::PushPlan plan_at(const Vec3& contact_m, const Vec3& direction) override { return lab_.plan_at(contact_m, direction); }
+  bool reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m) const override {
+    return lab_.reaches(contact_m, direction, start_distance_m);
+  }
+  double force_step_n(std::size_t site) const override { return lab_.object().force_step_at(lab_.object().sites[site]); }
+  double travel_limit_m() const override { return lab_.object().travel_limit_m; }
+  std::vector<DepthFrame> look_around(int views) const override { return lab_.look_around(views); }
+  std::optional<nlohmann::json> truth() const override { return truth_json(lab_); }
+  nlohmann::json truth_of(const Push& push, const Step& step) const override { return truth_json(push, step, lab_); }
+
+ private:
+  lab::LabRobot lab_;
+};
+
+class FromDriver : public PushRobot {
+ public:
+  explicit FromDriver(const RobotArguments& arguments) : library_(arguments.driver, arguments.settings) {
+    if (arguments.scene.empty())
+      throw Error("say what stands before the robot: a recording without pushes (object, supports, tools) as --scene FOLDER",
+                  "--driver");
+    scene_ = io::read_recording_unchecked(arguments.scene);
+    scene_.pushes.clear();
+    if (scene_.tools.empty()) throw Error("names no tool; add `tools:`", arguments.scene.string());
+    tool_ = arguments.tool.empty() ? scene_.tools.front().name : arguments.tool;
+    bool known = false;
+    for (const Tool& tool : scene_.tools) known = known || tool.name == tool_;
+    if (!known) throw Error("is no tool of the scene; its first is " + scene_.tools.front().name, "--tool " + tool_);
+    const std::size_t pushes = arguments.contacts.size(), directions = arguments.directions.size();
+    if (directions > 1 && directions != pushes)
+      throw Error(fmt::format("there are {} for {} contacts: give one each, one for all, or none", directions, pushes), "--direction");
+    for (std::size_t i = 0; i < pushes; ++i) {
+      const Vec3 contact_m(arguments.contacts[i].data());
+      Vec3 direction = directions == 0 ? into_the_object(contact_m) : Vec3(arguments.directions[directions == 1 ? 0 : i].data());
+      if (!(direction.norm() > 0) || !direction.allFinite()) throw Error("must not be zero", "--direction");
+      places_.emplace_back(contact_m, direction.normalized());
+    }
+  }
+  acquisition::Robot& robot() override { return library_.robot(); }
+  Recording scene() const override { return scene_; }
+  std::size_t sites() const override { return places_.size(); }
+  acquisition::PushPlan plan(std::size_t site) override {
+    acquisition::PushPlan plan = plan_at(places_.at(site).first, places_.at(site).second);
+    plan.name = fmt::format("push {}", site + 1);
+    plan.site = fmt::format("place {}", site + 1);
+    return plan;
+  }
+  acquisition::PushPlan plan_at(const Vec3& contact_m, const Vec3& direction) override {
+    acquisition::PushPlan plan;
+    plan.name = "push";
+    plan.site = fmt::format("({:.3f} {:.3f} {:.3f})", contact_m.x(), contact_m.y(), contact_m.z());
+    plan.tool = tool_;
+    plan.contact_m = contact_m;
+    plan.direction = direction;
+    plan.R_base_tip = acquisition::tip_along(direction);
+    return plan;
+  }
+  bool reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m) const override {
+    Pose pose = Pose::Identity();
+    pose.linear() = acquisition::tip_along(direction);
+    for (const double before_m : {start_distance_m, 0.0}) {
+      pose.translation() = contact_m - before_m * direction;
+      if (!library_.robot().reaches(pose)) return false;
+    }
+    return true;
+  }
+  double force_step_n(std::size_t) const override { return acquisition::PushOptions{}.force_step_n; }
+  double travel_limit_m() const override { return acquisition::PushOptions{}.travel_limit_m; }
+  std::vector<DepthFrame> look_around(int) const override {
+    throw Error("a driver's camera is not carried around: put the views into the scene's `rest.views`", "--views");
+  }
+
+ private:
+  Vec3 into_the_object(const Vec3& contact_m) const {
+    std::optional<TriMesh> surface = scene_.rest.surface;
+    if (!surface && scene_.rest.volume) surface = geometry::boundary_surface(*scene_.rest.volume).surface;
+    if (!surface) throw Error("the scene's shape is known from views only: say along which --direction to push", "--contact");
+    const auto nearest = geometry::TriangleTree(*surface).closest(contact_m);
+    const auto corner = [&](int k) { return Vec3(surface->vertices_m.row(surface->triangles(nearest.triangle, k))); };
+    return (corner(2) - corner(0)).cross(corner(1) - corner(0)).normalized();
+  }
+
+  DriverLibrary library_;
+  Recording scene_;
+  std::string tool_;
+  std::vector<std::pair<Vec3, Vec3>> places_;  // contact, direction
+};
+
+}  // namespace
+
+void add_robot_options(CLI::App& app, RobotArguments& arguments) {
+  add_lab_options(app, arguments.lab);
+  app.add_option("--driver", arguments.driver,
+                 "a robot of your own in place of the lab's: a shared library as palpate/acquisition/driver.h says");
+  app.add_option("--driver-settings", arguments.settings, "handed to the driver as it is: an address, a file, ...")->needs("--driver");
+  app.add_option("--scene", arguments.scene, "with --driver: a recording without pushes: object, supports, tools, table, robot")
+      ->needs("--driver");
+  app.add_option("--tool", arguments.tool, "with --driver: of the scene (default: its first)")->needs("--driver");
+}
+
+void add_contact_options(CLI::App& app, RobotArguments& arguments) {
+  app.add_option("--contact", arguments.contacts, "with --driver: where to push, X Y Z in metres, base frame; again for every push")
+      ->needs("--driver")
+      ->type_name("");
+  app.add_option("--direction", arguments.directions,
+                 "of these pushes, into the object: one for all, or one each (default: across the surface)")
+      ->needs("--driver")
+      ->type_name("");
+}
+
+std::unique_ptr<PushRobot> push_robot(const RobotArguments& arguments, std::uint64_t seed) {
+  if (arguments.driver.empty()) return std::make_unique<FromLab>(arguments.lab, seed);
+  return std::make_unique<FromDriver>(arguments);
+}
+
+}  // namespace palpate::cli

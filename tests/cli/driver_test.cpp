@@ -1,0 +1,95 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// `palpate record --driver`: a robot out of a shared library that was built from the C header alone, on a spring whose
+// stiffness is known; and what is said of libraries that are none.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "io/recording_folder.hpp"
+#include "palpate/io/recording.hpp"
+
+namespace palpate::io {
+namespace {
+
+using namespace palpate::io::test;
+using testing::HasSubstr;
+
+const std::string scene = PALPATE_SOURCE_DIR "/examples/driver/scene";
+
+class Driver : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  }
+  int palpate(const std::string& arguments) {
+    const std::string command = std::string("'") + PALPATE_CLI + "' " + arguments + " > '" + path("out") + "' 2> '" + path("err") + "'";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string path(const std::string& name) const { return (folder.path() / name).string(); }
+  std::string record(const std::string& library, const std::string& more = "") const {
+    return "--json record --driver '" + library + "' --scene '" + scene + "' -o '" + path("recording") + "' " + more;
+  }
+  const TemporaryFolder folder{"driver"};
+  const std::string spring = PALPATE_SPRING_ROBOT;
+  const std::string one_push = "--contact 0.5 0 0.1 --force-limit 8";
+};
+
+TEST_F(Driver, RecordsASpringWhoseStiffnessComesOut) {
+  ASSERT_EQ(palpate(record(spring, one_push + " --contact 0.52 0.01 0.1 --driver-settings 640")), 0) << folder.get("err");
+  const Recording made = read_recording(folder.path() / "recording");
+  EXPECT_TRUE(check_recording(made).empty());
+  ASSERT_EQ(made.pushes.size(), 2u);
+  for (const Push& push : made.pushes) {
+    ASSERT_EQ(push.steps.size(), 8u);  // rest, 2, 4, 6, 8 N, two on the way back, rest
+    for (const Step& step : push.steps) {
+      if (step.loads.empty()) continue;
+      EXPECT_EQ(step.loads[0].direction, Vec3(0, 0, -1)) << "across the plate, where nothing is said";
+      const auto* frame = std::get_if<DepthFrame>(&step.observations.back());
+      ASSERT_NE(frame, nullptr);
+      // The plate's middle as the camera saw it, and the force that the spring then has.
+      const double seen_m = 0.6 - double(frame->depth_m.block(50, 70, 20, 20).mean());
+      EXPECT_NEAR(-step.loads[0].force_n->z(), 640 * (0.1 - seen_m), 0.1);
+    }
+  }
+  EXPECT_EQ(palpate("--json check '" + path("recording") + "' --stiffness 640"), 0) << folder.get("err");
+  EXPECT_EQ(palpate("--json check '" + path("recording") + "' --stiffness 800"), 1) << "a fifth stiffer is noticed";
+}
+
+TEST_F(Driver, GoesOnWhereARecordingWasCutOff) {
+  ASSERT_EQ(palpate(record(spring, one_push)), 0) << folder.get("err");
+  Recording made = read_recording(folder.path() / "recording");
+  const std::size_t whole = made.pushes[0].steps.size();
+  made.pushes[0].steps.resize(3);
+  std::filesystem::remove_all(folder.path() / "recording");
+  write_recording(made, folder.path() / "recording");
+  EXPECT_EQ(palpate(record(spring, one_push)), 3) << "is there already";
+  ASSERT_EQ(palpate(record(spring, one_push + " --resume")), 0) << folder.get("err");
+  EXPECT_EQ(read_recording_unchecked(folder.path() / "recording").pushes[0].steps.size(), whole);
+}
+
+TEST_F(Driver, WhatIsWrongIsSaidWithACure) {
+  const auto refused = [&](const std::string& arguments, const std::string& words) {
+    EXPECT_EQ(palpate(arguments), 3) << arguments;
+    EXPECT_THAT(folder.get("err"), HasSubstr(words)) << arguments;
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "recording")) << arguments;
+  };
+  std::ofstream(path("text.so")) << "no library\n";
+  refused(record(path("absent.so"), one_push), "there is no such file");
+  refused(record(path("text.so"), one_push), "cannot be loaded");
+  refused(record(PALPATE_NO_ROBOT, one_push), "has no entry `palpate_make_robot`");
+  refused(record(spring, one_push + " --driver-settings soft"), "`soft` is no stiffness");
+  refused(record(spring), "say where to push");
+  refused(record(spring, one_push + " --tool hammer"), "is no tool of the scene; its first is stick");
+  refused(record(spring, one_push + " --direction 0 0 0"), "must not be zero");
+  refused(record(spring, one_push + " --views 3"), "rest.views");
+  refused("record --driver '" + spring + "' " + one_push + " -o '" + path("recording") + "'", "--scene FOLDER");
+}
+
+}  // namespace
+}  // namespace palpate::io
