@@ -10,6 +10,7 @@
 #include <random>
 
 #include "palpate/core/error.hpp"
+#include "refusals.hpp"
 
 namespace palpate::acquisition {
 namespace {
@@ -242,16 +243,7 @@ TEST(PushProtocol, GoesOnAfterAKillAtEveryStep) {
 }
 
 TEST(PushProtocol, BadOptionsAndPlansAreRefused) {
-  const auto refused = [](auto change) {
-    PushOptions o = options();
-    change(o);
-    try {
-      check(o);
-    } catch (const Error&) {
-      return true;
-    }
-    return false;
-  };
+  const auto refused = [](auto change) { return refuses([](const auto& o) { check(o); }, options(), change); };
   using O = PushOptions;
   EXPECT_FALSE(refused([](O&) {}));
   EXPECT_TRUE(refused([](O& o) { o.force_limit_n = 0; }));

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "geometry/shapes.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/sensing/depth_render.hpp"
 
@@ -19,24 +20,13 @@ namespace {
 namespace fs = std::filesystem;
 using namespace palpate;
 
-TriMesh box(const Vec3& low, const Vec3& high) {
-  TriMesh mesh;
-  mesh.vertices_m.resize(8, 3);
-  for (int i = 0; i < 8; ++i)
-    mesh.vertices_m.row(i) << (i & 1 ? high : low).x(), ((i >> 1) & 1 ? high : low).y(), (i >> 2 ? high : low).z();
-  mesh.triangles.resize(12, 3);
-  mesh.triangles << 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7,
-      5;
-  return mesh;
-}
-
 /// @param camera_off_m  where the camera really stands, from where it is said to
 Recording pushed_block(const Vec3& camera_off_m, double compliance_m_per_n) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   Recording recording;
   recording.name = "rigid block";
-  recording.rest.surface = box(Vec3(0.5, -0.05, 0), Vec3(0.6, 0.05, 0.08));
+  recording.rest.surface = shapes::box(Vec3(0.1, 0.1, 0.08), Vec3(0.5, -0.05, 0));
   Support table;
   table.kind = SupportKind::plane;
   table.tolerance_m = 0.002;

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "geometry/shapes.hpp"
 #include "palpate/io/recording.hpp"
 
 namespace {
@@ -21,13 +22,7 @@ using namespace palpate;
 Recording box_on_table() {
   Recording recording;
   recording.name = "box";
-  TriMesh box;
-  box.vertices_m.resize(8, 3);
-  for (int i = 0; i < 8; ++i) box.vertices_m.row(i) << 0.5 + 0.1 * (i & 1), 0.08 * ((i >> 1) & 1), 0.09 * (i >> 2);
-  box.triangles.resize(12, 3);
-  box.triangles << 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7,
-      5;
-  recording.rest.surface = box;
+  recording.rest.surface = shapes::box(Vec3(0.1, 0.08, 0.09), Vec3(0.5, 0, 0));
   Support table;
   table.kind = SupportKind::plane;
   table.name = "table";

@@ -5,11 +5,11 @@
 
 #include <random>
 
+#include "estimation/scenes.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/next_push.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
-#include "estimation/scenes.hpp"
 
 namespace palpate::estimation {
 
@@ -37,6 +37,15 @@ inline Recording block_on_table() {
 inline SimulatedObject block_object(int refinement) {
   const TetMesh mesh = kuhn_block(5 * refinement, 5 * refinement, 4 * refinement, soft_block_m);
   return simulated(fem::to_quadratic(mesh), "linear");
+}
+
+inline RayCloud only(const RayCloud& rays, const std::vector<Index>& keep) {
+  RayCloud out = rays;
+  out.origins_m = rays.origins_m(keep, Eigen::all);
+  out.directions = rays.directions(keep, Eigen::all);
+  out.range_m = rays.range_m(keep);
+  out.sigma_m = rays.sigma_m(keep);
+  return out;
 }
 
 /// Rays of a camera at `eye_m` that meet the surface, a bundle of n x n over the block.
@@ -69,6 +78,23 @@ inline RayObservation look(const TriMesh& surface, const Vec3& eye_m, int n = 40
     view.rays.range_m(i) = ranges[static_cast<std::size_t>(i)];
   }
   return view;
+}
+
+/// Replaces the ranges by what a camera sees that really stands at `camera` (from where it is said to) of a body that has
+/// moved by `moved_m`; rays that miss it are gone.
+/// @param normal  standard normal numbers, one a hit
+template <class Normal>
+void measure(RayObservation& image, const geometry::TriangleTree& body, const RigidOffset& camera, const Vec3& moved_m,
+             Normal normal) {
+  std::vector<Index> keep;
+  for (Index i = 0; i < image.rays.range_m.size(); ++i) {
+    const Vec3 origin = camera.apply(image.rays.origins_m.row(i)) - moved_m;
+    const auto hit = body.cast(origin, camera.rotation() * image.rays.directions.row(i).transpose());
+    if (!hit) continue;
+    image.rays.range_m(i) = hit->range_m + image.rays.sigma_m(i) * normal();
+    keep.push_back(i);
+  }
+  image.rays = only(image.rays, keep);
 }
 
 inline const Vec3 camera_eye_m(-0.25, -0.35, 0.4);
@@ -138,18 +164,7 @@ class MadePushes {
       RayObservation image = view;
       const RigidOffset camera{view.pose_std_m * normal3(), view.pose_std_rad * normal3(), Vec3(0.04, 0.04, 0.03)};
       const geometry::TriangleTree tree({seen.surface_m, truth_.surface.rest().triangles});
-      std::vector<Index> keep;
-      for (Index i = 0; i < image.rays.range_m.size(); ++i) {
-        const Vec3 origin = camera.apply(image.rays.origins_m.row(i));
-        const auto hit = tree.cast(origin, camera.rotation() * image.rays.directions.row(i).transpose());
-        if (!hit) continue;
-        image.rays.range_m(i) = hit->range_m + image.rays.sigma_m(i) * normal_(random_);
-        keep.push_back(i);
-      }
-      image.rays.origins_m = image.rays.origins_m(keep, Eigen::all).eval();
-      image.rays.directions = image.rays.directions(keep, Eigen::all).eval();
-      image.rays.range_m = image.rays.range_m(keep).eval();
-      image.rays.sigma_m = image.rays.sigma_m(keep).eval();
+      measure(image, tree, camera, Vec3::Zero(), [&] { return normal_(random_); });
       inputs.push_back(image);
       inputs_.push_back(std::move(inputs));
     }
@@ -183,10 +198,7 @@ class MadePushes {
       if (nearest > 0.014) keep.push_back(i);
     }
     RayObservation out = view;
-    out.rays.origins_m = view.rays.origins_m(keep, Eigen::all);
-    out.rays.directions = view.rays.directions(keep, Eigen::all);
-    out.rays.range_m = view.rays.range_m(keep);
-    out.rays.sigma_m = view.rays.sigma_m(keep);
+    out.rays = only(view.rays, keep);
     return out;
   }
 

@@ -79,18 +79,7 @@ Measured measured(const Rig& rig) {
       RayObservation image = stated;
       image.pose_std_m = stated_pose_std_m;
       image.pose_std_rad = stated_pose_std_rad;
-      std::vector<Index> keep;
-      for (Index i = 0; i < image.rays.range_m.size(); ++i) {
-        const Vec3 origin = camera.apply(image.rays.origins_m.row(i)) - give_m * direction;  // seen from the moved body
-        const auto hit = still.cast(origin, camera.rotation() * image.rays.directions.row(i).transpose());
-        if (!hit) continue;
-        image.rays.range_m(i) = hit->range_m + image.rays.sigma_m(i) * normal(random);
-        keep.push_back(i);
-      }
-      image.rays.origins_m = image.rays.origins_m(keep, Eigen::all).eval();
-      image.rays.directions = image.rays.directions(keep, Eigen::all).eval();
-      image.rays.range_m = image.rays.range_m(keep).eval();
-      image.rays.sigma_m = image.rays.sigma_m(keep).eval();
+      measure(image, still, camera, give_m * direction, [&] { return normal(random); });
       terms.push_back(image);
     }
     out.recording.pushes.push_back(push);

@@ -9,6 +9,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/surface_distance.hpp"
 #include "palpate/geometry/winding_number.hpp"
+#include "refusals.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -16,16 +17,6 @@ namespace {
 using testing::Contains;
 using testing::Field;
 using testing::HasSubstr;
-
-template <class F>
-std::string message_of(F f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "nothing thrown";
-}
 
 Tetrahedralisation with(const TriMesh& m, Index count) {
   TetrahedraliseOptions o;

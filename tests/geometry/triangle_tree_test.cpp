@@ -7,6 +7,7 @@
 
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
+#include "refusals.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -169,16 +170,6 @@ TEST(TriangleTree, a_point_that_is_not_finite_has_no_answer) {
   EXPECT_EQ(tree.closest(Vec3(0, NAN, 0)).triangle, -1);
   EXPECT_FALSE(tree.cast(Vec3(0, INFINITY, 0), Vec3::UnitX()));
   EXPECT_FALSE(tree.cast(Vec3(0.5, 0.5, 0.5), Vec3::Zero()));
-}
-
-template <class F>
-std::string message_of(F f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "nothing thrown";
 }
 
 TEST(TriangleTree, refuses_what_is_no_surface) {

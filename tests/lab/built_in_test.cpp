@@ -9,6 +9,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/sensing/observe.hpp"
+#include "refusals.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -85,16 +86,7 @@ TEST(BuiltIn, UnloadedViewShowsTheStatedCubeWithinTheStatedNoise) {
 }
 
 TEST(BuiltIn, BadOptionsAreRefusedAndCallersCanStop) {
-  const auto refused = [](auto change) {
-    DemoOptions options = quick();
-    change(options);
-    try {
-      make_demo(options);
-    } catch (const Error&) {
-      return true;
-    }
-    return false;
-  };
+  const auto refused = [](auto change) { return refuses([](const auto& o) { make_demo(o); }, quick(), change); };
   using O = DemoOptions;
   EXPECT_TRUE(refused([](O& o) { o.young_modulus_pa = -1; }));
   EXPECT_TRUE(refused([](O& o) { o.poisson_ratio = 0.5; }));

@@ -9,6 +9,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/depth_noise.hpp"
+#include "refusals.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -75,7 +76,8 @@ TEST(DepthSensor, PassiveStereoLosesWhatHasNoTexture) {
   }
 }
 
-// sigma = c / (4 sqrt(2) pi f) sqrt(A + B) / (K A): a quarter of the albedo takes the light of both to a quarter, twice the sigma.
+// sigma = c / (4 sqrt(2) pi f) sqrt(A + B) / (K A): a quarter of the albedo takes the light of both to a quarter, twice the
+// sigma.
 TEST(DepthSensor, TimeOfFlightIsNoisierOnDarkThingsAndInBrightLight) {
   DepthSensorOptions options = depth_sensor("time_of_flight");
   options.lens_scatter = 0;
@@ -181,16 +183,7 @@ TEST(DepthSensor, SameSeedSameImage) {
 }
 
 TEST(DepthSensor, BadOptionsAreRefused) {
-  const auto refused = [](auto change) {
-    DepthSensorOptions options;
-    change(options);
-    try {
-      check(options);
-    } catch (const Error&) {
-      return true;
-    }
-    return false;
-  };
+  const auto refused = [](auto change) { return refuses([](const auto& o) { check(o); }, DepthSensorOptions{}, change); };
   using O = DepthSensorOptions;
   EXPECT_FALSE(refused([](O&) {}));
   EXPECT_TRUE(refused([](O& o) { o.correlated_sigma_m = -1; }));

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <map>
 
-#include "palpate/core/error.hpp"
+#include "refusals.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -90,16 +90,7 @@ TEST(GradedBlock, ContactIsRound) {
 }
 
 TEST(GradedBlock, BadOptionsAreRefused) {
-  const auto refused = [](auto change) {
-    GradedBlockOptions options = half_block();
-    change(options);
-    try {
-      graded_block(options);
-    } catch (const Error&) {
-      return true;
-    }
-    return false;
-  };
+  const auto refused = [](auto change) { return refuses([](const auto& o) { graded_block(o); }, half_block(), change); };
   using O = GradedBlockOptions;
   EXPECT_FALSE(refused([](O&) {}));
   EXPECT_TRUE(refused([](O& o) { o.cells_in_radius = 0; }));

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "refusals.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -105,16 +106,7 @@ TEST(LabRobot, RefusesWhatTheArmCannotReach) {
 }
 
 TEST(LabRobot, BadOptionsAreRefused) {
-  const auto refused = [](auto change) {
-    LabOptions options = quick();
-    change(options);
-    try {
-      check(options);
-    } catch (const Error&) {
-      return true;
-    }
-    return false;
-  };
+  const auto refused = [](auto change) { return refuses([](const auto& o) { check(o); }, quick(), change); };
   using O = LabOptions;
   EXPECT_FALSE(refused([](O&) {}));
   EXPECT_TRUE(refused([](O& o) { o.joint_std_rad = -1; }));

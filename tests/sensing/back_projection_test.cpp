@@ -10,6 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/camera.hpp"
 #include "palpate/sensing/depth_noise.hpp"
+#include "refusals.hpp"
 
 namespace palpate::sensing {
 namespace {
@@ -172,16 +173,7 @@ TEST(BackProjection, BadInputIsNamed) {
   frame.noise = {};
   EXPECT_THROW(back_project(frame), Error);
 
-  const auto refused = [](auto change) {
-    BackProjectionOptions options;
-    change(options);
-    try {
-      check(options);
-    } catch (const Error&) {
-      return true;
-    }
-    return false;
-  };
+  const auto refused = [](auto change) { return refuses([](const auto& o) { check(o); }, BackProjectionOptions{}, change); };
   using O = BackProjectionOptions;
   EXPECT_FALSE(refused([](O&) {}));
   EXPECT_TRUE(refused([](O& o) { o.min_depth_m = 0; }));

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "palpate/core/error.hpp"
+#include "refusals.hpp"
 
 namespace palpate::sensing {
 namespace {
@@ -91,15 +92,7 @@ TEST(Watch, NamesWhatHappens) {
 }
 
 TEST(PushEventOptions, BadOnesAreRefused) {
-  const auto refused = [](auto options, auto change) {
-    change(options);
-    try {
-      check(options);
-    } catch (const Error&) {
-      return true;
-    }
-    return false;
-  };
+  const auto refused = [](auto options, auto change) { return refuses([](const auto& o) { check(o); }, options, change); };
   using C = ContactOptions;
   using S = SettlingOptions;
   using L = SlipOptions;
