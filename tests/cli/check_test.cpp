@@ -14,6 +14,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/sensing/depth_render.hpp"
+#include "temporary_folder.hpp"
 
 namespace {
 
@@ -89,9 +90,8 @@ struct Answer {
 };
 
 Answer check(const Recording& recording, const std::string& options) {
-  const fs::path folder = fs::path(testing::TempDir()) / "palpate_check_block",
-                 out = fs::path(testing::TempDir()) / "palpate_check.json";
-  fs::remove_all(folder);
+  const test::TemporaryFolder files("check");
+  const fs::path folder = files / "block", out = files / "answer.json";
   io::write_recording(recording, folder);
   const std::string command = std::string(PALPATE_CLI) + " check " + folder.string() + " --json --quiet " + options + " > " +
                               out.string() + " 2> /dev/null";

@@ -14,8 +14,11 @@
 #include <string>
 #include <vector>
 
+#include "temporary_folder.hpp"
+
 namespace {
 
+using palpate::test::TemporaryFolder;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
@@ -26,8 +29,8 @@ struct Outcome {
 };
 
 Outcome palpate(const std::string& arguments) {
-  const auto errors = std::filesystem::path(testing::TempDir()) /
-                      (std::string("stderr_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const TemporaryFolder files("command_line");
+  const auto errors = files / "stderr";
   FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " 2>" + errors.string()).c_str(), "r");
   Outcome outcome;
   std::array<char, 4096> buffer;
@@ -127,8 +130,8 @@ TEST(CommandLine, EveryVerbTakesJsonAndAnswersWrongUsageInIt) {
 }
 
 TEST(CommandLine, ProgressIsQuietLinesWhereThereIsNoTerminal) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "palpate_quiet_lines";
-  std::filesystem::remove_all(folder);
+  const TemporaryFolder files("quiet_lines");
+  const auto folder = files / "out";
   const Outcome outcome = palpate("record --demo -o " + folder.string());
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_THAT(outcome.err, HasSubstr("pressing the object ...\n"));
@@ -140,10 +143,12 @@ TEST(CommandLine, ProgressIsQuietLinesWhereThereIsNoTerminal) {
 }
 
 TEST(CommandLine, ProgressOnATerminalSaysStageAndShare) {
-  if (std::system("script --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "no script(1): there is no terminal to show it on";
-  const auto folder = std::filesystem::path(testing::TempDir()) / "palpate_on_a_terminal";
-  std::filesystem::remove_all(folder);
-  const std::string command = "script -qec '" + std::string(PALPATE_CLI) + " record --demo -o " + folder.string() + "' /dev/null";
+  if (std::system("script --version >/dev/null 2>&1") != 0)
+    GTEST_SKIP() << "no script(1): there is no terminal to show it on";
+  const TemporaryFolder files("on_a_terminal");
+  const auto folder = files / "out";
+  const std::string command =
+      "script -qec '" + std::string(PALPATE_CLI) + " record --demo -o " + folder.string() + "' /dev/null";
   FILE* pipe = popen(command.c_str(), "r");
   std::string seen;
   std::array<char, 4096> buffer;
@@ -155,7 +160,8 @@ TEST(CommandLine, ProgressOnATerminalSaysStageAndShare) {
 }
 
 TEST(CommandLine, BashCompletionOffersVerbsAndTheirOptions) {
-  const auto script = std::filesystem::path(testing::TempDir()) / "palpate_completion.bash";
+  const TemporaryFolder files("completion");
+  const auto script = files / "palpate.bash";
   ASSERT_EQ(palpate("completion bash > " + script.string()).exit_code, 0);
   const auto complete = [&](const std::string& words, int at) {
     const std::string command = "bash -c '. " + script.string() + "; COMP_WORDS=(" + words +

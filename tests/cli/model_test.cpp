@@ -16,6 +16,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/recording.hpp"
+#include "temporary_folder.hpp"
 
 namespace palpate {
 namespace {
@@ -31,9 +32,6 @@ struct Outcome {
 
 class Model : public testing::Test {
  protected:
-  void SetUp() override { fs::create_directories(folder_); }
-  void TearDown() override { fs::remove_all(folder_); }
-
   Outcome run(const std::string& arguments) const {
     const std::string command = std::string(PALPATE_CLI) + " model " + arguments + " --json --quiet 2>/dev/null";
     FILE* pipe = popen(command.c_str(), "r");
@@ -44,8 +42,8 @@ class Model : public testing::Test {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, nlohmann::json::parse(out, nullptr, false)};
   }
 
-  const fs::path folder_ = fs::path(testing::TempDir()) /
-                           (std::string("palpate_model_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const test::TemporaryFolder files_{"model"};
+  const fs::path folder_ = files_.path();
 };
 
 TEST_F(Model, a_surface_in_millimetres_becomes_files_that_can_be_read_back) {

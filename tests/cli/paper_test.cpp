@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "temporary_folder.hpp"
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -19,8 +21,8 @@ int palpate(const std::string& arguments) {
 }
 
 TEST(Paper, BothMethodsAnswerAndAGridJudgesTheBaseline) {
-  const fs::path out = fs::temp_directory_path() / "palpate_paper_test";
-  fs::remove_all(out);
+  const palpate::test::TemporaryFolder files("paper");
+  const fs::path out = files / "out";
   ASSERT_EQ(palpate("--quiet --threads 2 paper --quick --scene cube -o " + out.string()), 0);
   nlohmann::json told;
   std::ifstream(out / "paper.json") >> told;
@@ -38,7 +40,6 @@ TEST(Paper, BothMethodsAnswerAndAGridJudgesTheBaseline) {
   page << std::ifstream(out / "paper.html").rdbuf();
   EXPECT_NE(page.str().find("<svg"), std::string::npos);
   EXPECT_EQ(page.str().find("http"), page.str().find("http://www.w3.org/2000/svg"));  // nothing is fetched
-  fs::remove_all(out);
 }
 
 TEST(Paper, UnknownSceneIsNamedWithTheOnesThereAre) {

@@ -14,6 +14,8 @@
 #include <sstream>
 #include <string>
 
+#include "temporary_folder.hpp"
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -22,14 +24,11 @@ using testing::HasSubstr;
 class Paths : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / ("palpate_paths_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
     fs::create_directories(folder_ / "empty");
     std::ofstream(folder_ / "file") << "not empty\n";
     std::ofstream(folder_ / "cube.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
     std::ofstream(folder_ / "result.json") << "{}";
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   /// What the program says on stderr; `code_` is how it ended.
   std::string say(const std::string& arguments) {
@@ -43,7 +42,8 @@ class Paths : public testing::Test {
     return text.str();
   }
 
-  fs::path folder_;
+  const palpate::test::TemporaryFolder files_{"paths"};
+  const fs::path folder_ = files_.path();
   int code_ = -1;
 };
 
@@ -66,14 +66,16 @@ TEST_F(Paths, MissingInputsAreSaidWithWhatIsWanted) {
 
 TEST_F(Paths, MistypedNamesAreGuessed) {
   EXPECT_THAT(say("info emtpy"), HasSubstr("Did you mean `empty`?"));
-  EXPECT_THAT(say("model " + (folder_ / "cub.obj").string() + " -o new"), HasSubstr("Did you mean `" + (folder_ / "cube.obj").string() + "`?"));
+  EXPECT_THAT(say("model " + (folder_ / "cub.obj").string() + " -o new"),
+              HasSubstr("Did you mean `" + (folder_ / "cube.obj").string() + "`?"));
   EXPECT_THAT(say("info xyzzy"), testing::Not(HasSubstr("Did you mean")));
 }
 
 TEST_F(Paths, FoldersAndFilesInEachOthersPlaceAreSaid) {
   EXPECT_THAT(say("info empty"), HasSubstr("holds no recording.yaml"));
   EXPECT_EQ(code_, 3);
-  EXPECT_THAT(say("predict empty/ --contact 0 0 0 --force 1"), HasSubstr("is not a whole result"));  // OUT beside: its result
+  EXPECT_THAT(say("predict empty/ --contact 0 0 0 --force 1"),
+              HasSubstr("is not a whole result"));  // OUT beside: its result
   EXPECT_EQ(code_, 3);
   fs::remove(folder_ / "result.json");
   EXPECT_THAT(say("predict empty --contact 0 0 0 --force 1"), HasSubstr("holds no result.json; give the folder that"));
@@ -84,8 +86,8 @@ TEST_F(Paths, FoldersAndFilesInEachOthersPlaceAreSaid) {
 
 TEST_F(Paths, OutputsThatCannotBeWrittenAreRefusedBeforeTheWorkBegins) {
   // The recording is not even looked for: an hour of fitting must not end at a closed door.
-  for (const std::string verb : {"estimate /nonexistent -o file", "estimate /nonexistent -o file/below", "record --demo -o file",
-                                 "explore -o file", "demo -o file", "model cube.obj -o file"}) {
+  for (const std::string verb : {"estimate /nonexistent -o file", "estimate /nonexistent -o file/below",
+                                 "record --demo -o file", "explore -o file", "demo -o file", "model cube.obj -o file"}) {
     const std::string said = say(verb);
     EXPECT_EQ(code_, 3) << verb << said;
     EXPECT_THAT(said, HasSubstr("is a file, so nothing can be written into it; give the name of a folder")) << verb;

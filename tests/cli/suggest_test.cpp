@@ -12,6 +12,7 @@
 
 #include "geometry/shapes.hpp"
 #include "palpate/io/recording.hpp"
+#include "temporary_folder.hpp"
 
 namespace {
 
@@ -45,7 +46,8 @@ struct Answer {
 };
 
 Answer suggest(const std::string& folder, const std::string& options) {
-  const fs::path out = fs::path(testing::TempDir()) / "palpate_suggest.json";
+  const test::TemporaryFolder files("suggest_answer");
+  const fs::path out = files / "answer.json";
   const std::string command = std::string(PALPATE_CLI) + " suggest " + folder + " --json --quiet --contacts 6 --tilts 1 " +
                               options + " > " + out.string() + " 2> /dev/null";
   Answer answer;
@@ -57,12 +59,9 @@ Answer suggest(const std::string& folder, const std::string& options) {
 
 class Suggest : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = (fs::path(testing::TempDir()) / "palpate_suggest_box").string();
-    fs::remove_all(folder_);
-    io::write_recording(box_on_table(), folder_);
-  }
-  std::string folder_;
+  void SetUp() override { io::write_recording(box_on_table(), folder_); }
+  const test::TemporaryFolder files_{"suggest"};
+  const std::string folder_ = (files_ / "box").string();
 };
 
 TEST_F(Suggest, BeforeTheFirstTouchPushesAreSortedAndWithinTheLimits) {

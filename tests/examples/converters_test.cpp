@@ -12,6 +12,7 @@
 
 #include "palpate/identify.hpp"
 #include "palpate/io/recording.hpp"
+#include "temporary_folder.hpp"
 
 namespace palpate {
 namespace {
@@ -20,13 +21,6 @@ namespace fs = std::filesystem;
 
 class Converters : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              ("palpate_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path data(const std::string& set) const { return fs::path(PALPATE_SHARED_DIR) / "data" / set; }
 
   /// Exit code of the set's converter.
@@ -38,7 +32,8 @@ class Converters : public ::testing::Test {
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
-  fs::path folder_;
+  const palpate::test::TemporaryFolder files_{"converted"};
+  const fs::path folder_ = files_ / "recording";
 };
 
 struct Expected {

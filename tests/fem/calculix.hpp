@@ -11,6 +11,7 @@
 
 #include "palpate/core/mesh.hpp"
 #include "palpate/fem/materials.hpp"
+#include "temporary_folder.hpp"
 
 namespace palpate::fem {
 
@@ -20,13 +21,10 @@ inline bool calculix_is_there() { return std::system("command -v ccx > /dev/null
 /// Neo-Hookean law (C10 = mu / 2, D1 = 2 / K). NaN where ccx gave no result.
 /// @param other, other_young_pa  elements that are of another E
 inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Index>& held, const VectorX& load,
-                                      bool nonlinear, double young_pa, double poisson,
-                                      const std::vector<Index>& other = {}, double other_young_pa = 0) {
+                                      bool nonlinear, double young_pa, double poisson, const std::vector<Index>& other = {},
+                                      double other_young_pa = 0) {
   const auto nodes = mesh.tetrahedra.cols();
-  const auto folder = std::filesystem::temp_directory_path() /
-                      ("palpate_ccx_" + std::to_string(nodes) + (nonlinear ? "n" : "l") + std::to_string(poisson) + "_" +
-                       std::to_string(mesh.nodes_m.rows()) + "_" + std::to_string(std::rand()));
-  std::filesystem::create_directories(folder);
+  const test::TemporaryFolder folder("ccx");
   {
     std::ofstream out(folder / "job.inp");
     out.precision(12);  // ccx reads 20 characters of a number
@@ -70,7 +68,7 @@ inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Ind
       if (load(d) != 0) out << d / 3 + 1 << ", " << d % 3 + 1 << ", " << load(d) << "\n";
     out << "*NODE PRINT, NSET=ALL, FREQUENCY=999999\nU\n*END STEP\n";
   }
-  const std::string command = "cd '" + folder.string() + "' && OMP_NUM_THREADS=1 ccx job > log 2>&1";
+  const std::string command = "cd '" + folder.path().string() + "' && OMP_NUM_THREADS=1 ccx job > log 2>&1";
   VectorX u = VectorX::Constant(3 * mesh.nodes_m.rows(), std::nan(""));
   if (std::system(command.c_str()) == 0) {
     std::ifstream in(folder / "job.dat");
@@ -81,7 +79,6 @@ inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Ind
       if (words >> node >> value.x() >> value.y() >> value.z()) u.segment<3>(3 * (node - 1)) = value;
     }
   }
-  std::filesystem::remove_all(folder);
   return u;
 }
 

@@ -9,33 +9,19 @@
 #include "palpate/io/cloud_file.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
+#include "temporary_folder.hpp"
 
 namespace palpate::io::test {
 
-/// A folder that goes away with its owner.
-class TemporaryFolder {
+/// A temporary folder that tests put files into.
+class TemporaryFolder : public palpate::test::TemporaryFolder {
  public:
-  explicit TemporaryFolder(const std::string& name)
-      : path_(std::filesystem::temp_directory_path() /
-              ("palpate_" + name + "_" + std::to_string(reinterpret_cast<std::uintptr_t>(this)))) {
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder() {
-    std::error_code code;
-    std::filesystem::remove_all(path_, code);
-  }
-  const std::filesystem::path& path() const { return path_; }
+  using palpate::test::TemporaryFolder::TemporaryFolder;
   void put(const std::string& file, const std::string& bytes) const {
-    std::filesystem::create_directories((path_ / file).parent_path());
-    write_file(path_ / file, bytes);
+    std::filesystem::create_directories((path() / file).parent_path());
+    write_file(path() / file, bytes);
   }
-  std::string get(const std::string& file) const { return read_file(path_ / file); }
-
- private:
-  std::filesystem::path path_;
+  std::string get(const std::string& file) const { return read_file(path() / file); }
 };
 
 /// A cube of 10 cm in five tetrahedra.

@@ -1,6 +1,7 @@
 // label: unit
 // SPDX-License-Identifier: Apache-2.0
-// The page in a browser without a window. Needs node, viewer/node_modules (npm install) and Chromium; says so and skips without.
+// The page in a browser without a window. Needs node, viewer/node_modules (npm install) and Chromium; says so and skips
+// without.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -12,6 +13,7 @@
 
 #include "palpate/report/report.hpp"
 #include "report/pressed_block.hpp"
+#include "temporary_folder.hpp"
 
 namespace {
 
@@ -27,9 +29,6 @@ class Browser : public testing::Test {
     if (!fs::exists(viewer / "node_modules/playwright-core"))
       GTEST_SKIP() << "run `npm install --no-package-lock` in viewer/ to test the page in a browser";
     if (!runs("chromium --version")) GTEST_SKIP() << "no chromium: the page is not tested in a browser";
-    folder_ = fs::path(testing::TempDir()) /
-              ("palpate_browser_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::create_directories(folder_);
   }
 
   /// Runs one check of viewer/test/page.mjs on a page; its complaints are on stderr.
@@ -41,7 +40,8 @@ class Browser : public testing::Test {
     return WEXITSTATUS(status);
   }
 
-  fs::path folder_;
+  const palpate::test::TemporaryFolder files_{"browser"};
+  const fs::path folder_ = files_.path();
 };
 
 TEST_F(Browser, PageShowsTheAnswerAndTheSliderMovesTheMesh) {
@@ -80,8 +80,9 @@ TEST_F(Browser, LivePageFollowsARunningEstimate) {
   ASSERT_TRUE(runs(program + " record --demo -o " + recording.string()));
   const std::string estimate =
       program + " estimate " + recording.string() + " -o " + out.string() + " --element tet4 --refine none --serve 0";
-  const int status = std::system(("node " + (viewer / "test/page.mjs").string() + " live " + (out / "result.json").string() +
-                                  " " + estimate + " 1>&2").c_str());
+  const int status = std::system(
+      ("node " + (viewer / "test/page.mjs").string() + " live " + (out / "result.json").string() + " " + estimate + " 1>&2")
+          .c_str());
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 

@@ -14,6 +14,7 @@
 #include "palpate/report/thinning.hpp"
 #include "palpate/report/words.hpp"
 #include "report/pressed_block.hpp"
+#include "temporary_folder.hpp"
 
 namespace {
 
@@ -23,7 +24,8 @@ using testing::HasSubstr;
 using testing::Not;
 
 json data_of(const std::string& page) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "report_test_page.html";
+  const palpate::test::TemporaryFolder folder("report");
+  const auto file = folder / "page.html";
   std::ofstream(file, std::ios::binary) << page;
   return json::parse(report::read_report_data(file));
 }
