@@ -29,7 +29,7 @@ struct Options {
   std::filesystem::path recording, mapping, out;
   std::string method = "palpate", material, element, refine, regions = "recorded";
   std::vector<double> poisson_range;
-  double poisson_ratio = -2, young_start_pa = 0;
+  double poisson_ratio = -2, young_start_pa = 0, mesh_tolerance = 0.01;
   int max_iterations = 60;
   bool budget = false;
   LiveOptions live;
@@ -65,6 +65,7 @@ IdentifyOptions identify_options(const Options& given, const Session& session) {
   if (given.poisson_range.size() == 2) options.poisson_range = {given.poisson_range[0], given.poisson_range[1]};
   if (given.poisson_ratio > -1.5) options.poisson_fixed = given.poisson_ratio;
   if (given.young_start_pa > 0) options.fit.young_start_pa = given.young_start_pa;
+  options.mesh_tolerance = given.mesh_tolerance;
   options.fit.max_iterations = given.max_iterations;
   options.fit.threads = session.thread_count();
   return options;
@@ -157,6 +158,9 @@ Run verbs::estimate(CLI::App& app) {
       ->check(CLI::IsMember({"tet4", "tet10", "auto"}));
   app.add_option("--refine", given->refine, "none or auto: finer under the tool (overrides the recording's)")
       ->check(CLI::IsMember({"none", "auto"}));
+  app.add_option("--mesh-tolerance", given->mesh_tolerance,
+                 "with refine auto: fit again on a finer mesh while the mesh's own share of E is above this (0.01 = 1 %)")
+      ->check(CLI::PositiveNumber);
   app.add_option("--regions", given->regions,
                  "parts with an E of their own: recorded (what the recording says), by-site (one around each site that was pushed) or none")
       ->check(CLI::IsMember({"recorded", "by-site", "none"}));

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "palpate/estimation/mesh_error.hpp"
+#include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"

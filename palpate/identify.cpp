@@ -3,13 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <map>
 #include <sstream>
 #include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/version.hpp"
-#include "palpate/estimation/mesh_error.hpp"
+#include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/regions.hpp"
@@ -246,6 +247,56 @@ std::map<std::string, std::string> provenance(const Recording& recording, const 
   return said;
 }
 
+/// What the mesh does to E, as a share; nothing where it is not known.
+std::optional<double> mesh_error(const Identification& answer) {
+  for (const BudgetEntry& entry : answer.budget) {
+    if (entry.input == "mesh") return entry.young_modulus_percent / 100;
+  }
+  return std::nullopt;
+}
+
+std::string mesh_words(const estimation::SimulatedObject& object) {
+  return std::to_string(object.mesh.tetrahedra.rows()) + " " + (object.mesh.tetrahedra.cols() == 10 ? "tet10" : "tet4") + ", " +
+         std::to_string(object.mesh.nodes_m.rows()) + " nodes";
+}
+
+/// Fits, and once more on a finer mesh as long as the mesh's share of E is too large. Leaves recording and object as they
+/// were fitted last.
+Identification fit_on_fine_mesh(Recording& recording, estimation::SimulatedObject& object, const estimation::Inputs& observed,
+                                const IdentifyOptions& options, const OnProgress& progress) {
+  constexpr int most_refinements = 3;
+  estimation::FitOptions fit_options = options.fit;
+  std::string history;
+  for (int refinements = 0;; ++refinements) {
+    std::optional<estimation::FinerModel> finer;
+    if (recording.model.refine == "auto") finer = estimation::finer_model(recording, object);
+    Identification answer = estimation::fit(recording, object, observed, fit_options, progress, finer ? &*finer : nullptr);
+    const std::optional<double> error = mesh_error(answer);
+    std::ostringstream percent;
+    if (error) percent << std::setprecision(2) << 100 * *error << " %";
+    const bool too_coarse = error && *error > options.mesh_tolerance && answer.termination == Termination::converged;
+    if (too_coarse && refinements < most_refinements) {
+      if (auto better = estimation::refined_within(recording, object, options.mesh_tolerance)) {
+        history += mesh_words(object) + ": " + percent.str() + " of E; ";
+        recording = std::move(better->recording);
+        object = std::move(better->object);
+        fit_options.young_start_pa = answer.parameters[0].value;
+        fit_options.poisson_start = answer.parameters[1].value;
+        continue;
+      }
+    }
+    answer.provenance["mesh"] = mesh_words(object);
+    answer.provenance["mesh's error in E"] = error ? percent.str() : "not estimated";
+    if (!history.empty()) answer.provenance["coarser meshes"] = history.substr(0, history.size() - 2);
+    if (too_coarse) {
+      answer.verdicts.push_back({"mesh_too_coarse", "The mesh is estimated to put E off by " + percent.str() +
+                                                        ", and no finer one can be had: the interval holds that error; give a finer "
+                                                        "volume mesh to be rid of it."});
+    }
+    return answer;
+  }
+}
+
 }  // namespace
 
 Recording with_overrides(Recording recording, const IdentifyOptions& options) {
@@ -268,6 +319,8 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
          "the elements are tet4, tet10 and auto");
   demand(options.regions == "recorded" || options.regions == "by-site" || options.regions == "none", "regions " + options.regions,
          "regions are those of the recording (recorded), one around each pushed site (by-site), or none");
+  demand(options.mesh_tolerance > 0 && std::isfinite(options.mesh_tolerance), "mesh_tolerance",
+         "must be positive: a share of E, such as 0.01");
   demand(model.refine == "none" || model.refine == "auto", "model.refine " + model.refine, "refinement is none or auto");
   demand(model.poisson_lower >= 0 && model.poisson_upper <= 0.4995 && model.poisson_lower < model.poisson_upper,
          "poisson_range", "the range must lie within 0 and 0.4995, the lower end first");
@@ -348,13 +401,11 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   if (options.method == "paper") recording.regions.clear();  // the paper fits one stiffness
   std::vector<Points> masked_m;
   const estimation::Inputs observed = observe(recording, &masked_m);               // sec. IV-B: point clouds, robot masked
-  const estimation::SimulatedObject object = build_simulated_object(recording, progress);  // sec. IV-C: tetrahedral model
-  std::optional<estimation::FinerModel> finer;
-  if (options.method != "paper" && recording.model.refine == "auto") finer = estimation::finer_model(recording, object);
+  estimation::SimulatedObject object = build_simulated_object(recording, progress);  // sec. IV-C: tetrahedral model
   Identified out;
   out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
                    ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
-                   : estimation::fit(recording, object, observed, options.fit, progress, finer ? &*finer : nullptr);
+                   : fit_on_fine_mesh(recording, object, observed, options, progress);
   for (std::size_t s = 0; s < out.answer.steps.size() && s < masked_m.size(); ++s) {
     out.answer.steps[s].masked_m = std::move(masked_m[s]);
   }

@@ -7,49 +7,11 @@
 #include <map>
 #include <memory>
 
-#include "palpate/fem/boundary.hpp"
-#include "palpate/fem/discretisation.hpp"
-#include "palpate/fem/regions.hpp"
-#include "palpate/geometry/embedding.hpp"
-
 namespace palpate::estimation {
 namespace {
 
-constexpr Index most_uniform = 5000;     // tetrahedra of a mesh that is halved everywhere
-constexpr Index most_growth = 4;         // of the number of nodes, where it is not
 constexpr std::size_t most_steps = 3;    // that are solved on the finer mesh: the highest load of as many pushes
 constexpr double order = 1.5;
-
-double longest_edge_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m) {
-  double longest = 0;
-  for (Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
-    for (int a = 0; a < 4; ++a) {
-      for (int b = a + 1; b < 4; ++b) {
-        const Vec3 from = mesh.nodes_m.row(mesh.tetrahedra(t, a)), to = mesh.nodes_m.row(mesh.tetrahedra(t, b));
-        if ((0.5 * (from + to) - centre_m).norm() < radius_m) longest = std::max(longest, (to - from).norm());
-      }
-    }
-  }
-  return longest;
-}
-
-/// Places and radii of round tools.
-std::vector<std::pair<Vec3, double>> round_contacts(const Recording& recording) {
-  std::vector<std::pair<Vec3, double>> contacts;
-  for (const auto& push : recording.pushes) {
-    for (const auto& step : push.steps) {
-      for (const auto& load : step.loads) {
-        for (const auto& tool : recording.tools) {
-          if (tool.name != load.tool || !(tool.radius_m > 0) || !load.force_n || load.force_n->norm() == 0) continue;
-          const bool known = std::any_of(contacts.begin(), contacts.end(),
-                                         [&](const auto& each) { return (each.first - load.contact_m).norm() < 1e-6; });
-          if (!known) contacts.emplace_back(load.contact_m, tool.radius_m);
-        }
-      }
-    }
-  }
-  return contacts;
-}
 
 /// Highest load of each push; where gravity alone loads, its first step.
 std::vector<char> steps_that_matter(const ForwardModel& model, const std::vector<std::vector<TermRows>>& rows) {
@@ -73,41 +35,6 @@ std::vector<char> steps_that_matter(const ForwardModel& model, const std::vector
 }
 
 }  // namespace
-
-std::optional<FinerModel> finer_model(const Recording& recording, const SimulatedObject& object) {
-  if (!recording.rest.volume || recording.rest.volume->tetrahedra.cols() != 4 || object.mesh.tetrahedra.cols() != 10) {
-    return std::nullopt;
-  }
-  FinerModel finer{recording, {}};
-  TetMesh& volume = *finer.recording.rest.volume;
-  const auto lists_nodes = [](const auto& part) { return !part.vertices.empty(); };
-  const bool by_place = std::none_of(recording.supports.begin(), recording.supports.end(), lists_nodes) &&
-                        std::none_of(recording.tools.begin(), recording.tools.end(), lists_nodes);
-  if (by_place && volume.tetrahedra.rows() <= most_uniform) {
-    volume = fem::refine_uniform(volume);
-  } else {
-    const auto contacts = round_contacts(recording);
-    if (contacts.empty()) return std::nullopt;
-    const Index node_limit = most_growth * static_cast<Index>(volume.nodes_m.rows());
-    for (const auto& [contact_m, radius_m] : contacts) {
-      const double edge_m = longest_edge_near(*recording.rest.volume, contact_m, 1.2 * radius_m);
-      const fem::RefinedMesh refined = fem::refine_near(volume, contact_m, radius_m, 0.5 * edge_m, 1.0, node_limit);
-      for (auto& support : finer.recording.supports) support.vertices = fem::extend_nodes(support.vertices, refined);
-      for (auto& tool : finer.recording.tools) tool.vertices = fem::extend_nodes(tool.vertices, refined);
-      volume = refined.mesh;
-    }
-  }
-  finer.object.mesh = fem::to_quadratic(volume);
-  finer.object.material = object.material;
-  if (!object.region.empty()) {
-    finer.object.region = fem::regions_of(finer.object.mesh, recording.regions, &*recording.rest.volume);
-    finer.object.region_names = object.region_names;
-  }
-  const TriMesh& surface = object.surface.rest();  // the same vertices on both meshes
-  finer.object.surface =
-      SimulatedSurface::embedded(finer.object.mesh, surface, geometry::embed(surface.vertices_m, finer.object.mesh));
-  return finer;
-}
 
 std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objective& objective, const Optimum& optimum,
                                       const Loss& loss, const FinerModel& finer, const FitOptions& options,

@@ -4,23 +4,12 @@
 
 #include <optional>
 
+#include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
 
 namespace palpate::estimation {
-
-/// The same object on a finer mesh; supports and tools name its nodes.
-struct FinerModel {
-  Recording recording;
-  SimulatedObject object;
-};
-
-/// Halves every edge where the mesh has up to 5000 tetrahedra and supports and tools are found by their place; else those
-/// under round tools (within the radius, growing away from it), where most of the error is made.
-/// @param recording  with rest.volume as the fit uses it: linear tetrahedra, of which `object` has the quadratic ones
-/// @returns nothing where the volume is not linear, or there is neither
-std::optional<FinerModel> finer_model(const Recording& recording, const SimulatedObject& object);
 
 /// Change of an answer.
 struct AnswerShift {

@@ -19,6 +19,7 @@ struct PushedBlock {
   RigidOffset clamp;  ///< where the clamp really is
   unsigned seed = 7;
   std::string material = "neo_hookean";
+  int finer = 2;         ///< than the fit's mesh
   double free_half = 1;  ///< stiffness of x > 30 mm over that of the rest
 };
 
@@ -63,7 +64,7 @@ inline SimulatedObject coarse_block(const std::string& material = "neo_hookean")
 
 inline Inputs clouds_of(const PushedBlock& truth, const Recording& recording = pushed_block_recording()) {
   Unknowns unknowns;
-  SimulatedObject object = simulated(fem::to_quadratic(kuhn_block(8, 6, 4, block_size_m)), truth.material);
+  SimulatedObject object = simulated(fem::to_quadratic(kuhn_block(4 * truth.finer, 3 * truth.finer, 2 * truth.finer, block_size_m)), truth.material);
   if (truth.free_half != 1) put_two_halves(object);
   ForwardModel model(recording, object, unknowns);
   VectorX at = unknowns.prior_mean();

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/finer_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "palpate/estimation/held_body.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/fem/discretisation.hpp"
+#include "palpate/fem/regions.hpp"
+#include "palpate/geometry/embedding.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr Index most_uniform = 5000;   // tetrahedra of a mesh that is halved everywhere
+constexpr Index most_growth = 4;       // of the number of nodes, where it is not
+constexpr Index most_corners = 4000;   // of a mesh that is fitted with
+
+struct RoundContact {
+  fem::ContactPatch patch;
+  Vec3 force = Vec3::Zero();
+};
+
+double longest_edge_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m) {
+  double longest = 0;
+  for (Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
+    for (int a = 0; a < 4; ++a) {
+      for (int b = a + 1; b < 4; ++b) {
+        const Vec3 from = mesh.nodes_m.row(mesh.tetrahedra(t, a)), to = mesh.nodes_m.row(mesh.tetrahedra(t, b));
+        if ((0.5 * (from + to) - centre_m).norm() < radius_m) longest = std::max(longest, (to - from).norm());
+      }
+    }
+  }
+  return longest;
+}
+
+/// Places of tools with a radius, and the first force there.
+std::vector<RoundContact> round_contacts(const Recording& recording) {
+  std::vector<RoundContact> contacts;
+  for (const auto& push : recording.pushes) {
+    for (const auto& step : push.steps) {
+      for (const auto& load : step.loads) {
+        for (const auto& tool : recording.tools) {
+          if (tool.name != load.tool || !(tool.radius_m > 0) || !load.force_n || load.force_n->norm() == 0) continue;
+          const bool known = std::any_of(contacts.begin(), contacts.end(), [&](const RoundContact& each) {
+            return (each.patch.centre_m - load.contact_m).norm() < 1e-6;
+          });
+          if (known) continue;
+          const bool bar = tool.shape == ToolShape::capsule || tool.shape == ToolShape::edge;
+          contacts.push_back(
+              {{load.contact_m, tool.radius_m, bar ? Vec3(0.5 * tool.length_m * tool.axis) : Vec3(Vec3::Zero())}, *load.force_n});
+        }
+      }
+    }
+  }
+  return contacts;
+}
+
+bool lists_nodes(const Recording& recording) {
+  const auto lists = [](const auto& part) { return !part.vertices.empty(); };
+  return std::any_of(recording.supports.begin(), recording.supports.end(), lists) ||
+         std::any_of(recording.tools.begin(), recording.tools.end(), lists);
+}
+
+bool may_be_finer(const Recording& recording, const SimulatedObject& object) {
+  return recording.rest.volume && recording.rest.volume->tetrahedra.cols() == 4 && object.mesh.tetrahedra.cols() == 10;
+}
+
+void take(Recording& recording, const fem::RefinedMesh& refined) {
+  for (auto& support : recording.supports) support.vertices = fem::extend_nodes(support.vertices, refined);
+  for (auto& tool : recording.tools) tool.vertices = fem::extend_nodes(tool.vertices, refined);
+  recording.rest.volume = refined.mesh;
+}
+
+/// The object on a recording's finer volume; `object` gives everything else.
+FinerModel on_volume(Recording finer, const Recording& recording, const SimulatedObject& object) {
+  FinerModel out{std::move(finer), {}};
+  out.object.mesh = fem::to_quadratic(*out.recording.rest.volume);
+  out.object.material = object.material;
+  if (!object.region.empty()) {
+    out.object.region = fem::regions_of(out.object.mesh, recording.regions, &*recording.rest.volume);
+    out.object.region_names = object.region_names;
+  }
+  const TriMesh& surface = object.surface.rest();  // the same vertices on both meshes
+  out.object.surface =
+      SimulatedSurface::embedded(out.object.mesh, surface, geometry::embed(surface.vertices_m, out.object.mesh));
+  return out;
+}
+
+}  // namespace
+
+std::optional<FinerModel> finer_model(const Recording& recording, const SimulatedObject& object) {
+  if (!may_be_finer(recording, object)) return std::nullopt;
+  Recording finer = recording;
+  TetMesh& volume = *finer.rest.volume;
+  if (!lists_nodes(recording) && volume.tetrahedra.rows() <= most_uniform) {
+    volume = fem::refine_uniform(volume);
+  } else {
+    const auto contacts = round_contacts(recording);
+    if (contacts.empty()) return std::nullopt;
+    const Index node_limit = most_growth * static_cast<Index>(volume.nodes_m.rows());
+    for (const auto& [patch, force] : contacts) {
+      const double edge_m = longest_edge_near(*recording.rest.volume, patch.centre_m, 1.2 * patch.radius_m);
+      take(finer, fem::refine_near(volume, patch.centre_m, patch.radius_m, 0.5 * edge_m, 1.0, node_limit));
+    }
+  }
+  return on_volume(std::move(finer), recording, object);
+}
+
+std::optional<FinerModel> refined_within(const Recording& recording, const SimulatedObject& object, double tolerance) {
+  if (!may_be_finer(recording, object)) return std::nullopt;
+  fem::DiscretisationOptions options;
+  options.tolerance = tolerance;
+  options.node_limit = most_corners;
+  options.poisson_ratio = recording.model.poisson_fixed.value_or(0.3);
+  Recording finer = recording;
+  bool changed = false;
+  for (const auto& [patch, force] : round_contacts(recording)) {
+    const auto boundary_on = [&, &where = patch](const TetMesh& mesh, const fem::RefinedMesh& linear) {
+      fem::Boundary boundary;
+      boundary.forces = fem::spread_over_patch(mesh, where);
+      boundary.inertia_relief = recording.free;
+      if (recording.free) return boundary;
+      auto supports = finer.supports;
+      for (auto& support : supports) support.vertices = fem::extend_nodes(support.vertices, linear);
+      boundary.constraints = hold(mesh, supports, {}).constraints;
+      return boundary;
+    };
+    const fem::Discretisation chosen = fem::discretise(*finer.rest.volume, patch, boundary_on, force.normalized(), options);
+    if (chosen.base_young_error <= options.tolerance) continue;
+    take(finer, chosen.linear);
+    changed = true;
+  }
+  if (!changed) {
+    if (lists_nodes(recording) || recording.rest.volume->tetrahedra.rows() > most_uniform) return std::nullopt;
+    finer.rest.volume = fem::refine_uniform(*recording.rest.volume);
+    if (finer.rest.volume->nodes_m.rows() > most_corners) return std::nullopt;
+  }
+  return on_volume(std::move(finer), recording, object);
+}
+
+}  // namespace palpate::estimation

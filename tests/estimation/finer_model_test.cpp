@@ -1,0 +1,101 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// A fit whose mesh puts E off by more than was asked for is done again on a finer one, and says so.
+#include "palpate/estimation/finer_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/identify.hpp"
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+class FinerMesh : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    PushedBlock truth;
+    truth.material = "linear";
+    truth.sigma_m = 1e-5;
+    truth.points = 600;
+    truth.finer = 3;
+    recording = pushed_block_recording();
+    recording.model.material = "linear";
+    recording.model.poisson_lower = 0.2;  // fewer factorisations
+    recording.model.poisson_upper = 0.4;
+    recording.rest.volume = kuhn_block(4, 3, 2, block_size_m);
+    const Inputs inputs = clouds_of(truth);
+    for (std::size_t s = 0; s < inputs.size(); ++s)
+      recording.pushes[0].steps[s].observations = {std::get<PointCloud>(inputs[s][0])};
+    young_pa = truth.young_pa;
+  }
+  static Identified within(double tolerance) {
+    IdentifyOptions options;
+    options.mesh_tolerance = tolerance;
+    options.fit.cross_checks = options.fit.stresses = false;
+    return identify(recording, options);
+  }
+  static double share(const Identification& answer) {
+    for (const auto& entry : answer.budget)
+      if (entry.input == "mesh") return entry.young_modulus_percent / 100;
+    return -1;
+  }
+  static Recording recording;
+  static double young_pa;
+};
+Recording FinerMesh::recording;
+double FinerMesh::young_pa = 0;
+
+TEST_F(FinerMesh, IsTakenUntilTheErrorInYoungsModulusIsAsSmallAsAskedFor) {
+  const Identified coarse = within(1), fine = within(0.005);
+  EXPECT_EQ(coarse.volume.tetrahedra.rows(), 144);
+  EXPECT_EQ(coarse.answer.provenance.count("coarser meshes"), 0u);
+  ASSERT_GT(share(coarse.answer), 0.005);
+
+  EXPECT_GT(fine.volume.tetrahedra.rows(), 144);
+  EXPECT_LT(share(fine.answer), 0.005);
+  EXPECT_FALSE(says(fine.answer, "mesh_too_coarse"));
+  EXPECT_NE(fine.answer.provenance.at("coarser meshes").find("144 tet10"), std::string::npos);
+  EXPECT_EQ(fine.answer.provenance.at("mesh").find(std::to_string(fine.volume.tetrahedra.rows()) + " tet10"), 0u);
+  const auto error = [&](const Identified& found) { return std::abs(std::log(found.answer.parameters[0].value / young_pa)); };
+  EXPECT_LT(error(fine), 0.01) << "the promise, and as much again for noise and the mesh of the truth";
+  EXPECT_LT(error(fine), 0.5 * error(coarse));
+  RecordProperty("coarse_error_percent", std::to_string(100 * error(coarse)));
+  RecordProperty("coarse_estimate_percent", std::to_string(100 * share(coarse.answer)));
+  RecordProperty("fine_error_percent", std::to_string(100 * error(fine)));
+  RecordProperty("fine_estimate_percent", std::to_string(100 * share(fine.answer)));
+}
+
+TEST_F(FinerMesh, IsNotTakenWhereTheMeshIsToStayAsItIs) {
+  Recording kept = recording;
+  kept.model.refine = "none";
+  IdentifyOptions options;
+  options.fit.cross_checks = options.fit.stresses = false;
+  const Identified found = identify(kept, options);
+  EXPECT_EQ(found.volume.tetrahedra.rows(), 144);
+  EXPECT_EQ(found.answer.provenance.at("mesh's error in E"), "not estimated");
+}
+
+// Where tools are not what makes the error, every edge is halved, up to a size that can be fitted with.
+TEST_F(FinerMesh, IsEverywhereWhereToolsAreFineEnough) {
+  Recording now = recording;
+  SimulatedObject object = simulated(fem::to_quadratic(*now.rest.volume), "linear");
+  for (const Index tetrahedra : {8 * 144, 64 * 144}) {
+    auto finer = refined_within(now, object, 10);
+    ASSERT_TRUE(finer);
+    EXPECT_EQ(finer->object.mesh.tetrahedra.rows(), tetrahedra);
+    EXPECT_EQ(finer->object.surface.vertex_count(), object.surface.vertex_count());
+    now = std::move(finer->recording);
+    object = std::move(finer->object);
+  }
+  EXPECT_FALSE(refined_within(now, object, 10));
+  IdentifyOptions options;
+  options.mesh_tolerance = 0;
+  EXPECT_THROW(identify(recording, options), Error);
+}
+
+}  // namespace
+}  // namespace palpate::estimation
