@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
-#include "palpate/fem/contact/contact_problem.hpp"
+#include "palpate/fem/contact/contact_path.hpp"
 
 namespace palpate::fem {
 namespace {
@@ -45,7 +45,7 @@ struct ContactStatics::Impl {
 
   // One increment from an equilibrium; `s` and `memory` are changed only when it converges.
   std::string increment(const ContactProblem& p, const ContactLoads& from, const ContactLoads& to, ContactState& s,
-                        std::vector<TouchMemory>& memory, ContactEquilibrium& out) {
+                        std::vector<TouchMemory>& memory, ContactEquilibrium& out, std::vector<ContactIncrement>& path) {
     const auto count = system.contacts.size();
     ContactState next = s;
     std::vector<TouchMemory> next_memory = memory;
@@ -77,6 +77,8 @@ struct ContactStatics::Impl {
       reason = system.newton(p, next_memory, next, out);
     }
     if (!reason.empty()) return reason;
+    if (!remembers && path.size() > 1) path.pop_back();  // only the last one matters
+    path.push_back({0, to, next.u, next.poses, next_memory});
     for (std::size_t c = 0; c < count; ++c)
       system.terms.end_increment(system.body(c, p.m, next.poses[c], next_memory), next.u, next_memory[c]);
     s = std::move(next);
@@ -137,6 +139,7 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
     }
   }
 
+  std::vector<ContactIncrement> path{{0, start, s.u, s.poses, memory}};
   double done = 0, step = 1.0 / system.options.increments;
   const double smallest = step * std::pow(0.5, system.options.max_halvings);
   ContactLoads last = start;
@@ -144,9 +147,10 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
     const double next = done + step > 1 - 1e-9 ? 1 : done + step;
     const ContactLoads part = between(start, loads, next);
     const ContactProblem p = system.problem(young_modulus_pa, poisson_ratio, part, extra);
-    const std::string reason = impl_->increment(p, last, part, s, memory, out);
+    const std::string reason = impl_->increment(p, last, part, s, memory, out, path);
     if (reason.empty()) {
       ++out.increments;
+      path.back().share = next;
       done = next;
       last = part;
       step = std::min(2 * step, 1.0 / system.options.increments);
@@ -185,12 +189,41 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
     out.touches.push_back(std::move(touch));
   }
   out.increments_from_rest = out.increments + (from ? from->increments_from_rest : 0);
+  out.path = std::make_shared<const std::vector<ContactIncrement>>(std::move(path));
   out.memory = std::make_shared<const std::vector<TouchMemory>>(std::move(memory));
   return out;
 }
 
 ContactSensitivity ContactStatics::sensitivity(const ContactEquilibrium& at) const {
-  return sensitivity_of(impl_->system, at);
+  return sensitivity_of(impl_->system, *this, at);
+}
+
+ContactLoadsAlong ContactStatics::no_loads_along(Index parameters) const {
+  const ContactSystem& system = impl_->system;
+  ContactLoadsAlong along;
+  along.log_young = along.poisson = VectorX::Zero(parameters);
+  along.force_coefficients = MatrixX::Zero(static_cast<Index>(system.boundary.forces.cols()), parameters);
+  along.motion_coefficients = MatrixX::Zero(static_cast<Index>(system.motions.cols()), parameters);
+  along.motion.assign(system.contacts.size(), MatrixX::Zero(6, parameters));
+  along.wrench = along.motion;
+  along.radius.assign(system.contacts.size(), along.log_young);
+  return along;
+}
+
+ContactPathSensitivity ContactStatics::rest_along(Index parameters) const {
+  const ContactSystem& system = impl_->system;
+  ContactPathSensitivity rest;
+  rest.loads = no_loads_along(parameters);
+  rest.displacement = MatrixX::Zero(3 * static_cast<Index>(system.mesh.nodes_m.rows()), parameters);
+  rest.wrench = rest.motion = rest.loads.motion;
+  rest.motion_reaction = rest.loads.motion_coefficients;
+  rest.anchors.resize(system.contacts.size());
+  return rest;
+}
+
+ContactPathSensitivity ContactStatics::sensitivity_along(const ContactEquilibrium& at, const ContactLoadsAlong& along,
+                                                         const ContactPathSensitivity& from) const {
+  return path_sensitivity(impl_->system, at, *at.path, along, from);
 }
 
 }  // namespace palpate::fem

@@ -10,6 +10,7 @@
 
 #include <memory>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "palpate/fem/contact/contact_terms.hpp"
@@ -68,6 +69,15 @@ struct TouchResult {
   VectorX patch_pressure_pa;
 };
 
+/// End of one increment, for derivatives.
+struct ContactIncrement {
+  double share = 0;  ///< of the load step, 0 at its start
+  ContactLoads loads;
+  VectorX displacement_m;
+  std::vector<Pose> poses;
+  std::vector<TouchMemory> memory;  ///< anchors as the increment began with them, friction limits as it ended
+};
+
 struct ContactEquilibrium {
   VectorX displacement_m;  ///< 3n
   double young_modulus_pa = 0, poisson_ratio = 0;
@@ -83,11 +93,37 @@ struct ContactEquilibrium {
   int inverted_elements = 0;
   double residual = 0;
   std::shared_ptr<const std::vector<TouchMemory>> memory;  ///< what the next step of a sequence starts from
+  /// Where this load step started, and its increments (the last one alone where nothing depends on the path).
+  std::shared_ptr<const std::vector<ContactIncrement>> path;
 };
 
-/// Exact derivatives at a frictionless, bonded or sticking equilibrium, away from changes of the active set. One column a
-/// parameter: log E, nu, force coefficients, motion coefficients, then for every contact 6 of its pose (a shift of the tip,
-/// a rotation about it), 6 of its wrench, 1 of its radius.
+/// Derivatives of one load step's loads, and of E, nu and radii, to q parameters.
+struct ContactLoadsAlong {
+  VectorX log_young, poisson;                       ///< q
+  MatrixX force_coefficients, motion_coefficients;  ///< rows as in ContactLoads, q columns
+  std::vector<MatrixX> motion, wrench;              ///< 6 x q, one a contact
+  std::vector<VectorX> radius;                      ///< q, one a contact
+};
+
+/// Of what points of one contact stick to, tool frame.
+struct AnchorSensitivity {
+  std::unordered_map<std::size_t, Index> row_of;  ///< a surface point that touches: first of three rows
+  MatrixX anchor, normal;                         ///< 3 rows a point, q columns
+};
+
+/// Derivatives of a state at the end of a sequence of load steps to q parameters; handed on from step to step.
+struct ContactPathSensitivity {
+  MatrixX displacement;                ///< 3n x q
+  std::vector<MatrixX> wrench;         ///< 6 x q, one a contact
+  std::vector<MatrixX> motion;         ///< 6 x q: twist of the tool
+  MatrixX motion_reaction;             ///< m x q
+  std::vector<AnchorSensitivity> anchors;
+  ContactLoadsAlong loads;             ///< of the step that ends here
+};
+
+/// Exact derivatives away from changes of what touches and slides. One column a parameter: log E, nu, force coefficients,
+/// motion coefficients, then for every contact 6 of its pose (a shift of the tip, a rotation about it), 6 of its wrench, 1 of
+/// its radius.
 struct ContactSensitivity {
   MatrixX displacement;         ///< 3n x p
   std::vector<MatrixX> wrench;  ///< 6 x p, one a contact
@@ -114,8 +150,18 @@ class ContactStatics {
   ContactEquilibrium solve(double young_modulus_pa, double poisson_ratio, const ContactLoads& loads,
                            const ContactEquilibrium* from = nullptr, const VectorX& extra = {}) const;
 
-  /// @throws Error for contacts with Coulomb friction, and for sticking ones after more than one increment
+  /// Of one load step from rest; of the end of any sequence where no contact remembers (frictionless, bonded).
+  /// @throws Error for contacts with friction or sticking ones in a state that another one led to: use sensitivity_along
   ContactSensitivity sensitivity(const ContactEquilibrium& at) const;
+
+  /// All zeros, of the right sizes: loads that do not depend on q parameters, and the derivatives of the state of rest.
+  ContactLoadsAlong no_loads_along(Index parameters) const;
+  ContactPathSensitivity rest_along(Index parameters) const;
+  /// Derivatives at the end of a load step, by the implicit function theorem in each of its increments.
+  /// @param from  at its start (rest_along, or the derivatives of the state that it started from); may have fewer
+  ///              parameters, of which the others come after
+  ContactPathSensitivity sensitivity_along(const ContactEquilibrium& at, const ContactLoadsAlong& along,
+                                           const ContactPathSensitivity& from) const;
 
   const std::vector<RigidContact>& contacts() const;
   const TetMesh& mesh() const;

@@ -1,7 +1,7 @@
 // label: contract
 // SPDX-License-Identifier: Apache-2.0
 // Exact sensitivities of contact states against central differences, with steps that leave the active set alone, for every
-// shape, driven by pose and by force, frictionless, sticking and bonded.
+// shape, driven by pose and by force, frictionless, with Coulomb friction, sticking and bonded; and along sequences of steps.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -43,6 +43,9 @@ std::vector<Scene> scenes() {
           {"capsule_force", [](double r) { return capsule_shape(r, 0.03); }, 0.02, Touch::frictionless, true, "neo_hookean"},
           {"edge_pose", [](double r) { return edge_shape(r, 0.04); }, 0.012, Touch::frictionless, false, "neo_hookean"},
           {"mesh_force", [](double) { return mesh_shape(wedge(), 0.006); }, 0.02, Touch::frictionless, true, "neo_hookean"},
+          {"sphere_friction_pose", sphere, 0.03, Touch::friction, false, "neo_hookean"},
+          {"sphere_friction_force", sphere, 0.03, Touch::friction, true, "linear"},
+          {"disc_friction_force", [](double r) { return disc_shape(r); }, 0.02, Touch::friction, true, "neo_hookean"},
           {"platen_bonded_force", [](double) { return plane_shape(); }, 0.02, Touch::bonded, true, "neo_hookean"}};
 }
 
@@ -67,6 +70,7 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
     RigidContact tool;
     tool.shape = scene.shape(p.radius);
     tool.law = scene.law;
+    tool.friction_coefficient = 0.15;
     tool.bond_reach_m = 1e-4;
     tool.T_base_tool = tool_pose(Vec3(0.047, 0.052, 0.075), bonded ? Vec3(0, 0, -1) : Vec3(0.05, -0.08, -1));
     tool.T_base_tool.translation() += p.shift.head<3>();
@@ -76,6 +80,8 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
     if (scene.by_force) tool.free_axes = bonded ? MatrixX(MatrixX::Identity(6, 6)) : along(Vec3(0, 0, -1));
     ContactOptions options;
     options.statics.residual_tolerance = 1e-12;
+    options.friction_tolerance = 1e-12;
+    if (scene.law == Touch::friction) options.increments = 3;  // slips in each
     const ContactStatics body(mesh, scene.material, boundary, {tool}, options);
     ContactLoads loads = body.no_loads();
     loads.force_coefficients = p.weight;
@@ -84,6 +90,10 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
     ContactEquilibrium e = body.solve(std::exp(p.log_young), p.poisson, loads);
     EXPECT_TRUE(e.converged) << e.reason;
     EXPECT_GT(e.touches[0].active_points, 20);
+    if (scene.law == Touch::friction) {
+      EXPECT_GE(e.touches[0].slipping_points, 5);
+      EXPECT_LE(e.touches[0].slipping_points, e.touches[0].active_points - 5) << "some stick, some slide";
+    }
     if (sensitivity) *sensitivity = body.sensitivity(e);
     return e;
   };
@@ -118,6 +128,65 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, ContactSensitivityContract, testing::ValuesIn(scenes()),
                          [](const auto& each) { return std::string(each.param.name); });
+
+// A block on a table with friction: its weight, then a push aside and down in two steps, the second one back a little. What it
+// does at the end depends on every step before.
+TEST(ContactPath, CarriesDerivativesThroughStepsInSequence) {
+  const TetMesh mesh = to_quadratic(distorted(block_mesh(4, 3, 2, {0.08, 0.06, 0.04}), 0.002, 5));
+  Boundary boundary;
+  const auto top = nodes_where(mesh, [](const Vec3& x) { return x.z() > 0.039; });
+  boundary.forces = hstack({body_force(mesh), spread_over_nodes(static_cast<Index>(mesh.nodes_m.rows()), top)});
+  RigidContact table;
+  table.shape = plane_shape();
+  table.T_base_tool = tool_pose(Vec3(0, 0, 0.0005), Vec3::UnitZ());  // pressed in a little, so that all of it touches
+  table.law = Touch::friction;
+  table.friction_coefficient = 0.3;
+  ContactOptions options;
+  options.statics.residual_tolerance = options.friction_tolerance = 1e-12;
+  options.increments = 2;
+  const ContactStatics body(mesh, "neo_hookean", boundary, {table}, options);
+  // Parameters: log E, nu, density, push aside of the first push and of the second, all in sequence.
+  const auto run = [&](const VectorX& p, ContactPathSensitivity* d) {
+    ContactLoads loads = body.no_loads();
+    loads.force_coefficients = VectorX::Zero(6);
+    ContactEquilibrium e;
+    for (int step = 0; step < 3; ++step) {
+      loads.force_coefficients(2) = -9.81 * p(2);
+      if (step == 1) loads.force_coefficients.tail<3>() = Vec3(p(3), 0, -2);
+      if (step == 2) loads.force_coefficients.tail<3>() = Vec3(p(3) - 0.25, p(4), -2.2);
+      const ContactEquilibrium last = e;
+      e = body.solve(std::exp(p(0)), p(1), loads, step > 0 ? &last : nullptr);
+      EXPECT_TRUE(e.converged) << step << ": " << e.reason;
+      if (d == nullptr) continue;
+      const Index known = step == 0 ? 3 : step == 1 ? 4 : 5;  // parameters come as the steps need them
+      ContactLoadsAlong along = body.no_loads_along(known);
+      along.log_young(0) = along.poisson(1) = 1;
+      along.force_coefficients(2, 2) = -9.81;
+      if (step >= 1) along.force_coefficients(3, 3) = 1;
+      if (step == 2) along.force_coefficients(4, 4) = 1;
+      *d = body.sensitivity_along(e, along, step == 0 ? body.rest_along(known) : *d);
+    }
+    return e;
+  };
+  VectorX at(5);
+  at << std::log(20000.0), 0.35, 1100, 0.55, 0.1;
+  ContactPathSensitivity d;
+  const ContactEquilibrium base = run(at, &d);
+  EXPECT_GT(base.touches[0].slipping_points, 20);
+  EXPECT_LT(base.touches[0].slipping_points, base.touches[0].active_points - 20);
+  ASSERT_EQ(d.displacement.cols(), 5);
+  for (Index k = 0; k < 5; ++k) {
+    VectorX up = at, down = at;
+    const double step = k == 2 ? 1e-3 : 1e-6;
+    up(k) += step;
+    down(k) -= step;
+    const ContactEquilibrium a = run(up, nullptr), b = run(down, nullptr);
+    const VectorX du = (a.displacement_m - b.displacement_m) / (2 * step);
+    const Vec6 dw = (a.touches[0].wrench - b.touches[0].wrench) / (2 * step);
+    EXPECT_LT((du - d.displacement.col(k)).norm(), 1e-3 * du.norm()) << k;
+    EXPECT_LT((dw - d.wrench[0].col(k)).norm(), 1e-3 * dw.norm() + 1e-6) << k;
+  }
+}
 
 }  // namespace
 }  // namespace palpate::fem

@@ -90,8 +90,6 @@ class ContactSystem {
   double proximal_ = 0, diagonal_ = 0;
 };
 
-ContactSensitivity sensitivity_of(ContactSystem& system, const ContactEquilibrium& at);
-
 /// The pose moved by a twist: tip translated, rotated about the tip.
 Pose moved(const Pose& pose, const Vec6& twist);
 

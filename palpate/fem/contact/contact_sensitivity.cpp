@@ -1,35 +1,91 @@
 // SPDX-License-Identifier: Apache-2.0
-// Implicit function theorem on body and tools together.
+// Load steps as paths of increments, and the parameters that every contact has.
+#include <algorithm>
+
 #include "palpate/core/error.hpp"
-#include "palpate/fem/contact/contact_problem.hpp"
+#include "palpate/fem/contact/contact_path.hpp"
 
 namespace palpate::fem {
+namespace {
 
-ContactSensitivity sensitivity_of(ContactSystem& system, const ContactEquilibrium& at) {
-  const auto count = system.contacts.size();
-  if (at.displacement_m.size() != 3 * system.mesh.nodes_m.rows() || at.touches.size() != count || !at.memory)
-    throw Error("is not a state of this mesh and these contacts", "sensitivity.at");
-  for (std::size_t c = 0; c < count; ++c) {
-    const Touch law = system.contacts[c].law;
-    if (law == Touch::friction)
-      throw Error("friction has no exact derivatives here: difference two solutions, or let the contact slide or stick",
-                  "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
-    if (law == Touch::sticking && at.increments_from_rest != 1)
-      throw Error(
-          "a sticking contact has exact derivatives after one increment from rest only (its anchors then do not depend "
-          "on the path): set increments to 1",
-          "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
+void widen(MatrixX& matrix, Index columns) {
+  const Index had = static_cast<Index>(matrix.cols());
+  matrix.conservativeResize(matrix.rows(), columns);
+  matrix.rightCols(columns - had).setZero();
+}
+
+void widen(VectorX& vector, Index size) {
+  const Index had = static_cast<Index>(vector.size());
+  vector.conservativeResize(size);
+  vector.tail(size - had).setZero();
+}
+
+void widen(ContactPathSensitivity& d, Index q) {
+  widen(d.displacement, q);
+  widen(d.motion_reaction, q);
+  for (auto& each : d.wrench) widen(each, q);
+  for (auto& each : d.motion) widen(each, q);
+  for (auto& each : d.anchors) {
+    widen(each.anchor, q);
+    widen(each.normal, q);
   }
-  const ContactProblem p = system.problem(at.young_modulus_pa, at.poisson_ratio, at.loads, at.extra);
-  ContactState s;
-  s.u = at.displacement_m;
-  for (const TouchResult& touch : at.touches) s.poses.push_back(touch.T_base_tool);
-  s.travelled = VectorX::Zero(system.first_axis.back());
-  if (!system.evaluate(p, *at.memory, s)) throw Error("holds inverted elements", "sensitivity.at");
-  ContactTangent t;
-  system.tangent(p, *at.memory, s, false, t);
-  if (!system.factorise(t, 0, 1e-9)) throw Error("the equilibrium is not stable: it has no derivative", "sensitivity.at");
+  widen(d.loads.log_young, q);
+  widen(d.loads.poisson, q);
+  widen(d.loads.force_coefficients, q);
+  widen(d.loads.motion_coefficients, q);
+  for (auto& each : d.loads.motion) widen(each, q);
+  for (auto& each : d.loads.wrench) widen(each, q);
+  for (auto& each : d.loads.radius) widen(each, q);
+}
 
+ContactLoadsAlong between(const ContactLoadsAlong& a, const ContactLoadsAlong& b, double t) {
+  ContactLoadsAlong out = b;  // E, nu and radii are those of the whole step
+  out.force_coefficients = (1 - t) * a.force_coefficients + t * b.force_coefficients;
+  out.motion_coefficients = (1 - t) * a.motion_coefficients + t * b.motion_coefficients;
+  for (std::size_t c = 0; c < b.motion.size(); ++c) {
+    out.motion[c] = (1 - t) * a.motion[c] + t * b.motion[c];
+    out.wrench[c] = (1 - t) * a.wrench[c] + t * b.wrench[c];
+  }
+  return out;
+}
+
+bool remembers(Touch law) { return law == Touch::friction || law == Touch::sticking; }
+
+}  // namespace
+
+ContactPathSensitivity path_sensitivity(ContactSystem& system, const ContactEquilibrium& at,
+                                        const std::vector<ContactIncrement>& path, const ContactLoadsAlong& along,
+                                        const ContactPathSensitivity& from) {
+  const Index q = static_cast<Index>(along.log_young.size());
+  if (from.displacement.rows() != 3 * static_cast<Index>(system.mesh.nodes_m.rows()) || from.displacement.cols() > q)
+    throw Error("has other nodes than the mesh, or more parameters than `along`", "sensitivity_along.from");
+  if (along.motion.size() != system.contacts.size() || along.wrench.size() != system.contacts.size())
+    throw Error("needs one entry a contact: start from no_loads_along", "sensitivity_along.along");
+  ContactPathSensitivity d = from;
+  widen(d, q);
+  const ContactLoadsAlong start = d.loads;
+  ContactLoadsAlong last = start;
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const ContactLoadsAlong next = between(start, along, path[i].share);
+    advance(system, at, path[i - 1], path[i], last, next, d);
+    last = next;
+  }
+  d.loads = along;
+  return d;
+}
+
+ContactSensitivity sensitivity_of(ContactSystem& system, const ContactStatics& statics, const ContactEquilibrium& at) {
+  const auto count = system.contacts.size();
+  if (at.displacement_m.size() != 3 * system.mesh.nodes_m.rows() || at.touches.size() != count || !at.path || at.path->size() < 2)
+    throw Error("is not a state of this mesh and these contacts", "sensitivity.at");
+  bool path_matters = false;
+  for (std::size_t c = 0; c < count; ++c) {
+    if (!remembers(system.contacts[c].law)) continue;
+    path_matters = true;
+    if (at.increments_from_rest != at.increments)
+      throw Error("depends on the steps before: hand the derivatives on from step to step with sensitivity_along",
+                  "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
+  }
   ContactSensitivity out;
   const Index forces = static_cast<Index>(system.boundary.forces.cols()), driven = static_cast<Index>(system.motions.cols());
   Index columns = 2;
@@ -43,56 +99,28 @@ ContactSensitivity sensitivity_of(ContactSystem& system, const ContactEquilibriu
     columns += 12;
     out.radius.push_back(system.contacts[c].shape->has_radius() ? columns++ : -1);
   }
-
-  // Change of every force at fixed u and z: on nodes, and on the tools along all axes.
-  MatrixX change = MatrixX::Zero(s.u.size(), columns), tool_rhs = MatrixX::Zero(system.first_axis.back(), columns);
-  std::vector<MatrixX> gradient(count, MatrixX::Zero(6, columns));
-  change.col(out.log_young) = s.internal + s.touching;  // all of it is proportional to E
-  change.col(out.poisson) = system.assembly.forces_d_poisson(system.law, p.m, s.u);
-  change.middleCols(out.first_force, forces) -= MatrixX(system.boundary.forces);
-  for (Index k = 0; k < driven; ++k)
-    change.col(out.first_motion + k) = system.assembly.multiply(t.blocks, system.motions.col(k));
+  ContactLoadsAlong along = statics.no_loads_along(columns);
+  along.log_young(out.log_young) = along.poisson(out.poisson) = 1;
+  along.force_coefficients.middleCols(out.first_force, forces).setIdentity();
+  along.motion_coefficients.middleCols(out.first_motion, driven).setIdentity();
+  ContactPathSensitivity rest = statics.rest_along(columns);
   for (std::size_t c = 0; c < count; ++c) {
-    const TouchingBody body = system.body(c, p.m, s.poses[c], *at.memory);
-    gradient[c].col(out.log_young) = s.gradients[c];
-    for (Index k = 0; k < driven; ++k)
-      gradient[c].col(out.first_motion + k) = t.tools[c].coupling.transpose() * system.motions.col(k);
-    MatrixX by_pose = t.tools[c].coupling;
-    Eigen::Matrix<double, 6, 6> gradient_by_pose = t.tools[c].hessian;
-    system.terms.anchors_d_pose(body, s.u, system.contacts[c].T_base_tool.linear(), by_pose, gradient_by_pose);
-    change.middleCols(out.first_pose[c], 6) = by_pose;
-    gradient[c].middleCols(out.first_pose[c], 6) = gradient_by_pose;
-    const MatrixX& axes = system.contacts[c].free_axes;
-    tool_rhs.block(system.first_axis[c], out.first_wrench[c], axes.cols(), 6) = axes.transpose();
-    if (out.radius[c] < 0) continue;
-    VectorX by_radius = VectorX::Zero(s.u.size());
-    Vec6 gradient_by_radius = Vec6::Zero();
-    system.terms.d_radius(body, s.u, by_radius, gradient_by_radius);
-    change.col(out.radius[c]) = by_radius;
-    gradient[c].col(out.radius[c]) = gradient_by_radius;
+    rest.motion[c].middleCols(out.first_pose[c], 6).setIdentity();
+    along.wrench[c].middleCols(out.first_wrench[c], 6).setIdentity();
+    if (out.radius[c] >= 0) along.radius[c](out.radius[c]) = 1;
   }
-  for (std::size_t c = 0; c < count; ++c)
-    tool_rhs.middleRows(system.first_axis[c], system.contacts[c].free_axes.cols()) -=
-        system.contacts[c].free_axes.transpose() * gradient[c];
-
-  MatrixX du, dz;
-  system.solve(t, -change, tool_rhs, false, du, dz);
-  if (!du.allFinite() || !dz.allFinite()) throw Error("a tool touches nothing: it has no derivative", "sensitivity.at");
-  out.motion_reaction.resize(driven, columns);
-  for (Index k = 0; k < columns; ++k) {
-    VectorX force = change.col(k) + system.assembly.multiply(t.blocks, du.col(k));
-    if (dz.rows() > 0) force += t.coupling * dz.col(k);
-    out.motion_reaction.col(k) = system.motions.transpose() * force;
+  std::vector<ContactIncrement> path = *at.path;
+  if (!path_matters) {  // as if it had been reached from rest in one go
+    path = {path.front(), path.back()};
+    path.front().displacement_m.setZero();
+    path.front().loads = statics.no_loads();
+    for (std::size_t c = 0; c < count; ++c) path.front().poses[c] = system.contacts[c].T_base_tool;
   }
-  for (std::size_t c = 0; c < count; ++c) {
-    const MatrixX& axes = system.contacts[c].free_axes;
-    const MatrixX twist = axes * dz.middleRows(system.first_axis[c], axes.cols());
-    out.wrench.push_back(gradient[c] + t.tools[c].coupling.transpose() * du + t.tools[c].hessian * twist);
-    out.motion.push_back(twist);
-    out.motion.back().middleCols(out.first_pose[c], 6) += Eigen::Matrix<double, 6, 6>::Identity();
-  }
-  du.middleCols(out.first_motion, driven) += system.motions;
-  out.displacement = std::move(du);
+  ContactPathSensitivity d = path_sensitivity(system, at, path, along, rest);
+  out.displacement = std::move(d.displacement);
+  out.wrench = std::move(d.wrench);
+  out.motion = std::move(d.motion);
+  out.motion_reaction = std::move(d.motion_reaction);
   return out;
 }
 

@@ -17,21 +17,6 @@ Mat3 cross_matrix(const Vec3& a) {
   return m;
 }
 
-// Change of (I - n n') d, the tangential offset, as the anchor moves (d = y - anchor) and with it the normal there.
-template <typename Columns>
-Columns sticking_change(const Vec3& n, const Vec3& d, const Columns& anchor, const Columns& normal) {
-  return -(anchor - n * (n.transpose() * anchor)) - n * (d.transpose() * normal) - n.dot(d) * normal;
-}
-
-// d(unit normal)/dy of the shape.
-Mat3 normal_slope(const TouchingBody& body, const Vec3& y, double cell) {
-  ShapePoint shape;
-  if (!body.shape->at(y, cell, shape)) return Mat3::Zero();
-  const double length = shape.normal.norm();
-  const Vec3 n = shape.normal / length;
-  return (shape.curvature - n * (n.transpose() * shape.curvature)) / length;
-}
-
 // The nearest positive semi-definite matrix.
 void make_convex(Mat3& h) {
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(h);
@@ -194,14 +179,8 @@ void ContactTerms::d_radius(const TouchingBody& body, const VectorX& u, VectorX&
     if (body.law == Touch::bonded || !body.shape->at(y, points_.cell_m(f), shape)) return;
     const RadiusDerivative d = body.shape->d_radius(y, points_.cell_m(f));
     const double k = points_.weight_m2(f, p) * body.stiffness_pa / points_.face_size_m(f), g = shape.gap_m;
-    Vec3 change = k * ((d.coverage * g + shape.coverage * d.gap) * shape.normal + shape.coverage * g * d.normal +
+    const Vec3 change = k * ((d.coverage * g + shape.coverage * d.gap) * shape.normal + shape.coverage * g * d.normal +
                        g * d.gap * shape.coverage_gradient + 0.5 * g * g * d.coverage_gradient);
-    const std::size_t index = static_cast<std::size_t>(f) * points_.per_face() + p;
-    if (body.law == Touch::sticking && body.memory->limit_pa[index] > 0) {
-      const Vec3& anchor = body.memory->anchor_m[index];
-      const Vec3 turned = body.shape->d_radius(anchor, points_.cell_m(f)).normal;
-      change += k * sticking_change<Vec3>(body.memory->normal[index], y - anchor, Vec3::Zero(), turned);
-    }
     const Vec3 force = r * change;
     for (int a = 0; a < points_.nodes_per_face(); ++a)
       forces.segment<3>(3 * points_.node(f, a)) += points_.shape(p)(a) * force;
@@ -210,30 +189,53 @@ void ContactTerms::d_radius(const TouchingBody& body, const VectorX& u, VectorX&
   });
 }
 
-void ContactTerms::anchors_d_pose(const TouchingBody& body, const VectorX& u, const Mat3& start, MatrixX& forces,
-                                  Eigen::Matrix<double, 6, 6>& gradient) const {
-  if (body.law == Touch::frictionless) return;
-  const Mat3& r = body.T_base_tool.linear();
-  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3& y, const Sample&) {
-    const std::size_t index = static_cast<std::size_t>(f) * points_.per_face() + p;
-    const double k = points_.weight_m2(f, p) * body.stiffness_pa / points_.face_size_m(f);
-    // Where the tool starts moves the anchor: y = R' (x - c), dy = -R' (dc - arm x turn).
-    const Vec3& anchor = body.memory->anchor_m[index];
-    Eigen::Matrix<double, 3, 6> moves, change;
-    moves << -Mat3::Identity(), cross_matrix(start * anchor);
-    moves = start.transpose() * moves;
-    change = -moves;
+std::vector<ContactTerms::Held> ContactTerms::held(const TouchingBody& body, const VectorX& u) const {
+  std::vector<Held> out;
+  if (body.law == Touch::frictionless) return out;
+  ShapePoint shape;
+  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3& y, const Sample& s) {
+    Held h;
+    h.face = f;
+    h.point = p;
+    h.index = static_cast<std::size_t>(f) * points_.per_face() + p;
+    h.weight_m2 = points_.weight_m2(f, p);
+    h.stiffness_pa_m = body.stiffness_pa / points_.face_size_m(f);
+    h.arm_m = x - body.T_base_tool.translation();
+    h.y_m = y;
+    h.anchor_m = body.memory->anchor_m[h.index];
     if (body.law != Touch::bonded) {
-      if (!(body.memory->limit_pa[index] > 0)) return;
-      change = sticking_change(body.memory->normal[index], y - anchor, moves,
-                               Eigen::Matrix<double, 3, 6>(normal_slope(body, anchor, points_.cell_m(f)) * moves));
+      h.limit_pa = body.memory->limit_pa[h.index];
+      if (!(h.limit_pa > 0)) return;
+      body.shape->at(y, points_.cell_m(f), shape);
+      h.normal = body.memory->normal[h.index];
+      if (h.normal.squaredNorm() == 0) h.normal = shape.normal.normalized();
+      const Vec3 offset = y - h.anchor_m, tangential = offset - h.normal.dot(offset) * h.normal;
+      h.length_m = tangential.norm();
+      if (h.length_m > 0) h.across = tangential / h.length_m;
+      h.slips = s.slips;
+      h.pressure_slope = -h.stiffness_pa_m * (shape.coverage * shape.normal + shape.gap_m * shape.coverage_gradient);
+      if (body.shape->has_radius()) {
+        const RadiusDerivative d = body.shape->d_radius(y, points_.cell_m(f));
+        h.pressure_d_radius = -h.stiffness_pa_m * (d.coverage * shape.gap_m + shape.coverage * d.gap);
+      }
     }
-    const Eigen::Matrix<double, 3, 6> force = k * r * change;
-    for (int a = 0; a < points_.nodes_per_face(); ++a)
-      forces.middleRows<3>(3 * points_.node(f, a)) += points_.shape(p)(a) * force;
-    gradient.topRows<3>() -= force;
-    gradient.bottomRows<3>() -= cross_matrix(x - body.T_base_tool.translation()) * force;
+    out.push_back(h);
   });
+  return out;
+}
+
+Mat3 ContactTerms::normal_slope(const TouchingBody& body, Index face, const Vec3& y) const {
+  ShapePoint shape;
+  if (!body.shape->at(y, points_.cell_m(face), shape)) return Mat3::Zero();
+  const double length = shape.normal.norm();
+  const Vec3 n = shape.normal / length;
+  return (shape.curvature - n * (n.transpose() * shape.curvature)) / length;
+}
+
+Vec3 ContactTerms::normal_d_radius(const TouchingBody& body, Index face, const Vec3& y) const {
+  ShapePoint shape;
+  if (!body.shape->has_radius() || !body.shape->at(y, points_.cell_m(face), shape)) return Vec3::Zero();
+  return body.shape->d_radius(y, points_.cell_m(face)).normal;
 }
 
 TouchMemory ContactTerms::bond(const TouchingBody& body, const VectorX& u, double reach_m) const {

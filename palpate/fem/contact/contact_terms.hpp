@@ -58,12 +58,29 @@ class ContactTerms {
   /// Adds the tangent to the blocks and fills the tool's terms. @param convex  leaves out what bends the wrong way (deep
   /// penetration of a curved tool), far from the solution
   void tangent(const TouchingBody& body, const VectorX& u, bool convex, BlockValues& blocks, ToolTerms& tool) const;
-  /// d(nodal forces)/d radius (3n) and d(gradient)/d radius.
+  /// d(nodal forces)/d radius (3n) and d(gradient)/d radius at fixed anchors and friction limits.
   void d_radius(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient) const;
-  /// What a twist of the tool at the start does through the anchors, which are fixed then: d(nodal forces) (3n x 6) and
-  /// d(gradient). @param start  the tool's rotation at the start
-  void anchors_d_pose(const TouchingBody& body, const VectorX& u, const Mat3& start, MatrixX& forces,
-                      Eigen::Matrix<double, 6, 6>& gradient) const;
+  /// What touches with a memory (friction, sticking, bonded), for derivatives along a path (contact_path.hpp).
+  struct Held {
+    Index face = 0;
+    int point = 0;
+    std::size_t index = 0;         ///< of the point in TouchMemory
+    double weight_m2 = 0;
+    double stiffness_pa_m = 0;     ///< of the layer, per area
+    Vec3 arm_m = Vec3::Zero();     ///< from the tip, base axes
+    Vec3 y_m = Vec3::Zero();       ///< tool frame
+    Vec3 anchor_m = Vec3::Zero(), normal = Vec3::Zero();  ///< where it sticks, tool frame
+    Vec3 across = Vec3::Zero();    ///< unit tangential offset from the anchor, tool frame
+    double length_m = 0;           ///< of that offset
+    bool slips = false;
+    double limit_pa = 0;           ///< largest tangential traction
+    Vec3 pressure_slope = Vec3::Zero();  ///< d pressure / dy
+    double pressure_d_radius = 0;
+  };
+  std::vector<Held> held(const TouchingBody& body, const VectorX& u) const;
+  /// d(unit normal of the shape)/dy and /d radius at a place that stands for a piece of this face.
+  Mat3 normal_slope(const TouchingBody& body, Index face, const Vec3& y) const;
+  Vec3 normal_d_radius(const TouchingBody& body, Index face, const Vec3& y) const;
   /// Points that lie within `reach_m` of the body's surface are glued to where they are.
   TouchMemory bond(const TouchingBody& body, const VectorX& u, double reach_m) const;
   /// Memory at the start of an increment: points that do not touch will slide from where they are now.
