@@ -143,8 +143,8 @@ TEST(CommandLine, ProgressIsQuietLinesWhereThereIsNoTerminal) {
 }
 
 TEST(CommandLine, ProgressOnATerminalSaysStageAndShare) {
-  if (std::system("script --version >/dev/null 2>&1") != 0)
-    GTEST_SKIP() << "no script(1): there is no terminal to show it on";
+  if (std::system("script -qec true /dev/null >/dev/null 2>&1") != 0)
+    GTEST_SKIP() << "no script(1), or no pseudo-terminals (/dev/pts): there is no terminal to show it on";
   const TemporaryFolder files("on_a_terminal");
   const auto folder = files / "out";
   const std::string command =
