@@ -98,6 +98,13 @@ void tell(Session& session, const Options& given, const Identification& answer) 
   }
   session.say(fmt::format("fit                residuals {} rms over {} values; chi2 per degree of freedom {:.3g}, 1 where noise is as stated",
                           report::quantity(answer.fit.rms_m, "m"), answer.fit.points_used, answer.fit.chi2_per_dof));
+  const auto mesh = answer.provenance.find("mesh"), error = answer.provenance.find("mesh's error in E");
+  if (mesh != answer.provenance.end() && error != answer.provenance.end()) {
+    const bool known = error->second != "not estimated";
+    session.say(fmt::format("mesh               {}; its own error {}", mesh->second,
+                            known ? "is about " + error->second + " of E, inside the interval"
+                                  : "was not estimated and is not in the interval (--refine auto does both)"));
+  }
   if (given.budget) {
     session.say("error budget       what each input's uncertainty does to E and nu:");
     for (const auto& entry : answer.budget) {

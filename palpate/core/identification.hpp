@@ -15,7 +15,7 @@ struct Verdict {
   std::string message;  ///< plain words: what it means and what to do
 };
 
-/// value = posterior median, interval = equal-tailed quantiles; the mesh's own error is not included (docs/uncertainty.md).
+/// value = posterior median, interval = equal-tailed quantiles; what is inside: docs/uncertainty.md (of the mesh: refine auto).
 struct Parameter {
   std::string name;    ///< young_modulus, poisson_ratio, alpha, ...
   std::string region;  ///< empty = whole object
