@@ -101,9 +101,11 @@ void tell(Session& session, const Options& given, const Identification& answer) 
   const auto mesh = answer.provenance.find("mesh"), error = answer.provenance.find("mesh's error in E");
   if (mesh != answer.provenance.end() && error != answer.provenance.end()) {
     const bool known = error->second != "not estimated";
+    const bool as_given = answer.provenance.at("refine") == "none";
     session.say(fmt::format("mesh               {}; its own error {}", mesh->second,
                             known ? "is about " + error->second + " of E, inside the interval"
-                                  : "was not estimated and is not in the interval (--refine auto does both)"));
+                                  : std::string("was not estimated and is not in the interval") +
+                                        (as_given ? " (--refine auto does both)" : "")));
   }
   if (given.budget) {
     session.say("error budget       what each input's uncertainty does to E and nu:");
