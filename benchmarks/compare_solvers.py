@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Times one linear static analysis of the pressed cube against CalculiX and DOLFINx/PETSc on the same meshes.
 
-The cube has an edge of 0.15 m, n^3 cells of five linear tetrahedra, its bottom is held, a pressure of 10 N in all acts on a
+The cube has an edge of 0.15 m, n^3 cells of five linear or quadratic tetrahedra, its bottom is held, a pressure of 10 N in all acts on a
 disc of 25 mm radius at the centre of the top. CalculiX and palpate run as whole processes from the same input deck (read,
 assemble, solve, write); DOLFINx and palpate are compared in process (assemble and solve; DOLFINx' just-in-time compilation is not counted,
 mesh and sparsity pattern are counted on neither side). Seconds are CPU seconds of all threads, the smallest of the repeats; wall
@@ -12,7 +12,11 @@ differ. PETSc has no threads of its own and is left out above one.
   cmake --preset developer && ninja -C build/developer solve_deck
   benchmarks/compare_solvers.py build/developer/benchmarks/solve_deck --cells 6 13 27 --poisson 0.3 0.49
 
-Programs that are absent are left out with a word. Options: --threads N..., --repeats, --keep FOLDER, --json FILE.
+Programs that are absent are left out with a word. Options: --element tet4 tet10, --threads N..., --patient (SPOOLES, MUMPS and
+CHOLMOD on every mesh), --repeats, --keep FOLDER, --json FILE. Everything at once, for a machine with nothing else to do:
+
+  benchmarks/compare_solvers.py build/developer/benchmarks/solve_deck --cells 6 13 27 47 --element tet4 --threads 1 2 --patient
+  benchmarks/compare_solvers.py build/developer/benchmarks/solve_deck --cells 6 13 20 --element tet10 --threads 1 2 --patient
 """
 import argparse
 import json
@@ -30,6 +34,14 @@ EDGE, RADIUS, FORCE, YOUNG = 0.15, 0.025, 10.0, 20e3
 
 def environment(threads):
     return dict(os.environ, OMP_NUM_THREADS=str(threads), OPENBLAS_NUM_THREADS="1", CCX_NPROC_EQUATION_SOLVER=str(threads))
+
+
+def quadratic(nodes, tets):
+    """Midpoints of edges 01, 12, 02, 03, 13, 23 after the corners (CalculiX' order)."""
+    edges = np.sort(np.stack([tets[:, list(pair)] for pair in ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))], 1), -1)
+    unique, index = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+    return (np.concatenate([nodes, nodes[unique].mean(1)]),
+            np.concatenate([tets, len(nodes) + index.reshape(-1, 6)], 1))
 
 
 def cube(n):
@@ -50,13 +62,20 @@ def cube(n):
 
 def disc_load(nodes, tets, samples=24):
     """Consistent nodal forces along z of the pressure on the disc (top triangles, sampled finely)."""
-    faces = np.concatenate([tets[:, f] for f in ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])])
+    sides = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
+    if tets.shape[1] == 10:  # midpoints of 01, 12, 02 of each side
+        middle = {(0, 1): 4, (1, 2): 5, (0, 2): 6, (0, 3): 7, (1, 3): 8, (2, 3): 9}
+        sides = [side + [middle[side[0], side[1]], middle[side[1], side[2]], middle[side[0], side[2]]] for side in sides]
+    faces = np.concatenate([tets[:, f] for f in sides])
     faces = faces[(nodes[faces][:, :, 2] > EDGE * (1 - 1e-9)).all(1)]
     weights = np.array([((i + s) / samples, (j + s) / samples, 1 - (i + j + 2 * s) / samples)
                         for i in range(samples) for j in range(samples - i)
                         for s in ((1 / 3, 2 / 3) if j < samples - i - 1 else (1 / 3,))])
-    points = np.einsum("sk,fkd->fsd", weights, nodes[faces][:, :, :2])
+    points = np.einsum("sk,fkd->fsd", weights, nodes[faces[:, :3]][:, :, :2])
     inside = np.hypot(*(points - EDGE / 2).transpose(2, 0, 1)) <= RADIUS
+    if tets.shape[1] == 10:
+        a, b, c = weights.T
+        weights = np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * a * c], 1)
     load = np.zeros(len(nodes))
     np.add.at(load, faces, np.einsum("fs,sk->fk", inside.astype(float), weights))
     return -FORCE * load / load.sum()
@@ -66,7 +85,7 @@ def write_deck(path, nodes, tets, load, poisson, solver):
     with open(path, "w") as deck:
         deck.write("*NODE, NSET=ALL\n")
         np.savetxt(deck, np.column_stack([np.arange(1, len(nodes) + 1), nodes]), fmt=["%d"] + ["%.12g"] * 3, delimiter=",")
-        deck.write("*ELEMENT, TYPE=C3D4, ELSET=BODY\n")
+        deck.write(f"*ELEMENT, TYPE=C3D{tets.shape[1]}, ELSET=BODY\n")
         np.savetxt(deck, np.column_stack([np.arange(1, len(tets) + 1), tets + 1]), fmt="%d", delimiter=",")
         deck.write("*BOUNDARY\n")
         deck.writelines(f"{i + 1},1,3\n" for i in np.flatnonzero(nodes[:, 2] < 1e-9))
@@ -127,9 +146,11 @@ def dolfinx_worker(path):
 
     case = np.load(path)
     nodes, tets, load, poisson = case["nodes"], case["tets"], case["load"], float(case["poisson"])
+    degree, patient, cells = (2 if tets.shape[1] == 10 else 1), bool(case["patient"]), int(case["cells"])
+    corners = tets[:, :4].max() + 1
     domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.tetrahedron, 1))
-    mesh = dolfinx.mesh.create_mesh(MPI.COMM_SELF, tets.astype(np.int64), nodes, domain)
-    space = fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
+    mesh = dolfinx.mesh.create_mesh(MPI.COMM_SELF, tets[:, :4].astype(np.int64), nodes[:corners], domain)
+    space = fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     lame = YOUNG * poisson / ((1 + poisson) * (1 - 2 * poisson)), YOUNG / (2 * (1 + poisson))
     strain = lambda w: ufl.sym(ufl.grad(w))
@@ -148,11 +169,10 @@ def dolfinx_worker(path):
     assemble()
     assembly = time.process_time() - start
 
-    # Degrees of freedom of the nodes as they were given: the first order map of the mesh and of the space agree cell by cell.
-    block_of = np.zeros(len(nodes), dtype=np.int64)
-    geometry = np.asarray(mesh.geometry.dofmap.array).reshape(-1, 4)
-    cells = np.asarray(space.dofmap.list.array).reshape(-1, 4)
-    block_of[np.asarray(mesh.geometry.input_global_indices)[geometry]] = cells
+    # Degrees of freedom of the nodes as they were given: both lie on a lattice of half cells.
+    lattice = lambda x: tuple(np.rint(x * (2 * cells / EDGE)).astype(np.int64).T)
+    at = {place: k for k, place in enumerate(zip(*lattice(space.tabulate_dof_coordinates())))}
+    block_of = np.array([at[place] for place in zip(*lattice(nodes))])
     b = matrix.createVecLeft()
     values = np.zeros(3 * len(nodes))
     values[3 * block_of + 2] = load
@@ -172,7 +192,7 @@ def dolfinx_worker(path):
     }
     results = {}
     for name, options in solvers.items():
-        if len(nodes) > 60000 and name in ("MUMPS Cholesky", "CHOLMOD", "CG + GAMG"):
+        if len(nodes) > 60000 and not patient and name in ("MUMPS Cholesky", "CHOLMOD", "CG + GAMG"):
             continue  # minutes and gigabytes
         try:
             ksp = PETSc.KSP().create(MPI.COMM_SELF)
@@ -202,12 +222,12 @@ def dolfinx_worker(path):
 
 
 def compare(case, arguments, folder):
-    n, poisson, threads = case
-    nodes, tets = cube(n)
+    n, element, poisson, threads = case
+    nodes, tets = cube(n) if element == "tet4" else quadratic(*cube(n))
     load = disc_load(nodes, tets)
     deck = os.path.join(folder, "cube.inp")
     write_deck(deck, nodes, tets, load, poisson, "")
-    result = dict(cells=n, tetrahedra=len(tets), poisson=poisson, threads=threads,
+    result = dict(cells=n, element=element, tetrahedra=len(tets), nodes=len(nodes), poisson=poisson, threads=threads,
                   load_average=os.getloadavg()[0])
     cpu, wall, memory, text = smallest([os.path.abspath(arguments.solve_deck), deck, "ours.txt", "--threads", str(threads)],
                                        folder, arguments.repeats, arguments.timeout, threads)
@@ -215,13 +235,13 @@ def compare(case, arguments, folder):
     u = displacements(os.path.join(folder, "ours.txt"), len(nodes))
     result["palpate"] = dict(ours, cpu_s=cpu, wall_s=wall, peak_mb=memory)
     beside = lambda seconds: f" (wall {seconds:.3f} s)" if threads > 1 else ""
-    print(f"\n{len(tets)} tetrahedra, nu = {poisson}, threads {threads}, load average {result['load_average']:.1f}\n"
+    print(f"\n{len(tets)} {element}, {len(nodes)} nodes, nu = {poisson}, threads {threads}, load average {result['load_average']:.1f}\n"
           f"  palpate, whole process         {cpu:9.3f} s{beside(wall)} {memory:7.0f} MB   {ours['method']}, {ours['steps']} steps",
           flush=True)
 
     if shutil.which("ccx"):
         for solver in ("SPOOLES", "ITERATIVE SCALING", "ITERATIVE CHOLESKY"):
-            if solver == "SPOOLES" and len(tets) > 200000 and not arguments.patient:
+            if solver == "SPOOLES" and len(nodes) > 60000 and not arguments.patient:
                 continue
             name = solver.replace(" ", "_").lower()
             write_deck(os.path.join(folder, name + ".inp"), nodes, tets, load, poisson, solver)
@@ -244,7 +264,7 @@ def compare(case, arguments, folder):
         return result
     in_process = ours["assemble_s"] + ours["solve_s"]
     path = os.path.join(folder, "case.npz")
-    np.savez(path, nodes=nodes, tets=tets, load=load, poisson=poisson)
+    np.savez(path, nodes=nodes, tets=tets, load=load, poisson=poisson, cells=n, patient=arguments.patient)
     worker = subprocess.run([sys.executable, os.path.abspath(__file__), "--dolfinx-worker", path], env=environment(1),
                             capture_output=True, text=True)
     if worker.returncode != 0:
@@ -270,19 +290,20 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("solve_deck", help="the program of benchmarks/solve_deck.cpp")
     parser.add_argument("--cells", type=int, nargs="+", default=[6, 13, 27], help="cells along an edge (47: 519 115 tetrahedra)")
+    parser.add_argument("--element", nargs="+", choices=["tet4", "tet10"], default=["tet4"])
     parser.add_argument("--poisson", type=float, nargs="+", default=[0.3, 0.49])
     parser.add_argument("--threads", type=int, nargs="+", default=[1])
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--timeout", type=float, default=300, help="seconds a process")
-    parser.add_argument("--patient", action="store_true", help="SPOOLES above 200 000 tetrahedra too")
+    parser.add_argument("--patient", action="store_true", help="SPOOLES, MUMPS, CHOLMOD and GAMG above 60 000 nodes too")
     parser.add_argument("--keep", help="folder for decks and results (otherwise they are deleted)")
     parser.add_argument("--json", help="writes all numbers to this file")
     arguments = parser.parse_args()
     results = []
-    for case in [(n, nu, threads) for n in arguments.cells for nu in arguments.poisson for threads in arguments.threads]:
+    for case in [(n, element, nu, threads) for element in arguments.element for n in arguments.cells for nu in arguments.poisson for threads in arguments.threads]:
         with tempfile.TemporaryDirectory() as folder:
             if arguments.keep:
-                folder = os.path.join(arguments.keep, f"cube_{case[0]}_{case[1]}_{case[2]}")
+                folder = os.path.join(arguments.keep, f"cube_{case[0]}_{case[1]}_{case[2]}_{case[3]}")
                 os.makedirs(folder, exist_ok=True)
             results.append(compare(case, arguments, folder))
     if arguments.json:

@@ -123,7 +123,7 @@ std::optional<FinerModel> refined_within(const Recording& recording, const Simul
       boundary.forces = fem::spread_over_patch(mesh, where);
       boundary.inertia_relief = recording.free;
       if (recording.free) return boundary;
-      auto supports = finer.supports;
+      auto supports = held_both_ways(finer.supports);  // small strains decide on the mesh
       for (auto& support : supports) support.vertices = fem::extend_nodes(support.vertices, linear);
       boundary.constraints = hold(mesh, supports, {}).constraints;
       return boundary;

@@ -107,9 +107,16 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   }
   memory_.resize(steps_.size());
   followed_.assign(steps_.size(), 0);
-  workers_ = std::clamp<std::size_t>(static_cast<std::size_t>(std::max(options_.threads, 1)), 1, steps_.size());
+  contact_ = has_contacts(recording);
+  path_ = depends_on_path(recording);
+  if (contact_ && parameters_ > first_ratio) {
+    throw Error("parts with a stiffness of their own cannot lie on a table or wall that only pushes: give one stiffness "
+                "(--regions none), or hold the support bonded or as a plane",
+                "regions");
+  }
+  workers_ = path_ ? 1 : std::clamp<std::size_t>(static_cast<std::size_t>(std::max(options_.threads, 1)), 1, steps_.size());
   // Unit responses are for one set of ratios; with regions a linear body is solved for at every step.
-  linear_ = fem::material_law(object_.material).is_linear() && parameters_ == first_ratio;
+  linear_ = fem::material_law(object_.material).is_linear() && parameters_ == first_ratio && !contact_;
   poisson_lower_ = unknowns[poisson].lower;
   poisson_upper_ =
       recording.model.poisson_fixed ? poisson_lower_ : unknowns[poisson].upper;  // one ratio needs no polynomial
@@ -226,6 +233,7 @@ void ForwardModel::set_ratios(Body& body, const VectorX& unknowns) const {
 
 int ForwardModel::inverted_elements(std::size_t s, const VectorX& unknowns) {
   Body& body = body_of(push(s), worker_of(s));
+  if (body.contact) return predict(s, unknowns, false).inverted_elements;
   set_ratios(body, unknowns);
   const Coefficients c = coefficients(s, body, unknowns);
   const auto at = body.statics->solve(std::exp(unknowns(log_young)), unknowns(poisson), c.force, c.motion);
@@ -236,6 +244,7 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
                               Watched& watched, StepPrediction& out) {
   const std::size_t worker = worker_of(s);
   followed_[s] = 0;
+  if (body.contact) return solve_contact_step(s, body, c, unknowns, derivatives, watched, out);
   // Start from the last solution of this step, or else of the step before, moved along its derivatives.
   Memory& memory = memory_[s];
   const Memory* from = memory.valid ? &memory : nullptr;
@@ -266,7 +275,7 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
 
   watched.moved_m = object_.surface.restrict(at.displacement_m);
   if (!derivatives) {
-    memory = {true, unknowns, at.displacement_m, {}, MatrixX(at.displacement_m.size(), 0), {}, at.inverted_elements};
+    memory = {true, unknowns, at.displacement_m, {}, MatrixX(at.displacement_m.size(), 0), {}, at.inverted_elements, {}};
     return true;
   }
   const fem::SensitivityAlong d = body.statics->sensitivity_along(at, c.d_force, c.d_motion);
@@ -281,7 +290,7 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
   watched.d_reaction.resize(c.motion.size(), parameters_ + others);
   watched.d_reaction << d.reaction_d_log_young, d.reaction_d_poisson, d.reaction_d_log_stiffness.rightCols(ratios),
       d.reaction_d_along;
-  memory = {true, unknowns, at.displacement_m, parameter_columns(), std::move(field), watched, at.inverted_elements};
+  memory = {true, unknowns, at.displacement_m, parameter_columns(), std::move(field), watched, at.inverted_elements, {}};
   memory.columns.insert(memory.columns.end(), c.columns.begin(), c.columns.end());
   return true;
 }
@@ -305,7 +314,8 @@ void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const V
 StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
   const std::size_t worker = worker_of(s);
   Body& body = body_of(push(s), worker);
-  const Coefficients c = coefficients(s, body, unknowns);
+  Coefficients c = coefficients(s, body, unknowns);
+  if (body.contact && path_) add_path_columns(s, body, unknowns, c);
   if (body.free_motions.cols() > 0 && c.force.size() > 0) {
     const VectorX load = body.forces * c.force;
     if ((body.free_motions.transpose() * load).cwiseAbs().maxCoeff() > 1e-6 * (load.lpNorm<1>() + 1e-12)) {

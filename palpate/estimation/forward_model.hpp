@@ -14,7 +14,7 @@
 #include "palpate/estimation/simulated_surface.hpp"
 #include "palpate/estimation/surface_field.hpp"
 #include "palpate/estimation/unknowns.hpp"
-#include "palpate/fem/statics.hpp"
+#include "palpate/fem/contact_statics.hpp"
 
 namespace palpate::estimation {
 
@@ -102,10 +102,21 @@ class ForwardModel {
   struct Coefficients;  // of a step: a, b and their derivatives
   struct Memory;        // of a step: where it was last solved
   struct Watched;       // what is seen of the body in one step, in the object's frame
+  struct ContactState;
+  using ContactStatePtr = std::shared_ptr<const ContactState>;
 
   /// False: no equilibrium, and `out` says why.
   bool solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
                   Watched& watched, StepPrediction& out);
+  bool solve_contact_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
+                          Watched& watched, StepPrediction& out);
+  ContactStatePtr contact_state(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);
+  ContactStatePtr solve_contact(Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
+                                const ContactStatePtr& start, const ContactStatePtr& before, std::size_t worker);
+  ContactStatePtr lying(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);
+  void add_contacts(Body& body, const Push& push, fem::Boundary boundary, std::vector<fem::RigidContact> supports);
+  void add_path_columns(std::size_t s, const Body& body, const VectorX& unknowns, Coefficients& c) const;
+  std::size_t first_step_of_push(std::size_t s) const { return s - steps_[s].step; }
   /// False: too far from where the step was last solved.
   bool follow(std::size_t s, const VectorX& unknowns, Watched& watched, StepPrediction& out);
   Watched superpose(const Body& body, const Coefficients& c, const VectorX& unknowns, StepPrediction& out) const;
@@ -126,6 +137,7 @@ class ForwardModel {
   double poisson_lower_ = 0, poisson_upper_ = 0;
   std::vector<StepIndex> steps_;
   std::size_t workers_ = 1;
+  bool contact_ = false, path_ = false;  // bodies touch what only pushes; a step depends on the steps before
   bool linear_ = false;  // workers share one solver for each set of platens, else each has its own
   std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies_;
   std::vector<Memory> memory_;

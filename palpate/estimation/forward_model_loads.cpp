@@ -12,9 +12,17 @@
 namespace palpate::estimation {
 namespace {
 
+/// Pushes of one key share a body: the same platens, and rigid tools at the same places.
 std::string body_key(const Push& push) {
+  std::set<std::string> parts;
+  for (const auto& step : push.steps) {
+    for (const auto& load : step.loads) {
+      if (load.travel_m) parts.insert(key_of(load) + "," + std::to_string(load.direction.x()) + "," + std::to_string(load.direction.y()) +
+                                      "," + std::to_string(load.direction.z()));
+    }
+  }
   std::string key;
-  for (const auto& name : driven_tools(push)) key += name + "\n";
+  for (const auto& part : parts) key += part + "\n";
   return key;
 }
 
@@ -61,9 +69,10 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
 
   std::vector<const Tool*> platens;
   for (const auto& tool : recording_->tools) {
-    if (driven_tools(push).count(tool.name) == 0) continue;
+    if (driven_tools(push).count(tool.name) == 0 || touches_rigidly(tool)) continue;
     if (tool.shape != ToolShape::platen) {
-      throw Error("only a platen's motion can be imposed; give the force of this tool and its travel as an observation",
+      throw Error("chosen vertices have no shape whose motion could be imposed; give the force on them and their travel as an "
+                  "observation",
                   "tools." + tool.name);
     }
     body->motion_column[tool.name] = static_cast<int>(platens.size());
@@ -85,7 +94,8 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
       }
     }
   }
-  if (recording_->rest.state == RestState::stress_free && recording_->environment.gravity_m_s2.norm() > 0) {
+  const bool lies = contact_ && recording_->density_kg_m3 > 0;  // its weight holds it down, whether or not it shows
+  if ((recording_->rest.state == RestState::stress_free || lies) && recording_->environment.gravity_m_s2.norm() > 0) {
     body->gravity_column = static_cast<int>(3 * parts.size());
     parts.push_back(fem::body_force(object_.mesh));
   }
@@ -102,6 +112,7 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
   boundary.forces.resize(3 * object_.mesh.nodes_m.rows(), static_cast<Index>(3 * parts.size()));
   boundary.forces.setFromTriplets(entries.begin(), entries.end());
   boundary.inertia_relief = recording_->free;
+  std::vector<fem::RigidContact> tables;
   if (recording_->free) {
     boundary.motions.resize(3 * object_.mesh.nodes_m.rows(), 0);
   } else {
@@ -109,8 +120,14 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
     boundary.constraints = std::move(held.constraints);
     boundary.motions = std::move(held.motions);
     body->free_motions = std::move(held.free_motions);
+    tables = std::move(held.contacts);
   }
   body->forces = boundary.forces;
+  body->node_motions = static_cast<int>(platens.size());
+  if (contact_) {
+    add_contacts(*body, push, std::move(boundary), std::move(tables));
+    return *body;
+  }
   body->statics = std::make_unique<fem::Statics>(object_.mesh, object_.material, std::move(boundary), options_);
   if (linear_) {
     Eigen::SparseMatrix<double, Eigen::RowMajor> watched =

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "palpate/estimation/forward_model.hpp"
+#include "palpate/fem/contact_statics.hpp"
 #include "palpate/fem/linear_response.hpp"
 
 namespace palpate::estimation {
@@ -22,13 +23,39 @@ std::set<std::string> driven_tools(const Push& push);
 /// True for a tool that touches at Load::contact_m, which may then be elsewhere than thought.
 bool has_place(const Recording& recording, const Load& load);
 
+/// Tools of a recording that touch as rigid bodies: their motion is imposed, and it is not that of nodes.
+bool touches_rigidly(const Tool& tool);
+
+/// True where something that the object touches has friction, so that a step depends on the steps before.
+bool depends_on_path(const Recording& recording);
+/// True where the object touches something that only pushes.
+bool has_contacts(const Recording& recording);
+
+/// State of a body in contact at one set of unknowns.
+struct ForwardModel::ContactState {
+  fem::ContactEquilibrium at;
+  VectorX unknowns;
+  bool differentiated = false;
+  std::vector<int> columns;         // unknowns beside log E and nu, in the order of d's columns
+  fem::ContactPathSensitivity d;
+};
+
 struct ForwardModel::Body {
   std::map<std::string, int> force_column;   // of a load's key: first of three; of nine where the contact may have shifted
   std::map<std::string, int> motion_column;  // of a platen
   int gravity_column = -1;
   MatrixX free_motions;
   Eigen::SparseMatrix<double> forces;
-  std::unique_ptr<fem::Statics> statics;
+  std::unique_ptr<fem::Statics> statics;                // none where there are contacts
+  std::unique_ptr<fem::ContactStatics> contact;
+  struct Driven {
+    std::size_t contact;
+    Vec3 direction;
+    int motion_column;
+  };
+  std::vector<Driven> driven;                           // rigid tools with an imposed motion, after the platens' columns
+  int node_motions = 0;                                 // columns of platens whose nodes are moved
+  std::shared_ptr<const ContactState> lying;            // under its weight alone, where it was last asked for
   std::unique_ptr<fem::LinearResponse> response;  // linear materials only: surface rows, then the forces' own (3 a load)
 };
 
@@ -53,6 +80,7 @@ struct ForwardModel::Memory {
   MatrixX derivative;  // 3n x columns, object frame
   Watched watched;     // with derivatives where there are columns
   int inverted_elements = 0;
+  std::shared_ptr<const ContactState> contact;
 
   VectorX change_to(const VectorX& there) const;  // of the columns' unknowns
 };

@@ -12,8 +12,10 @@ VectorX ForwardModel::von_mises_pa(std::size_t s, const VectorX& unknowns) {
   VectorX displacement_m;
   if (memory.valid && memory.unknowns == unknowns) {
     displacement_m = memory.displacement_m;
+  } else if (Body& body = body_of(push(s), worker_of(s)); body.contact) {
+    if (!predict(s, unknowns, false).converged) return {};
+    displacement_m = memory.displacement_m;
   } else {
-    Body& body = body_of(push(s), worker_of(s));
     const Coefficients c = coefficients(s, body, unknowns);
     set_ratios(body, unknowns);
     const auto at = body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion,

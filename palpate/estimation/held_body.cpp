@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
@@ -28,6 +29,9 @@ class Holds {
   void clamp(Index node) {
     for (int d = 0; d < 3; ++d) add(node, Vec3::Unit(d));
   }
+  /// What carries loads without being a constraint.
+  void carry(Index node, const Vec3& direction) { carried_.emplace_back(node, direction); }
+  const std::vector<std::pair<Index, Vec3>>& carried() const { return carried_; }
   const std::map<Index, std::vector<Vec3>>& directions() const { return directions_; }
 
   std::vector<fem::Constraint> constraints() const {
@@ -49,6 +53,7 @@ class Holds {
     if (count <= 2) axes.col(2) = axes.col(0).cross(axes.col(1));
   }
   std::map<Index, std::vector<Vec3>> directions_;
+  std::vector<std::pair<Index, Vec3>> carried_;
 };
 
 /// Displacement of a node under the six rigid motions (translations, rotations about the centre in units of `length`).
@@ -81,6 +86,7 @@ MatrixX pin_free_motions(const TetMesh& mesh, Holds& holds) {
   for (const auto& [node, held] : holds.directions()) {
     for (const auto& direction : held) append(node, direction);
   }
+  for (const auto& [node, direction] : holds.carried()) append(node, direction);
   const MatrixX free = null_space(rows);
   if (free.cols() == 0) return MatrixX(3 * mesh.nodes_m.rows(), 0);
 
@@ -127,28 +133,59 @@ std::vector<Index> platen_nodes(const TetMesh& mesh, const Tool& platen) {
 
 }  // namespace
 
+bool lifts_off(const Support& support) {
+  const bool half_space = support.kind == SupportKind::table || support.kind == SupportKind::wall;
+  return half_space && support.contact != ContactLaw::bonded;
+}
+
+std::vector<Support> held_both_ways(std::vector<Support> supports) {
+  for (Support& support : supports) {
+    if (lifts_off(support)) support.kind = SupportKind::plane;
+    if (support.contact == ContactLaw::friction) support.contact = ContactLaw::bonded;
+  }
+  return supports;
+}
+
 HeldBody hold(const TetMesh& mesh, const std::vector<Support>& supports, const std::vector<const Tool*>& platens) {
+  // Of the layer of a table: twenty times stiffer than under a tool, where a rim may run through faces.
+  constexpr double table_stiffness = 1000;
   Holds holds;
-  const auto refuse_friction = [](ContactLaw contact, const std::string& where) {
-    if (contact != ContactLaw::friction) return;
-    throw Error("the fit knows bonded and frictionless contact; choose the nearer of the two, and fit with the other as well to "
-                "see how much it matters",
-                where + ".contact friction");
-  };
+  HeldBody body;
   for (const Support& support : supports) {
-    refuse_friction(support.contact, "supports." + support.name);
-    for (Index node : fem::support_nodes(mesh, support)) {
+    const auto nodes = fem::support_nodes(mesh, support);
+    const Vec3 normal = support.plane.normal.normalized();
+    if (lifts_off(support)) {
+      fem::RigidContact contact;
+      contact.name = support.name;
+      contact.shape = fem::plane_shape();
+      contact.T_base_tool = fem::tool_pose(support.plane.point_m, normal);
+      contact.seat_m = support.tolerance_m;
+      contact.stiffness = table_stiffness;
+      const bool rough = support.contact == ContactLaw::friction;
+      contact.law = rough ? fem::Touch::friction : fem::Touch::frictionless;
+      contact.friction_coefficient = support.friction_coefficient;
+      body.contacts.push_back(contact);
+      for (Index node : nodes) {
+        if (!rough) holds.carry(node, normal);
+        for (int d = 0; rough && d < 3; ++d) holds.carry(node, Vec3::Unit(d));
+      }
+      continue;
+    }
+    if (support.contact == ContactLaw::friction) {
+      throw Error("friction needs a surface to slide on: give the support as a table or a wall, or hold its nodes bonded or frictionless",
+                  "supports." + support.name + ".contact friction");
+    }
+    for (Index node : nodes) {
       if (support.contact == ContactLaw::bonded) {
         holds.clamp(node);
       } else {
-        holds.add(node, support.plane.normal.normalized());
+        holds.add(node, normal);
       }
     }
   }
 
   std::vector<Eigen::Triplet<double>> motion;
   for (std::size_t p = 0; p < platens.size(); ++p) {
-    refuse_friction(platens[p]->contact, "tools." + platens[p]->name);
     const Vec3 direction = platens[p]->plane.normal.normalized();
     for (Index node : platen_nodes(mesh, *platens[p])) {
       holds.add(node, direction);
@@ -159,7 +196,6 @@ HeldBody hold(const TetMesh& mesh, const std::vector<Support>& supports, const s
     }
   }
 
-  HeldBody body;
   body.free_motions = pin_free_motions(mesh, holds);
   body.constraints = holds.constraints();
   body.motions.resize(3 * mesh.nodes_m.rows(), static_cast<Index>(platens.size()));

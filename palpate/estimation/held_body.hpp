@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes that supports and platens hold, as constraints of the static solver.
+// What supports and platens hold: nodes as constraints of the static solver, and rigid bodies that only push.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "palpate/core/recording.hpp"
+#include "palpate/fem/contact_statics.hpp"
 #include "palpate/fem/statics.hpp"
 
 namespace palpate::estimation {
@@ -17,10 +18,18 @@ struct HeldBody {
   /// 3n x f: rigid motions that supports leave free. They were pinned at single nodes, which carry no force as long as no load
   /// works on these motions (frictionless platens); 0 columns when the supports hold everything.
   MatrixX free_motions;
+  /// Tables and walls that the object may lift off and slide on (not the bonded ones), in the order of the supports.
+  std::vector<fem::RigidContact> contacts;
 };
 
+/// True for a support that only pushes.
+bool lifts_off(const Support& support);
+
+/// Supports that are found by the linear solver: tables and walls hold in both directions, and friction holds.
+std::vector<Support> held_both_ways(std::vector<Support> supports);
+
 /// @param platens  tools of shape `platen` whose motion is prescribed; their nodes are those within the plane's tolerance.
-/// @throws Error naming the support or platen that touches no node, or that asks for friction.
+/// @throws Error naming the support or platen that touches no node, or that asks for friction of chosen nodes.
 HeldBody hold(const TetMesh& mesh, const std::vector<Support>& supports, const std::vector<const Tool*>& platens);
 
 }  // namespace palpate::estimation

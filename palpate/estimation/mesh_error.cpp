@@ -7,6 +7,8 @@
 #include <map>
 #include <memory>
 
+#include "palpate/estimation/held_body.hpp"
+
 namespace palpate::estimation {
 namespace {
 
@@ -46,6 +48,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
     copy.model.poisson_fixed = optimum.unknowns(poisson);
     copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
     object.material = "linear";
+    copy.supports = held_both_ways(std::move(copy.supports));
     const auto statics = statics_options(copy, object, options);  // of this ratio alone
     Unknowns unknowns;
     auto held = std::make_unique<Recording>(std::move(copy));

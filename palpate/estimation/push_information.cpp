@@ -69,7 +69,7 @@ VectorX compliances_m_per_n(const Recording& scene, const SimulatedObject& objec
   boundary.motions.resize(dofs, 0);
   boundary.inertia_relief = scene.free;
   if (!scene.free) {
-    HeldBody held = hold(object.mesh, scene.supports, {});
+    HeldBody held = hold(object.mesh, held_both_ways(scene.supports), {});
     boundary.constraints = std::move(held.constraints);
     free_motions = std::move(held.free_motions);
   }
@@ -189,6 +189,7 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
   plan.tool = tool_named(scene, tool_name);
   plan.planned = scene;
   plan.planned.pushes.clear();
+  plan.planned.supports = held_both_ways(scene.supports);
   plan.planned.model.poisson_fixed = knowledge.poisson_ratio;  // one ratio, one factorisation
   plan.log_young_value = std::log(knowledge.young_modulus_pa);
   plan.poisson_value = knowledge.poisson_ratio;

@@ -29,6 +29,9 @@ struct RigidContact {
   /// wrench; no columns: the pose is prescribed and the wrench is the answer.
   MatrixX free_axes = MatrixX(6, 0);
   double stiffness = 0;        ///< 0: that of the options
+  /// What lies this near to the shape at the start just touches it there: its gap and the force are zero, also where a mesh
+  /// is a little uneven or reaches into the table.
+  double seat_m = 0;
   double bond_reach_m = 1e-6;  ///< Touch::bonded: what lies this near to the shape at the start is glued
 };
 

@@ -34,12 +34,25 @@ Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double rad
 
 Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const BoundaryOn& boundary_on,
                           const VectorX& force, const DiscretisationOptions& options) {
-  const double radius_m = patch.radius_m;
-  if (!(radius_m > 0)) throw Error("must be positive, is " + std::to_string(radius_m), "radius_m");
-  if (!(options.tolerance > 0))
-    throw Error("must be positive, is " + std::to_string(options.tolerance), "options.tolerance");
   StaticsOptions statics;
   statics.dilatation = options.dilatation;
+  const auto solve = [&](const TetMesh& quadratic, const RefinedMesh& linear) {
+    const Boundary boundary = boundary_on(quadratic, linear);
+    const Eigen::SparseMatrix<double> forces = boundary.forces;
+    const Statics body(quadratic, "linear", boundary, statics);
+    const Equilibrium e =
+        body.solve(1.0, options.poisson_ratio, force, VectorX::Zero(static_cast<Index>(boundary.motions.cols())));
+    return ContactAnswer{force.dot(forces.transpose() * e.displacement_m), e.displacement_m, 0};
+  };
+  return discretise(base, patch, SolveOn(solve), options);
+}
+
+Discretisation discretise(const TetMesh& base, const ContactPatch& given, const SolveOn& solve,
+                          const DiscretisationOptions& options) {
+  ContactPatch patch = given;
+  if (!(patch.radius_m > 0)) throw Error("must be positive, is " + std::to_string(patch.radius_m), "radius_m");
+  if (!(options.tolerance > 0))
+    throw Error("must be positive, is " + std::to_string(options.tolerance), "options.tolerance");
   // What cameras see, on the corners that all levels share.
   std::vector<Index> seen;
   std::vector<char> counted(static_cast<std::size_t>(base.nodes_m.rows()), 0);
@@ -47,18 +60,15 @@ Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const 
   for (Index k = 0; k < faces.size(); ++k) {
     const Index node = faces.data()[k];
     if (counted[static_cast<std::size_t>(node)]++) continue;
-    if (patch.distance_m(base.nodes_m.row(node).transpose()) > radius_m) seen.push_back(node);
+    if (given.distance_m(base.nodes_m.row(node).transpose()) > given.radius_m) seen.push_back(node);
   }
   VectorX surface(3 * static_cast<Index>(seen.size()));
   const auto work = [&](const RefinedMesh& linear, const TetMesh& quadratic) {
-    const Boundary boundary = boundary_on(quadratic, linear);
-    const Eigen::SparseMatrix<double> forces = boundary.forces;
-    const Statics body(quadratic, "linear", boundary, statics);
-    const Equilibrium e =
-        body.solve(1.0, options.poisson_ratio, force, VectorX::Zero(static_cast<Index>(boundary.motions.cols())));
+    const ContactAnswer answer = solve(quadratic, linear);
     for (std::size_t i = 0; i < seen.size(); ++i)
-      surface.segment<3>(3 * static_cast<Index>(i)) = e.displacement_m.segment<3>(3 * seen[i]);
-    return force.dot(forces.transpose() * e.displacement_m);
+      surface.segment<3>(3 * static_cast<Index>(i)) = answer.displacement_m.segment<3>(3 * seen[i]);
+    if (answer.patch_radius_m > 0) patch.radius_m = answer.patch_radius_m;
+    return answer.depth_m;
   };
 
   Discretisation out;
@@ -67,13 +77,13 @@ Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const 
   double last = work(out.linear, out.mesh);
   if (!(std::abs(last) > 0)) throw Error("does no work: is the force zero or held by the supports?", "force");
   // The first level already resolves the disc: quadratic tetrahedra need about two edges a radius.
-  double edge = std::min(longest_edge_near(base, patch) / 2, radius_m);
+  double edge = std::min(longest_edge_near(base, patch) / 2, patch.radius_m);
   double change = 0;
   const double base_work = last;
   double growth = 0.5;
   for (int level = 1; level <= options.max_levels; ++level, edge /= 2, growth *= 0.7) {
     RefinedMesh finer = refine_near(
-        base, [&](const Vec3& x) { return patch.distance_m(x) - 1.2 * radius_m; }, edge, growth, options.node_limit);
+        base, [&](const Vec3& x) { return patch.distance_m(x) - 1.2 * patch.radius_m; }, edge, growth, options.node_limit);
     const bool full = finer.mesh.nodes_m.rows() >= options.node_limit;
     if (full && level > 1) break;
     TetMesh quadratic = to_quadratic(finer.mesh);

@@ -58,12 +58,23 @@ struct Discretisation {
 /// Boundary of the object on a refined mesh: supports and the force columns of the contact.
 using BoundaryOn = std::function<Boundary(const TetMesh& quadratic, const RefinedMesh& linear)>;
 
-/// Refines under the tool until the work of the load, W = a' F' u, which is what a force-controlled probe's depth sees
-/// (E_hat / E = u_h / u), changes by so little from level to level that the error left is below the tolerance. Small strains
-/// are used for the choice. The error left is the geometric continuation of the last two changes: the rim of the load keeps
-/// convergence between first and second order. One change alone is no estimate, so there are two levels at least (within the
-/// limit of nodes; then half of the first change). Each level also refines farther away from the tool, for the surface that
-/// cameras see.
+/// What a mesh says of one contact.
+struct ContactAnswer {
+  double depth_m = 0;         ///< what a force-controlled probe reads; any number in proportion to 1 / E will do
+  VectorX displacement_m;     ///< 3n
+  double patch_radius_m = 0;  ///< of the patch where it was found; 0: it is the one that was given
+};
+using SolveOn = std::function<ContactAnswer(const TetMesh& quadratic, const RefinedMesh& linear)>;
+
+/// Refines under the tool until the depth of the load, work-conjugate (W = a' F' u), which is what a force-controlled probe sees
+/// (E_hat / E = u_h / u), changes by so little from level to level that the error left is below the tolerance. The error left is
+/// the geometric continuation of the last two changes: the rim of the load keeps convergence between first and second order. One
+/// change alone is no estimate, so there are two levels at least (within the limit of nodes; then half of the first change).
+/// Each level also refines farther away from the tool, for the surface that cameras see.
+/// @param solve  any solution of the same load on a mesh, contact search included (contact_statics.hpp)
+Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const SolveOn& solve,
+                          const DiscretisationOptions& options = {});
+/// The same for a uniform pressure on the patch and small strains.
 /// @param force  coefficients of the boundary's force columns
 Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const BoundaryOn& boundary_on,
                           const VectorX& force, const DiscretisationOptions& options = {});

@@ -65,6 +65,10 @@ ContactSystem::ContactSystem(const TetMesh& mesh_in, const std::string& material
     if (contact.free_axes.cols() > 0 && Eigen::FullPivLU<MatrixX>(contact.free_axes).rank() < contact.free_axes.cols())
       throw Error("are linearly dependent", where + ".free_axes");
     first_axis.push_back(first_axis.back() + static_cast<Index>(contact.free_axes.cols()));
+    TouchingBody start;
+    start.shape = contact.shape.get();
+    start.T_base_tool = contact.T_base_tool;
+    seats_.push_back(contact.seat_m > 0 ? terms.seats(start, contact.seat_m) : std::vector<double>());
   }
   motions = MatrixX(boundary.motions);
   for (Index k = 0; k < motions.cols(); ++k) motions.col(k) = system.prescribed_part(motions.col(k));
@@ -75,7 +79,8 @@ TouchingBody ContactSystem::body(std::size_t contact, const Moduli& m, const Pos
                                  const std::vector<TouchMemory>& memory) const {
   double k = contacts[contact].stiffness > 0 ? contacts[contact].stiffness : options.stiffness;
   if (softest > 0) k = std::min(k, softest);
-  return {contacts[contact].shape.get(), contacts[contact].law, pose, &memory[contact], k * m.young_pa};
+  const auto* seat = seats_[contact].empty() ? nullptr : &seats_[contact];
+  return {contacts[contact].shape.get(), contacts[contact].law, pose, &memory[contact], k * m.young_pa, seat};
 }
 
 ContactProblem ContactSystem::problem(double young, double poisson, const ContactLoads& loads, const VectorX& extra) const {

@@ -84,6 +84,7 @@ class ContactSystem {
  private:
   std::string iterate(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s,
                       ContactEquilibrium& out, double tolerance, int max_steps);
+  std::vector<std::vector<double>> seats_;  // a contact; empty: none
   BlockValues body_blocks_;  // of a linear law, at linear_
   Moduli linear_;
   mutable BlockValues shifted_;

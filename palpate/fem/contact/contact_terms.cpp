@@ -62,6 +62,23 @@ void ContactTerms::for_each_candidate(const TouchingBody& body, const VectorX& u
   }
 }
 
+bool ContactTerms::shape_at(const TouchingBody& body, Index face, int point, const Vec3& y, ShapePoint& out) const {
+  if (!body.shape->at(y, points_.cell_m(face), out)) return false;
+  if (body.seat_m != nullptr) out.gap_m -= (*body.seat_m)[static_cast<std::size_t>(face) * points_.per_face() + point];
+  return true;
+}
+
+std::vector<double> ContactTerms::seats(const TouchingBody& body, double reach_m) const {
+  std::vector<double> seat(static_cast<std::size_t>(points_.point_count()), 0);
+  const VectorX rest = VectorX::Zero(3 * static_cast<Index>(rest_m_.rows()));
+  ShapePoint shape;
+  for_each_candidate(body, rest, [&](Index f, int p, const Vec3& x, const Vec3&) {
+    if (!body.shape->at(body.T_base_tool.inverse() * x, points_.cell_m(f), shape) || std::abs(shape.gap_m) > reach_m) return;
+    seat[static_cast<std::size_t>(f) * points_.per_face() + p] = shape.gap_m;
+  });
+  return seat;
+}
+
 bool ContactTerms::sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Vec3& outward,
                           bool with_hessian, Sample& out) const {
   const double k = body.stiffness_pa / points_.face_size_m(face);
@@ -77,7 +94,7 @@ bool ContactTerms::sample(const TouchingBody& body, Index face, int point, const
     return true;
   }
   ShapePoint shape;
-  if (!body.shape->at(y, points_.cell_m(face), shape)) return false;
+  if (!shape_at(body, face, point, y, shape)) return false;
   if (!(shape.gap_m < 0) || !(shape.coverage > 0)) return false;
   // The far side of a thin object also lies inside a tool that was put deep; it faces away from what could touch it.
   if (outward.dot(body.T_base_tool.linear() * shape.normal) > 0.5 * outward.norm() * shape.normal.norm()) return false;
@@ -176,7 +193,7 @@ void ContactTerms::d_radius(const TouchingBody& body, const VectorX& u, VectorX&
   const Mat3& r = body.T_base_tool.linear();
   ShapePoint shape;
   for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3& y, const Sample&) {
-    if (body.law == Touch::bonded || !body.shape->at(y, points_.cell_m(f), shape)) return;
+    if (body.law == Touch::bonded || !shape_at(body, f, p, y, shape)) return;
     const RadiusDerivative d = body.shape->d_radius(y, points_.cell_m(f));
     const double k = points_.weight_m2(f, p) * body.stiffness_pa / points_.face_size_m(f), g = shape.gap_m;
     const Vec3 change = k * ((d.coverage * g + shape.coverage * d.gap) * shape.normal + shape.coverage * g * d.normal +
@@ -206,7 +223,7 @@ std::vector<ContactTerms::Held> ContactTerms::held(const TouchingBody& body, con
     if (body.law != Touch::bonded) {
       h.limit_pa = body.memory->limit_pa[h.index];
       if (!(h.limit_pa > 0)) return;
-      body.shape->at(y, points_.cell_m(f), shape);
+      shape_at(body, f, p, y, shape);
       h.normal = body.memory->normal[h.index];
       if (h.normal.squaredNorm() == 0) h.normal = shape.normal.normalized();
       const Vec3 offset = y - h.anchor_m, tangential = offset - h.normal.dot(offset) * h.normal;

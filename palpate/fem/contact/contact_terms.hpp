@@ -37,6 +37,7 @@ struct TouchingBody {
   Pose T_base_tool = Pose::Identity();
   const TouchMemory* memory = nullptr;  ///< needed but for frictionless
   double stiffness_pa = 0;              ///< k times the size of a face
+  const std::vector<double>* seat_m = nullptr;  ///< a surface point: gap at the start that counts as none; nullptr: no point
 };
 
 /// Derivatives to the tool's twist q = (translation of the tip, rotation about the tip), base axes.
@@ -87,6 +88,8 @@ class ContactTerms {
   void begin_increment(const TouchingBody& body, const VectorX& u, TouchMemory& memory) const;
   /// Friction limits from the present pressures; returns the largest change of force, newton.
   double update_limits(const TouchingBody& body, const VectorX& u, double friction, TouchMemory& memory) const;
+  /// Gaps at the start of points that lie within `reach_m` of the body's surface, else 0 (TouchingBody::seat_m).
+  std::vector<double> seats(const TouchingBody& body, double reach_m) const;
   /// At the end of an increment: anchors follow what has slipped (return map).
   void end_increment(const TouchingBody& body, const VectorX& u, TouchMemory& memory) const;
 
@@ -109,6 +112,7 @@ class ContactTerms {
   };
   bool sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Vec3& outward, bool with_hessian,
               Sample& out) const;
+  bool shape_at(const TouchingBody& body, Index face, int point, const Vec3& y, ShapePoint& out) const;
   template <typename Visit>
   void for_each_candidate(const TouchingBody& body, const VectorX& u, Visit&& visit) const;
   template <typename Visit>

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/rigid_tool.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr int across = 24;  // samples along the edge of a triangle near the tool
+
+/// Smallest gap between the tool, its tip on the line through `on_line_m`, and the surface near it.
+class GapAlong {
+ public:
+  GapAlong(const TetMesh& mesh, const fem::RigidShape& shape, const Pose& pose) : shape_(shape), pose_(pose) {
+    const Triangles triangles = fem::boundary_triangles(mesh);
+    const Vec3 centre = pose * shape.bounding_centre_m();
+    for (Index t = 0; t < triangles.rows(); ++t) {
+      const Vec3 a = mesh.nodes_m.row(triangles(t, 0)), b = mesh.nodes_m.row(triangles(t, 1)), c = mesh.nodes_m.row(triangles(t, 2));
+      const double size = std::max({(b - a).norm(), (c - a).norm(), (c - b).norm()});
+      if (((a + b + c) / 3 - centre).norm() > 2 * shape.bounding_radius_m() + size) continue;
+      cell_m_ = std::max(cell_m_, size / across);
+      for (int i = 0; i <= across; ++i)
+        for (int j = 0; i + j <= across; ++j) points_.push_back(a + (b - a) * i / double(across) + (c - a) * j / double(across));
+    }
+  }
+  bool misses() const { return points_.empty(); }
+  double at(double travel_m) const {
+    Pose pose = pose_;
+    pose.translation() += travel_m * pose.linear().col(2);
+    const Pose T_tool_base = pose.inverse();
+    double gap = std::numeric_limits<double>::infinity();
+    fem::ShapePoint point;
+    for (const Vec3& x : points_)
+      if (shape_.at(T_tool_base * x, cell_m_, point)) gap = std::min(gap, point.gap_m);
+    return gap;
+  }
+
+ private:
+  const fem::RigidShape& shape_;
+  Pose pose_;
+  double cell_m_ = 0;
+  std::vector<Vec3> points_;
+};
+
+}  // namespace
+
+Vec3 push_direction(const Tool& tool, const Load& load) {
+  return (tool.shape == ToolShape::platen ? tool.plane.normal : load.direction).normalized();
+}
+
+fem::RigidContact rigid_tool(const TetMesh& mesh, const Tool& tool, const Load& load) {
+  fem::RigidContact contact;
+  contact.name = tool.name;
+  contact.shape = fem::shape_of(tool);
+  contact.friction_coefficient = tool.friction_coefficient;
+  contact.law = tool.contact == ContactLaw::friction       ? fem::Touch::friction
+                : tool.contact == ContactLaw::frictionless ? fem::Touch::frictionless
+                                                           : fem::Touch::sticking;
+  const Vec3 direction = push_direction(tool, load);
+  if (tool.shape == ToolShape::platen) {
+    contact.T_base_tool = fem::tool_pose(tool.plane.point_m, direction);
+    const double diagonal_m = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
+    contact.seat_m = std::max(1e-6, 1e-4 * diagonal_m);
+    return contact;
+  }
+  contact.T_base_tool = fem::tool_pose(load.contact_m, direction, tool.axis);
+  const GapAlong gap(mesh, *contact.shape, contact.T_base_tool);
+  if (gap.misses()) throw Error("lies nowhere near the object; check its loads' contact_m", "tools." + tool.name);
+  // From twice its size outside, where it touches nothing, inwards.
+  const double reach_m = 2 * contact.shape->bounding_radius_m();
+  const double stride_m = reach_m / 100;
+  double outside = -reach_m, inside = outside;
+  while (gap.at(inside) >= 0) {
+    outside = inside;
+    inside += stride_m;
+    if (inside > reach_m)
+      throw Error("misses the object along the push through contact_m; check direction and contact_m", "tools." + tool.name);
+  }
+  for (int k = 0; k < 40; ++k) {
+    const double middle = 0.5 * (outside + inside);
+    (gap.at(middle) < 0 ? inside : outside) = middle;
+  }
+  contact.T_base_tool.translation() += outside * direction;
+  return contact;
+}
+
+}  // namespace palpate::estimation

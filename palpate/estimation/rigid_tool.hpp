@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tools of a recording as rigid bodies that touch the object.
+#pragma once
+
+#include "palpate/core/recording.hpp"
+#include "palpate/fem/contact_statics.hpp"
+
+namespace palpate::estimation {
+
+/// Along which a tool's imposed motion goes: a platen's normal, else the load's direction.
+Vec3 push_direction(const Tool& tool, const Load& load);
+
+/// The tool where it just touches the object at rest: a platen at its plane, any other tool with its tip on the line of the
+/// push through Load::contact_m, as far along as nothing of it is inside the object (to a thousandth of its size). `bonded`:
+/// what touches does not slide.
+/// @throws Error for chosen vertices, a shape without its size, or a tool that misses the object
+fem::RigidContact rigid_tool(const TetMesh& mesh, const Tool& tool, const Load& load);
+
+}  // namespace palpate::estimation
