@@ -36,6 +36,18 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
       ->check(CLI::PositiveNumber);
   app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
+  lab::LabOptions& lab = arguments.lab;
+  app.add_option("--compliance", lab.compliance_m_per_n, "of the lab's stick and arm, m/N (0.0001: a tenth of a millimetre a newton)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--stated-compliance", lab.stated_compliance_m_per_n, "what the recording says of it, m/N (default: the truth)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--relaxation", lab.relaxation, "share of each rise of the force that fades after the motion")
+      ->check(CLI::Range(0.0, 0.95))
+      ->capture_default_str();
+  app.add_option("--relaxation-time", lab.relaxation_s, "with this time constant, s")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--slip-at", lab.slip_at_m, "travel at which the tip slides off sideways, m (default: it holds)")->check(CLI::PositiveNumber);
+  app.add_option("--slides-at", lab.slides_at_n, "sideways force at which the object slides on the table, N (default: it holds)")
+      ->check(CLI::PositiveNumber);
 }
 
 lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
@@ -53,7 +65,7 @@ lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
 }
 
 lab::LabOptions lab_options(const LabArguments& arguments, std::uint64_t seed) {
-  lab::LabOptions options;
+  lab::LabOptions options = arguments.lab;
   options.seed = seed;
   options.depth = lab::depth_sensor(arguments.depth_sensor);
   options.force = lab::force_sensor(arguments.force_sensor);

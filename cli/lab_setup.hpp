@@ -19,9 +19,10 @@ struct LabArguments {
   double young_modulus_pa = 0;  ///< 0: drawn from the seed
   double poisson_ratio = -1;    ///< below 0: drawn from the seed
   double region_ratio = 1;      ///< 1: one stiffness everywhere
+  lab::LabOptions lab;          ///< what goes wrong in it: compliance, relaxation, slip, sliding
 };
 
-/// --object, --material, --depth-sensor, --force-sensor, --young-modulus, --poisson-ratio, --region-ratio
+/// What the lab pushes, with what, and what goes wrong then.
 void add_lab_options(CLI::App& app, LabArguments& arguments);
 
 /// A name of the lab's table, or a mesh file.

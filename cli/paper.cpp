@@ -36,9 +36,22 @@ nlohmann::json json_of(const TrialAnswer& trial) {
                         {"tetrahedra", trial.tetrahedra},
                         {"paper", json_of(trial.paper)},
                         {"paper_linear_tetrahedra", json_of(trial.paper_coarse)},
-                        {"palpate", json_of(trial.palpate)},
-                        {"held_out_rms_m",
-                         {{"paper", trial.held_out_paper_m}, {"palpate", trial.held_out_palpate_m}, {"still", trial.held_out_still_m}}}};
+                        {"palpate", json_of(trial.palpate)}};
+  for (const SiteAnswer& site : trial.sites)
+    out["sites"].push_back({{"site", site.site},
+                            {"true_young_modulus_pa", site.young_modulus_pa},
+                            {"paper", json_of(site.paper)},
+                            {"palpate", json_of(site.palpate)}});
+  if (!trial.as_one_verdicts.empty()) out["verdicts_without_regions"] = trial.as_one_verdicts;
+  for (const UnusedStep& step : trial.unused)
+    out["unused_place"].push_back({{"force_n", step.force_n},
+                                   {"travel_m", step.travel_m},
+                                   {"force_paper_n", step.force_paper_n},
+                                   {"force_palpate_n", step.force_palpate_n},
+                                   {"surface_rms_m",
+                                    {{"paper", step.surface_paper_m}, {"palpate", step.surface_palpate_m}, {"still", step.surface_still_m}}}});
+  for (const RegistrationPicture& picture : trial.pictures)
+    out["registrations"].push_back({{"young_modulus_pa", picture.young_modulus_pa}, {"rms_m", picture.rms_m}});
   for (const SampleAnswer& sample : trial.samples)
     out["samples"].push_back({{"push", sample.push},
                               {"force_n", sample.force_n},
@@ -83,6 +96,7 @@ int remake(Session& session, const PaperArguments& arguments) {
       TrialOptions options;
       options.threads = session.thread_count();
       options.every_sample = k > 0 ? 0 : arguments.quick ? 2 : 1;
+      options.pictures = k == 0;
       options.surface_points = k > 0 ? 0 : arguments.quick ? 9 : 25;
       const TrialAnswer trial = run_trial(*scene, session.seed + static_cast<std::uint64_t>(k), options, session.progress());
       if (Session::interrupted()) break;
@@ -97,9 +111,10 @@ int remake(Session& session, const PaperArguments& arguments) {
     if (of_scene.trials.empty()) break;
     nlohmann::json json = {{"scene", scene->name}, {"trials", nlohmann::json::array()}};
     for (const TrialAnswer& trial : of_scene.trials) json["trials"].push_back(json_of(trial));
-    json["scores"] = {{"paper", json_of(score_of(of_scene.trials, &TrialAnswer::paper))},
-                      {"paper_linear_tetrahedra", json_of(score_of(of_scene.trials, &TrialAnswer::paper_coarse))},
-                      {"palpate", json_of(score_of(of_scene.trials, &TrialAnswer::palpate))}};
+    const SceneScores scores = scores_of(of_scene.trials);
+    json["scores"] = {{"paper", json_of(scores.paper)},
+                      {"paper_linear_tetrahedra", json_of(scores.paper_coarse)},
+                      {"palpate", json_of(scores.palpate)}};
     told["scenes"].push_back(std::move(json));
     answers.push_back(std::move(of_scene));
     // After every scene: a run that is stopped leaves what it has.

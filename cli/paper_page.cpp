@@ -5,129 +5,48 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
+#include "cli/paper_figures.hpp"
 #include "palpate/core/version.hpp"
-#include "palpate/report/axes.hpp"
 #include "palpate/report/words.hpp"
 
 namespace palpate::cli {
 namespace {
 
-using report::Axes;
-using report::Range;
-using report::Spot;
-
-constexpr double width_pt = 420, height_pt = 260;
-const report::Colour truth_colour{22, 32, 44}, paper_colour = report::category(1), own_colour = report::category(0);
-
-void legend(report::Canvas& canvas, std::initializer_list<std::pair<const char*, report::Colour>> entries) {
-  double x = 60;
-  for (const auto& [words, colour] : entries) {
-    canvas.dot({x, 12}, 3, colour);
-    canvas.text({x + 7, 15}, words, 9, report::Align::left, report::ink);
-    x += 16 + 5.4 * static_cast<double>(std::string_view(words).size());
+std::string site_table(const TrialAnswer& trial) {
+  if (trial.sites.empty()) return {};
+  std::string html = "<table><tr><th>site</th><th>true E</th><th>the paper's method, this push alone</th><th>palpate, all regions at "
+                     "once</th><th>95 %</th></tr>\n";
+  for (const SiteAnswer& site : trial.sites)
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{} ({:+.0f} %)</td><td>{} ({:+.0f} %)</td><td>{}</td></tr>\n", site.site,
+                        report::quantity(site.young_modulus_pa, "Pa"), report::quantity(site.paper.young_modulus_pa, "Pa"),
+                        100 * (site.paper.young_modulus_pa / site.young_modulus_pa - 1),
+                        report::quantity(site.palpate.young_modulus_pa, "Pa"),
+                        100 * (site.palpate.young_modulus_pa / site.young_modulus_pa - 1),
+                        report::interval(site.palpate.lower_95_pa, site.palpate.upper_95_pa, "Pa"));
+  html += "</table>\n";
+  if (!trial.as_one_verdicts.empty()) {
+    std::string codes;
+    for (const std::string& code : trial.as_one_verdicts) codes += (codes.empty() ? "" : ", ") + code;
+    html += "<p class=\"small\">Told of no regions, palpate's verdicts are: " + codes + ".</p>\n";
+  } else {
+    html += "<p class=\"small\">Told of no regions, palpate had no verdict.</p>\n";
   }
+  return html;
 }
 
-/// Fig. 4: the error over (E, nu), both paths on it.
-std::string surface_figure(const TrialAnswer& trial) {
-  const ErrorSurface& surface = trial.surface;
-  if (surface.error_m2.size() == 0) return {};
-  auto canvas = report::svg_canvas(width_pt, height_pt);
-  const Index rows = static_cast<Index>(surface.error_m2.rows()), columns = static_cast<Index>(surface.error_m2.cols());
-  Axes axes(*canvas, width_pt, height_pt, "log10 E (Pa)",
-            {std::log10(surface.young_modulus_pa(0)), std::log10(surface.young_modulus_pa(rows - 1))}, "Poisson ratio",
-            {surface.poisson_ratio(0), surface.poisson_ratio(columns - 1)});
-  const double low = std::log(surface.smallest_m2());
-  double high = low;
-  for (double e : surface.error_m2.reshaped())
-    if (std::isfinite(e)) high = std::max(high, std::log(e));
-  const auto x_at = [&](double i) {
-    const double a = std::log10(surface.young_modulus_pa(0)), b = std::log10(surface.young_modulus_pa(rows - 1));
-    return std::clamp(a + (b - a) * i / static_cast<double>(rows - 1), a, b);
-  };
-  const auto y_at = [&](double k) {
-    const double a = surface.poisson_ratio(0), b = surface.poisson_ratio(columns - 1);
-    return std::clamp(a + (b - a) * k / static_cast<double>(columns - 1), a, b);
-  };
-  for (Index i = 0; i < rows; ++i)
-    for (Index k = 0; k < columns; ++k) {
-      const double e = surface.error_m2(i, k);
-      const double share = std::isfinite(e) && high > low ? (std::log(e) - low) / (high - low) : 1;
-      const auto tone = [&](double from, double to) { return static_cast<std::uint8_t>(from + (to - from) * share); };
-      const Spot corner = axes.at(x_at(static_cast<double>(i) - 0.5), y_at(static_cast<double>(k) + 0.5)),
-                 opposite = axes.at(x_at(static_cast<double>(i) + 0.5), y_at(static_cast<double>(k) - 0.5));
-      canvas->box(corner, opposite.x - corner.x + 0.3, opposite.y - corner.y + 0.3, {tone(40, 245), tone(90, 246), tone(140, 248)});
-    }
-  const auto path = [&](const MethodAnswer& method, report::Colour colour) {
-    std::vector<Spot> spots;
-    for (const FitIteration& at : method.path) {
-      const double x = std::log10(at.young_modulus_pa), y = at.poisson_ratio;
-      if (x < x_at(0) || x > x_at(static_cast<double>(rows)) || y < y_at(0) || y > y_at(static_cast<double>(columns))) continue;
-      spots.push_back({x, y});
-    }
-    if (spots.size() > 1) axes.line(spots, colour, 1.4);
-    axes.dot(std::log10(method.young_modulus_pa), method.poisson_ratio, 4, colour);
-  };
-  path(trial.paper, paper_colour);
-  path(trial.palpate, own_colour);
-  axes.dot(std::log10(trial.young_modulus_pa), trial.poisson_ratio, 3, truth_colour);
-  legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate", own_colour}});
-  return canvas->bytes();
-}
-
-/// Fig. 5: measured force over travel.
-std::string force_figure(const TrialAnswer& trial) {
-  std::map<std::string, std::vector<Spot>> pushes;
-  std::vector<double> travels, forces;
-  for (const SampleAnswer& sample : trial.samples) {
-    if (!std::isfinite(sample.travel_m)) continue;
-    pushes[sample.push].push_back({1000 * sample.travel_m, sample.force_n});
-    travels.push_back(1000 * sample.travel_m);
-    forces.push_back(sample.force_n);
-  }
-  if (travels.size() < 2) return {};
-  auto canvas = report::svg_canvas(width_pt, height_pt);
-  Axes axes(*canvas, width_pt, height_pt, "travel of the tool (mm)", report::range_of(travels, true), "force (N)",
-            report::range_of(forces, true));
-  std::size_t i = 0;
-  double x = 60;
-  for (const auto& [name, spots] : pushes) {
-    const auto colour = report::category(i++);
-    axes.line(spots, colour, 1.4);
-    for (const Spot& spot : spots) axes.dot(spot.x, spot.y, 2.5, colour);
-    canvas->dot({x, 12}, 3, colour);
-    canvas->text({x + 7, 15}, name, 9, report::Align::left, report::ink);
-    x += 24 + 5.4 * static_cast<double>(name.size());
-  }
-  return canvas->bytes();
-}
-
-/// Fig. 6, 8 and 9: E of every sample alone, by both methods, with ours' interval.
-std::string samples_figure(const TrialAnswer& trial) {
-  if (trial.samples.empty()) return {};
-  std::vector<double> values{trial.young_modulus_pa / 1000};
-  for (const SampleAnswer& sample : trial.samples)
-    for (double e : {sample.paper.young_modulus_pa, sample.palpate.young_modulus_pa})
-      if (e < 6 * trial.young_modulus_pa) values.push_back(e / 1000);
-  auto canvas = report::svg_canvas(width_pt, height_pt);
-  const double count = static_cast<double>(trial.samples.size());
-  const Range range = report::range_of(values, true);
-  Axes axes(*canvas, width_pt, height_pt, "sample, all pushes one after the other", {0, count + 1}, "E (kPa)", range);
-  axes.line(std::vector<Spot>{{0.0, trial.young_modulus_pa / 1000}, {count + 1, trial.young_modulus_pa / 1000}}, truth_colour, 1, true);
-  for (std::size_t i = 0; i < trial.samples.size(); ++i) {
-    const SampleAnswer& sample = trial.samples[i];
-    const double x = static_cast<double>(i) + 1;
-    if (i > 0 && trial.samples[i - 1].push != sample.push)
-      axes.line(std::vector<Spot>{{x - 0.5, range.from}, {x - 0.5, range.to}}, report::rule, 0.8);
-    const double top = std::min(sample.palpate.upper_95_pa / 1000, range.to), foot = sample.palpate.lower_95_pa / 1000;
-    if (foot < top) axes.line(std::vector<Spot>{{x + 0.12, foot}, {x + 0.12, top}}, own_colour, 1);
-    if (sample.palpate.young_modulus_pa / 1000 < range.to) axes.dot(x + 0.12, sample.palpate.young_modulus_pa / 1000, 2.5, own_colour);
-    if (sample.paper.young_modulus_pa / 1000 < range.to) axes.dot(x - 0.12, sample.paper.young_modulus_pa / 1000, 2.5, paper_colour);
-  }
-  legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate, 95 %", own_colour}});
-  return canvas->bytes();
+std::string unused_table(const TrialAnswer& trial) {
+  if (trial.unused.empty()) return {};
+  std::string html = "<p>A push at a place that was not used: force expected at the measured travel, and rms distance of what the camera "
+                     "saw to the expected surface.</p>\n<table><tr><th>true force</th><th>travel</th><th>force: the paper's "
+                     "method</th><th>palpate</th><th>surface: the paper's method</th><th>palpate</th><th>if nothing moved</th></tr>\n";
+  for (const UnusedStep& step : trial.unused)
+    html += fmt::format("<tr><td>{:.2f} N</td><td>{:.1f} mm</td><td>{:.2f} N ({:+.0f} %)</td><td>{:.2f} N ({:+.0f} %)</td><td>{:.2f} mm</td>"
+                        "<td>{:.2f} mm</td><td>{:.2f} mm</td></tr>\n",
+                        step.force_n, 1000 * step.travel_m, step.force_paper_n, 100 * (step.force_paper_n / step.force_n - 1),
+                        step.force_palpate_n, 100 * (step.force_palpate_n / step.force_n - 1), 1000 * step.surface_paper_m,
+                        1000 * step.surface_palpate_m, 1000 * step.surface_still_m);
+  return html + "</table>\n";
 }
 
 std::string figure(const std::string& svg, const std::string& caption) {
@@ -146,23 +65,23 @@ std::string section(const SceneAnswers& answers) {
   const TrialAnswer& first = answers.trials.front();
   std::string html = fmt::format("<h2 id=\"{}\">{}</h2>\n<p><b>The paper</b> (fig. {}): {}<br><b>Here</b>: {}</p>\n", scene.name,
                                  scene.title, scene.figures, scene.paper_says, scene.differs);
-  html += fmt::format(
-      "<p>Seed {}: the true E is {}, &nu; {:.3f}. {} quadratic tetrahedra. The paper's method found {} and {:.3f} in {} "
-      "iterations, {} solves and {:.1f} s; palpate {} ({}) and {:.3f} in {} iterations, {} solves and {:.1f} s.</p>\n",
-      first.seed, report::quantity(first.young_modulus_pa, "Pa"), first.poisson_ratio, first.tetrahedra,
-      report::quantity(first.paper.young_modulus_pa, "Pa"), first.paper.poisson_ratio, first.paper.iterations, first.paper.solves,
-      first.paper.seconds, report::quantity(first.palpate.young_modulus_pa, "Pa"),
-      report::interval(first.palpate.lower_95_pa, first.palpate.upper_95_pa, "Pa"), first.palpate.poisson_ratio,
-      first.palpate.iterations, first.palpate.solves, first.palpate.seconds);
-  if (std::isfinite(first.held_out_palpate_m))
-    html += fmt::format("<p>The last push, predicted from the others: its points lie {:.2f} mm (rms) from the surface with the "
-                        "paper's E, {:.2f} mm with palpate's; {:.2f} mm if nothing moved.</p>\n",
-                        1000 * first.held_out_paper_m, 1000 * first.held_out_palpate_m, 1000 * first.held_out_still_m);
+  html += fmt::format("<p>Seed {}: the true E is {}{}, &nu; {:.3f}. {} quadratic tetrahedra. The paper's method found {} and {:.3f} in {} "
+                      "iterations, {} solves and {:.1f} s",
+                      first.seed, report::quantity(first.young_modulus_pa, "Pa"),
+                      first.sites.empty() ? "" : " at " + first.sites.front().site, first.poisson_ratio, first.tetrahedra,
+                      report::quantity(first.paper.young_modulus_pa, "Pa"), first.paper.poisson_ratio, first.paper.iterations,
+                      first.paper.solves, first.paper.seconds);
+  html += fmt::format("; palpate {} ({}) and {:.3f} in {} iterations, {} solves and {:.1f} s.</p>\n",
+                      report::quantity(first.palpate.young_modulus_pa, "Pa"),
+                      report::interval(first.palpate.lower_95_pa, first.palpate.upper_95_pa, "Pa"), first.palpate.poisson_ratio,
+                      first.palpate.iterations, first.palpate.solves, first.palpate.seconds);
+  html += site_table(first) + unused_table(first);
   html += "<table><tr><th>method</th><th>bias of E</th><th>rms of E</th><th>bias of &nu;</th><th>rms of &nu;</th><th>truth in "
           "95 %</th><th>solves</th><th>s</th></tr>\n";
-  html += row("the paper's method, linear tetrahedra", score_of(answers.trials, &TrialAnswer::paper_coarse), false);
-  html += row("the paper's method on palpate's mesh", score_of(answers.trials, &TrialAnswer::paper), false);
-  html += row("palpate", score_of(answers.trials, &TrialAnswer::palpate), true);
+  const SceneScores scores = scores_of(answers.trials);
+  if (first.sites.empty()) html += row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
+  html += row(first.sites.empty() ? "the paper's method on palpate's mesh" : "the paper's method on palpate's mesh, by site", scores.paper, false);
+  html += row("palpate", scores.palpate, true);
   html += fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm.</p>\n",
                       answers.trials.size(), answers.trials.size() == 1 ? "" : "s");
   if (first.surface.error_m2.size() > 0) {
@@ -175,6 +94,8 @@ std::string section(const SceneAnswers& answers) {
                             : "so it did not reach the minimum of its own objective");
     html += figure(surface_figure(first), "The paper's error function over (E, &nu;), dark = small, with the paths of both methods.");
   }
+  html += figure(registration_figure(first),
+                 "What the camera saw of the hardest push, registered with the surface that each E gives; the last is the true one.");
   html += figure(force_figure(first), "Measured force over travel.");
   html += figure(samples_figure(first), "E from every sample alone.");
   return html;
@@ -182,12 +103,20 @@ std::string section(const SceneAnswers& answers) {
 
 }  // namespace
 
-Score score_of(const std::vector<TrialAnswer>& trials, const MethodAnswer TrialAnswer::*method) {
+namespace {
+
+/// One E with its truth: of the whole object, or of a site of one with regions.
+struct Compared {
+  double young_modulus_pa = 0, poisson_ratio = 0;
+  const MethodAnswer* answer = nullptr;
+};
+
+Score score_of(const std::vector<Compared>& all) {
   Score score;
-  for (const TrialAnswer& trial : trials) {
-    const MethodAnswer& answer = trial.*method;
-    const double error = std::log(answer.young_modulus_pa / trial.young_modulus_pa), shift = answer.poisson_ratio - trial.poisson_ratio;
-    ++score.trials;
+  for (const Compared& one : all) {
+    const MethodAnswer& answer = *one.answer;
+    const double error = std::log(answer.young_modulus_pa / one.young_modulus_pa), shift = answer.poisson_ratio - one.poisson_ratio;
+    ++score.answers;
     score.bias_percent += 100 * error;
     score.rms_percent += 1e4 * error * error;
     score.poisson_bias += shift;
@@ -196,9 +125,9 @@ Score score_of(const std::vector<TrialAnswer>& trials, const MethodAnswer TrialA
     score.seconds += answer.seconds;
     if (!std::isfinite(answer.lower_95_pa)) continue;
     ++score.with_interval;
-    score.inside_95 += answer.lower_95_pa <= trial.young_modulus_pa && trial.young_modulus_pa <= answer.upper_95_pa;
+    score.inside_95 += answer.lower_95_pa <= one.young_modulus_pa && one.young_modulus_pa <= answer.upper_95_pa;
   }
-  const double count = std::max(1, score.trials);
+  const double count = std::max(1, score.answers);
   score.bias_percent /= count;
   score.rms_percent = std::sqrt(score.rms_percent / count);
   score.poisson_bias /= count;
@@ -206,6 +135,56 @@ Score score_of(const std::vector<TrialAnswer>& trials, const MethodAnswer TrialA
   score.solves /= count;
   score.seconds /= count;
   return score;
+}
+
+/// What the evaluation has to show, over all scenes, and whether it does.
+std::string claims(const std::vector<SceneAnswers>& scenes) {
+  std::vector<double> shares;
+  std::string worse, dear;
+  int inside = 0, intervals = 0;
+  std::size_t least = 1000000;
+  for (const SceneAnswers& scene : scenes) {
+    const SceneScores scores = scores_of(scene.trials);
+    shares.push_back(scores.palpate.rms_percent / scores.paper.rms_percent);
+    const std::string name(scene.scene->name);
+    if (!(shares.back() < 1)) worse += (worse.empty() ? "" : ", ") + name;
+    if (!(scores.palpate.solves <= 0.2 * scores.paper.solves)) dear += (dear.empty() ? "" : ", ") + name;
+    inside += scores.palpate.inside_95;
+    intervals += scores.palpate.with_interval;
+    least = std::min(least, scene.trials.size());
+  }
+  if (shares.empty()) return {};
+  std::sort(shares.begin(), shares.end());
+  const double median = 0.5 * (shares[shares.size() / 2] + shares[(shares.size() - 1) / 2]);
+  const double in = intervals > 0 ? 100.0 * inside / intervals : 0;
+  const auto line = [](const std::string& what, bool holds, const std::string& found) {
+    return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", what, holds ? "yes" : "<b>no</b>", found);
+  };
+  std::string html = "<h2>What it should show, and whether it does</h2>\n<table><tr><th>claim</th><th>holds</th><th>found</th></tr>\n";
+  html += line("palpate's rms error of E is smaller in every scene", worse.empty(), worse.empty() ? "in all" : "not in: " + worse);
+  html += line("in the median scene it is at most half", median <= 0.5, fmt::format("{:.2f} of the paper's method's", median));
+  html += line("at least 88 % of the truths lie in palpate's 95 % intervals", in >= 88, fmt::format("{:.0f} % of {}", in, intervals));
+  html += line("palpate needs at most a fifth of the solves", dear.empty(), dear.empty() ? "in all" : "not in: " + dear);
+  return html + fmt::format("</table>\n<p class=\"small\">{} seed{} a scene at least{}.</p>\n", least, least == 1 ? "" : "s",
+                            least < 100 ? ": too few to say so; a full run has 100" : "");
+}
+
+}  // namespace
+
+SceneScores scores_of(const std::vector<TrialAnswer>& trials) {
+  std::vector<Compared> paper, coarse, palpate;
+  for (const TrialAnswer& trial : trials) {
+    coarse.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.paper_coarse});
+    if (trial.sites.empty()) {
+      paper.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.paper});
+      palpate.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.palpate});
+    }
+    for (const SiteAnswer& site : trial.sites) {
+      paper.push_back({site.young_modulus_pa, trial.poisson_ratio, &site.paper});
+      palpate.push_back({site.young_modulus_pa, trial.poisson_ratio, &site.palpate});
+    }
+  }
+  return {score_of(paper), score_of(coarse), score_of(palpate)};
 }
 
 std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::string& command, int threads) {
@@ -223,6 +202,7 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::strin
       "descent with numerical derivatives. It gets palpate's mesh, solver, points, start and {} thread{}; a second row gives it linear "
       "tetrahedra, as the paper had. Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the object at rest. All truths are linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
       version, threads, threads == 1 ? "" : "s", command);
+  html += claims(scenes);
   for (const SceneAnswers& scene : scenes) html += section(scene);
   return html + "</body></html>\n";
 }

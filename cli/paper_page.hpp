@@ -16,12 +16,16 @@ struct SceneAnswers {
 
 /// Of a method over the trials of a scene.
 struct Score {
-  int trials = 0, with_interval = 0, inside_95 = 0;
+  int answers = 0, with_interval = 0, inside_95 = 0;
   double bias_percent = 0, rms_percent = 0;  ///< of log E
   double poisson_bias = 0, poisson_rms = 0;
   double solves = 0, seconds = 0;            ///< means
 };
-Score score_of(const std::vector<TrialAnswer>& trials, const MethodAnswer TrialAnswer::*method);
+struct SceneScores {
+  Score paper, paper_coarse, palpate;
+};
+/// Of an object with regions, every site's E counts.
+SceneScores scores_of(const std::vector<TrialAnswer>& trials);
 
 /// One offline HTML file.
 std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::string& command, int threads);

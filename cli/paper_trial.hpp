@@ -28,6 +28,26 @@ struct SampleAnswer {
   MethodAnswer paper, palpate;
 };
 
+/// E where one push acts: by the paper's method from this push alone, by ours as the region's where the object has regions.
+struct SiteAnswer {
+  std::string site;
+  double young_modulus_pa = 0;  ///< the truth there
+  MethodAnswer paper, palpate;
+};
+
+/// A push at a place that no method has seen, at one of its forces.
+struct UnusedStep {
+  double force_n = 0, travel_m = 0;                         ///< true force, measured travel
+  double force_paper_n = 0, force_palpate_n = 0;            ///< that each answer expects at this travel
+  double surface_paper_m = 0, surface_palpate_m = 0, surface_still_m = 0;  ///< rms of the seen points to the expected surface
+};
+
+/// The seen points of the hardest step laid on the surface that an E gives.
+struct RegistrationPicture {
+  double young_modulus_pa = 0, rms_m = 0;
+  Points simulated_m, registered_m;  ///< thinned
+};
+
 /// The paper's error function over (E, nu), m2; rows = E.
 struct ErrorSurface {
   VectorX young_modulus_pa, poisson_ratio;
@@ -42,7 +62,10 @@ struct TrialAnswer {
   Index tetrahedra = 0;
   MethodAnswer paper, palpate;
   MethodAnswer paper_coarse;                  ///< the paper's method on linear tetrahedra of the same mesh
-  double held_out_paper_m = 0, held_out_palpate_m = 0, held_out_still_m = 0;  ///< rms of the last push, fitted without; NaN = one push
+  std::vector<SiteAnswer> sites;              ///< only of an object with regions
+  std::vector<std::string> as_one_verdicts;   ///< of ours when it takes such an object for homogeneous; only where asked for
+  std::vector<UnusedStep> unused;
+  std::vector<RegistrationPicture> pictures;  ///< only where asked for
   std::vector<SampleAnswer> samples;          ///< each sample alone; only where asked for
   ErrorSurface surface;                       ///< only where asked for
 };
@@ -50,6 +73,7 @@ struct TrialAnswer {
 struct TrialOptions {
   int every_sample = 0;    ///< alone: 1 = each, 2 = every second, ...; 0 = none
   int surface_points = 0;  ///< a side of the error surface; 0 = none
+  bool pictures = false;   ///< registrations, and what ours says of an object with regions that it is not told of
   int threads = 1;
 };
 

@@ -111,6 +111,10 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
         [] { return !Session::interrupted(); }, so_far);
     for (const int step : report.unsettled)
       session.warn(fmt::format("step {} of {} had not settled when it was recorded", step, plan.name));
+    if (!report.came_back)
+      session.warn(fmt::format("{}: after the push {:.2f} % of the picture are not as before: the object has moved or did not come "
+                               "back; hold it better, or push less",
+                               plan.name, 100 * report.changed_share));
     session.say(fmt::format("{} stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps", plan.name, acquisition::to_words(report.stop),
                             report.message, report.highest_force_n, 1000 * report.deepest_m, report.steps));
     told.push_back({{"push", plan.name},
@@ -120,7 +124,8 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
                     {"steps", report.steps},
                     {"highest_force_n", report.highest_force_n},
                     {"deepest_m", report.deepest_m},
-                    {"unsettled", report.unsettled}});
+                    {"unsettled", report.unsettled},
+                    {"came_back", report.came_back}});
     steps += report.steps;
     fine = fine && (report.stop == acquisition::StopReason::force_limit || report.stop == acquisition::StopReason::travel_limit ||
                     report.stop == acquisition::StopReason::slip || report.stop == acquisition::StopReason::contact_lost);

@@ -16,9 +16,9 @@
 #include "palpate/fem/regions.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/reconstruction/build_object.hpp"
-#include "palpate/reconstruction/stand_on.hpp"
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/observe.hpp"
@@ -208,7 +208,7 @@ void fill_with_tetrahedra(Recording& recording, const OnProgress& progress) {
     options.mesh.finer = finer_under_tools(recording);
     for (const Support& support : recording.supports) {
       if (!recording.rest.surface || (support.kind != SupportKind::plane && support.kind != SupportKind::table)) continue;
-      for (const auto& near : reconstruction::finer_at_feet(support.plane, *recording.rest.surface)) options.mesh.finer.push_back(near);
+      for (const auto& near : geometry::finer_at_feet(support.plane, *recording.rest.surface)) options.mesh.finer.push_back(near);
     }
   }
   auto built = recording.rest.surface

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
+#include "palpate/sensing/rest_change.hpp"
 
 namespace palpate::acquisition {
 namespace {
@@ -35,6 +36,9 @@ class PushRun {
             recorded_travel_m_ = std::max(recorded_travel_m_, encoder->travel_m);
         recorded_rest_ = recorded_rest_ || force == 0;
         recorded_again_ = recorded_again_ || (step.unloading && force == 0);
+        if (force == 0 && !step.unloading)
+          for (const Observation& seen : step.observations)
+            if (const auto* frame = std::get_if<DepthFrame>(&seen)) before_ = *frame;
       }
   }
 
@@ -244,10 +248,22 @@ class PushRun {
       encoder.sigma_m = robot_.travel_sigma_m();
       step.observations.emplace_back(encoder);
     }
-    step.observations.emplace_back(robot_.take_depth_image());
+    DepthFrame image = robot_.take_depth_image();
+    if (!force_n && !unloading) before_ = image;
+    if (!force_n && unloading && before_) look_whether_it_came_back(image);
+    step.observations.emplace_back(std::move(image));
     if (on_step_) on_step_(push_, step);
     ++next_index_;
     ++report_.steps;
+  }
+
+  // A camera that moves with the arm stands elsewhere by now: only images from one place can be compared.
+  void look_whether_it_came_back(const DepthFrame& after) {
+    const DepthFrame& before = *before_;
+    if (before.depth_m.rows() != after.depth_m.rows() || before.depth_m.cols() != after.depth_m.cols()) return;
+    if (!before.T_base_camera.isApprox(after.T_base_camera, 1e-6)) return;
+    report_.changed_share = sensing::changed_share(before, after);
+    report_.came_back = report_.changed_share <= options_.changed_share;
   }
 
   void go_back_step_by_step() {
@@ -292,6 +308,7 @@ class PushRun {
   int next_index_ = 0;
   double recorded_force_n_ = 0, recorded_travel_m_ = 0;
   bool recorded_rest_ = false, recorded_unloading_ = false, recorded_again_ = false;
+  std::optional<DepthFrame> before_;  // the untouched object
 };
 
 }  // namespace
@@ -322,6 +339,7 @@ void check(const PushOptions& o) {
   need(o.free_air_samples >= 2, "free_air_samples", "must be at least 2");
   need(o.settling_timeout_s > o.settling.window_s, "settling_timeout_s", "must be longer than settling.window_s");
   need(o.contact_std_m >= 0, "contact_std_m", "must not be negative");
+  need(o.changed_share >= 0, "changed_share", "must not be negative");
   sensing::check(o.contact);
   sensing::check(o.settling);
   sensing::check(o.slip);

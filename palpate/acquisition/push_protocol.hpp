@@ -38,6 +38,7 @@ struct PushOptions {
   int free_air_samples = 50;         ///< for the tare and its noise
   double settling_timeout_s = 10.0;  ///< a step that has not settled by then is recorded and reported
   double contact_std_m = 0.0;        ///< prior on the contact point that the recording will state
+  double changed_share = 2e-4;       ///< of the pixels after the push, beyond which the object did not come back
   sensing::ContactOptions contact;
   /// The window is long enough for 0.05 N of noise at 50 Hz to leave the slope known to 0.01 N/s.
   sensing::SettlingOptions settling{0.05, 0.005, 2.0};
@@ -58,6 +59,8 @@ struct PushReport {
   int steps = 0;               ///< recorded now, resumed ones not counted
   std::vector<int> unsettled;  ///< indices (in the push) of steps whose force still crept
   Vec3 tare_n = Vec3::Zero();  ///< taken off every force
+  bool came_back = true;       ///< false: what the camera sees after the push is not what it saw before
+  double changed_share = 0;    ///< of its pixels (sensing::changed_share)
 };
 
 /// Called with each finished step, after the force has settled and everything is read: a crash loses at most the step in

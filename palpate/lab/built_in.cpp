@@ -34,7 +34,7 @@ struct TruePush {
 TruePush press_step_by_step(const DemoOptions& options, double site_m, double young_pa, double poisson, double level_n,
                             const std::function<bool()>& keep_going) {
   PressedBlockOptions block;
-  block.edge_m = options.edge_m;
+  block.size_m = Vec3::Constant(options.edge_m);
   block.pad_radius_m = options.disc_radius_m;
   block.site_m = site_m;
   block.base_centre_m = cube_centre_m;

@@ -13,12 +13,13 @@ namespace {
 
 // Noise, drift and cross-talk are not in the sheets that could be had: they are of the size that users of strain-gauge sensors
 // report. Ranges and resolutions are the makers'.
-constexpr std::array<ForceSensorModel, 3> table{{
+constexpr std::array<ForceSensorModel, 4> table{{
     {"generic", "a good strain-gauge sensor without cross-talk", {}},
     {"schunk_ftcl_050", "range 300 N: Frank et al. 2010, section V; the rest of the size usual in its class",
      {0.08, 0.05, 300, 1.0, 0.0003, 0.015, 0.01, 0.3}},
     {"ati_gamma", "ATI Gamma SI-32-2.5: range 32 N across, resolution 6.25 mN (manual 9620-05); the rest of the size usual",
      {0.01, 0.00625, 32, 0.5, 0.0001, 0.01, 0.005, 0.3}},
+    {"ideal", "none such: for tests of the rest", {0.001, 0.0001, 1000, 1.0, 0, 0.01, 0, 0.3}},
 }};
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/lab/box_surface.hpp"
 #include "palpate/lab/implicit_surface.hpp"
+#include "palpate/lab/pressed_balloon.hpp"
 #include "palpate/lab/pressed_block.hpp"
 #include "palpate/lab/pressed_object.hpp"
 #include "palpate/lab/random.hpp"
@@ -35,6 +36,7 @@ LabObject draw(const std::string& name, const ObjectOptions& o, double stiffer =
   const double young = 10e3 * stiffer * std::exp(random.uniform() * std::log(4.0)), poisson = random.uniform(0.1, 0.45);
   LabObject object;
   object.name = name;
+  object.foot_m = o.base_centre_m;
   object.material = o.material;
   object.young_modulus_pa = o.young_modulus_pa.value_or(std::round(young / 10) * 10);
   object.poisson_ratio = o.poisson_ratio.value_or(std::round(poisson * 1000) / 1000);
@@ -52,7 +54,6 @@ Support table(const Vec3& base_centre_m) {
   return support;
 }
 
-// Where a straight push along `direction` through `aim_m` (relative to the foot) first meets the surface.
 PushSite site(const LabObject& object, const ObjectOptions& o, const std::string& name, const Vec3& aim_m, const Vec3& direction,
               double stiffness = 1) {
   const geometry::TriangleTree tree(object.surface);
@@ -93,6 +94,36 @@ void make_pressable(LabObject& object, const ObjectOptions& o) {
   };
 }
 
+// Pushes in the plane y = 0, on top or on the side that looks along -x, are solved on a mesh that is made for the round pad;
+// others on one as for any object.
+void make_pressable_block(LabObject& object, const ObjectOptions& o, const Vec3& size_m) {
+  make_pressable(object, o);
+  if (!object.regions.empty()) return;
+  PressedBlockOptions block;
+  block.size_m = size_m;
+  block.pad_radius_m = object.pad_radius_m;
+  block.base_centre_m = o.base_centre_m;
+  block.cells_in_radius = std::max(1, o.cells_in_radius - 2);
+  block.material = object.material;
+  block.young_modulus_pa = object.young_modulus_pa;
+  block.poisson_ratio = object.poisson_ratio;
+  block.extra = object.extra;
+  object.press = [block, anywhere = object.press](const PushSite& at) -> std::unique_ptr<Pressed> {
+    PressedBlockOptions here = block;
+    const Vec3 from_foot = at.contact_m - block.base_centre_m, half = 0.5 * block.size_m;
+    const double room_m = 1.1 * block.pad_radius_m;
+    here.direction = at.direction;
+    here.at_side = std::abs(from_foot.x() + half.x()) < 1e-9 && from_foot.z() < block.size_m.z() - 1e-9;
+    here.site_m = here.at_side ? from_foot.z() : from_foot.x();
+    const bool on_top = std::abs(from_foot.z() - block.size_m.z()) < 1e-9 && std::abs(from_foot.x()) < half.x() - room_m;
+    const bool on_side = here.at_side && from_foot.z() > room_m && from_foot.z() < block.size_m.z() - room_m;
+    const bool into = (here.at_side ? at.direction.x() : -at.direction.z()) > 0.1;
+    if (std::abs(from_foot.y()) > 1e-9 || std::abs(at.direction.y()) > 1e-9 || !into || !(on_top || on_side) || half.y() < room_m)
+      return anywhere(at);
+    return std::make_unique<PressedBlock>(here);
+  };
+}
+
 // A box relative to the foot; without one, what the others leave.
 TrueRegion region(const ObjectOptions& o, const std::string& name, double young_modulus_pa,
                   const std::optional<std::pair<Vec3, Vec3>>& box_m = {}) {
@@ -124,23 +155,7 @@ LabObject cube(const ObjectOptions& o) {
   size_pushes(object, 0.025);
   for (const double x : {-0.02, 0.03})
     object.sites.push_back(site(object, o, x < 0 ? "top" : "top aside", {x, 0, edge_m}, -Vec3::UnitZ()));
-  PressedBlockOptions block;
-  block.edge_m = edge_m;
-  block.pad_radius_m = object.pad_radius_m;
-  block.base_centre_m = o.base_centre_m;
-  block.cells_in_radius = std::max(1, o.cells_in_radius - 1);  // its mesh is made for the round pad
-  block.material = object.material;
-  block.young_modulus_pa = object.young_modulus_pa;
-  block.poisson_ratio = object.poisson_ratio;
-  block.extra = object.extra;
-  make_pressable(object, o);
-  object.press = [block, anywhere = object.press](const PushSite& at) -> std::unique_ptr<Pressed> {
-    const Vec3 from_foot = at.contact_m - block.base_centre_m;
-    if (std::abs(from_foot.y()) > 1e-9 || from_foot.z() < block.edge_m - 1e-9 || at.direction.z() > -1 + 1e-12) return anywhere(at);
-    PressedBlockOptions here = block;
-    here.site_m = at.contact_m.x() - block.base_centre_m.x();
-    return std::make_unique<PressedBlock>(here);
-  };
+  make_pressable_block(object, o, Vec3::Constant(edge_m));
   return object;
 }
 
@@ -154,19 +169,20 @@ LabObject ball(const ObjectOptions& o) {
   return object;
 }
 
+// Stout enough: a pad's dead load of the usual depth on its end is two fifths of what would buckle it.
 LabObject bar(const ObjectOptions& o) {
   LabObject object = draw("bar", o, 10);
-  object.description = "an upright bar of 60 x 60 x 180 mm, glued to the table with one end";
-  object.surface = box_surface(o.base_centre_m - Vec3(0.03, 0.03, 0), o.base_centre_m + Vec3(0.03, 0.03, 0.18), 20);
+  object.description = "an upright bar of 80 x 80 x 160 mm, glued to the table with one end";
+  object.surface = box_surface(o.base_centre_m - Vec3(0.04, 0.04, 0), o.base_centre_m + Vec3(0.04, 0.04, 0.16), 20);
   object.supports.push_back(table(o.base_centre_m));
   size_pushes(object, 0.015);
-  object.sites = {site(object, o, "side", {-0.03, 0, 0.14}, {0.866, 0, -0.5}, 0.06),
-                  site(object, o, "end", {0.005, 0, 0.18}, -Vec3::UnitZ(), 0.4)};
+  object.sites = {site(object, o, "side", {-0.04, 0, 0.125}, {0.866, 0, -0.5}, 0.12),
+                  site(object, o, "end", {0.005, 0, 0.16}, -Vec3::UnitZ(), 0.5)};
   if (o.region_ratio != 1) {
-    object.regions = {region(o, "upper", o.region_ratio * object.young_modulus_pa, {{Vec3(-1, -1, 0.09), Vec3(1, 1, 1)}}),
+    object.regions = {region(o, "upper", o.region_ratio * object.young_modulus_pa, {{Vec3(-1, -1, 0.08), Vec3(1, 1, 1)}}),
                       region(o, "lower", object.young_modulus_pa)};
   }
-  make_pressable(object, o);
+  make_pressable_block(object, o, Vec3(0.08, 0.08, 0.16));
   return object;
 }
 
@@ -216,15 +232,51 @@ LabObject animal(const ObjectOptions& o) {
   return object;
 }
 
-constexpr std::array<BuiltInObject, 5> table_of_objects{{
+// No solid: E is the skin's, and a solid model finds an apparent modulus at most.
+LabObject balloon(const ObjectOptions& o) {
+  LabObject object = draw("balloon", o, 60);
+  object.description = "a balloon of 150 mm, a skin of 0.3 mm stretched to twice its size, glued to the table at its foot";
+  object.state = RestState::under_pressure;
+  object.material = "neo_hookean";
+  object.extra.clear();
+  object.poisson_ratio = 0.5;
+  PressedBalloonOptions balloon;
+  balloon.young_modulus_pa = object.young_modulus_pa;
+  balloon.base_centre_m = o.base_centre_m;
+  object.pad_radius_m = balloon.pad_radius_m;
+  object.travel_limit_m = 0.5 * object.pad_radius_m;
+  object.supports.push_back(table(o.base_centre_m));
+  PressedBalloon trial(balloon);
+  object.surface = trial.surface();
+  object.sites = {site(object, o, "top", {0, 0, 0.1}, -Vec3::UnitZ())};
+  // A short touch says how stiff it is, and the spring is nearly straight.
+  const double touch_n = 0.01 * trial.pressure_pa() * EIGEN_PI * object.pad_radius_m * object.pad_radius_m;
+  trial.press(touch_n);
+  object.force_step_n = std::max(0.1, std::round(2.5 * touch_n / trial.travel_m() * object.travel_limit_m) / 10);
+  object.press = [balloon, top = object.sites[0]](const PushSite& at) -> std::unique_ptr<Pressed> {
+    if ((at.contact_m - top.contact_m).norm() > 1e-6 || (at.direction - top.direction).norm() > 1e-6)
+      throw Error("can be pressed at its top only, straight down", "balloon");
+    return std::make_unique<PressedBalloon>(balloon);
+  };
+  return object;
+}
+
+constexpr std::array<BuiltInObject, 6> table_of_objects{{
     {"cube", "foam cube of 150 mm, pressed from above at two sites", cube},
     {"ball", "ball of 120 mm, from above and slanted", ball},
-    {"bar", "upright bar of 60 x 60 x 180 mm and ten times the stiffness, at its side and its end", bar},
+    {"bar", "upright bar of 80 x 80 x 160 mm and ten times the stiffness, at its side and its end", bar},
     {"bear", "sitting plush bear of 200 mm: head, belly, back", bear},
     {"animal", "animal of 280 mm on four legs: back, flank", animal},
+    {"balloon", "inflated skin of 150 mm, at its top: it has an apparent modulus only", balloon},
 }};
 
 }  // namespace
+
+PushSite place_on(const LabObject& object, const std::string& name, const Vec3& aim_m, const Vec3& direction, double stiffness) {
+  ObjectOptions o;
+  o.base_centre_m = object.foot_m;
+  return site(object, o, name, aim_m, direction, stiffness);
+}
 
 std::span<const BuiltInObject> built_in_objects() { return table_of_objects; }
 

@@ -33,13 +33,15 @@ struct ObjectOptions {
   std::vector<double> extra;                         ///< its further parameters, in the table's order; empty = their initial values
   double region_ratio = 1;                           ///< of an object with regions: their stiffnesses differ by this factor
   Vec3 base_centre_m = Vec3(0.6, 0.0, 0.0);          ///< of the object's foot on the table, base frame
-  Index tetrahedra = 5000;                           ///< of the true mesh, before refinement under the pad
-  int cells_in_radius = 4;                           ///< edges across the pad's radius
+  Index tetrahedra = 8000;                           ///< of the true mesh
+  int cells_in_radius = 5;                           ///< edges across the pad's radius
 };
 
 struct LabObject {
   std::string name, description;
   TriMesh surface;  ///< what the recording says about its shape at rest, base frame
+  Vec3 foot_m = Vec3::Zero();  ///< on the table, base frame
+  RestState state = RestState::stress_free;
   std::vector<Support> supports;
   std::vector<PushSite> sites;
   double pad_radius_m = 0.02;
@@ -54,6 +56,10 @@ struct LabObject {
   std::vector<TrueRegion> regions;  ///< empty: one stiffness everywhere
   std::function<std::unique_ptr<Pressed>(const PushSite&)> press;
 };
+
+/// Where a straight push along `direction` through `aim_m`, given from the object's foot, first meets its surface.
+/// @throws Error when it passes the object by.
+PushSite place_on(const LabObject& object, const std::string& name, const Vec3& aim_m, const Vec3& direction, double stiffness = 1);
 
 struct BuiltInObject {
   std::string_view name;

@@ -17,8 +17,8 @@ class Pressed {
   virtual double travel_m() const = 0;
   /// Deformed, base frame; the same triangles in every state.
   virtual TriMesh surface() const = 0;
-  /// What is solved.
-  virtual const TetMesh& mesh() const = 0;
+  /// Of what is solved.
+  virtual Index nodes() const = 0;
 };
 
 }  // namespace palpate::lab

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/lab/pressed_block.hpp"
 
+#include <cmath>
 #include <vector>
 
 #include "palpate/core/error.hpp"
@@ -13,10 +14,21 @@ namespace palpate::lab {
 struct PressedBlock::Impl {
   explicit Impl(const PressedBlockOptions& given) : options_(given) {
     const PressedBlockOptions& options = options_;
+    const Vec3& size = options.size_m;
+    // The mesh is made for a pad on its top: a block that is pressed at its side lies on its back while it is solved.
+    if (options.at_side) R_base_mesh_ << 0, 0, -1, 0, 1, 0, 1, 0, 0;
+    const Vec3 direction = R_base_mesh_.transpose() * options.direction;
+    if (std::abs(direction.norm() - 1) > 1e-6 || std::abs(direction.y()) > 1e-9 || !(direction.z() < -0.1))
+      throw Error("must have unit length, lie in the plane y = 0 and point into the face", "PressedBlockOptions.direction");
     GradedBlockOptions block;
-    block.min_m = {-0.5 * options.edge_m, 0, 0};
-    block.max_m = {0.5 * options.edge_m, 0.5 * options.edge_m, options.edge_m};
-    block.contact_m = {options.site_m, 0, options.edge_m};
+    if (options.at_side) {
+      block.min_m = {0, 0, -0.5 * size.x()};
+      block.max_m = {size.z(), 0.5 * size.y(), 0.5 * size.x()};
+    } else {
+      block.min_m = {-0.5 * size.x(), 0, 0};
+      block.max_m = {0.5 * size.x(), 0.5 * size.y(), size.z()};
+    }
+    block.contact_m = {options.site_m, 0, block.max_m.z()};
     block.contact_radius_m = options.pad_radius_m;
     block.cells_in_radius = options.cells_in_radius;
     mesh_ = fem::to_quadratic(graded_block(block));
@@ -24,7 +36,7 @@ struct PressedBlock::Impl {
 
     fem::Boundary boundary;
     for (Index n = 0; n < Index(mesh_.nodes_m.rows()); ++n) {
-      if (mesh_.nodes_m(n, 2) < 1e-9) {
+      if (mesh_.nodes_m(n, options.at_side ? 0 : 2) < 1e-9) {
         boundary.constraints.push_back({n, Mat3::Identity(), 3});
       } else if (mesh_.nodes_m(n, 1) < 1e-9) {
         Mat3 axes;
@@ -47,7 +59,8 @@ struct PressedBlock::Impl {
     share_ /= share_.sum();
     std::vector<Eigen::Triplet<double>> entries;
     for (Index n = 0; n < Index(share_.size()); ++n)
-      if (share_(n) != 0) entries.emplace_back(3 * n + 2, 0, -share_(n));
+      for (int k = 0; k < 3; k += 2)
+        if (share_(n) != 0) entries.emplace_back(3 * n + k, 0, share_(n) * direction(k));
     boundary.forces.resize(3 * mesh_.nodes_m.rows(), 1);
     boundary.forces.setFromTriplets(entries.begin(), entries.end());
 
@@ -57,7 +70,7 @@ struct PressedBlock::Impl {
     half_surface_ = fem::boundary_triangles(mesh_);
   }
 
-  /// Deforms the cube by a force (newton, downwards, on the whole cube). Starts from the last state, extrapolated.
+  /// Deforms the block by a force (newton, on the whole of it). Starts from the last state, extrapolated.
   void press(double force_n) {
     const VectorX coefficient = VectorX::Constant(1, 0.5 * force_n);
     const VectorX start = displacement_m_.size() ? VectorX(force_n / force_n_ * displacement_m_) : VectorX();
@@ -65,17 +78,18 @@ struct PressedBlock::Impl {
     fem::Equilibrium state = statics_->solve(options_.young_modulus_pa, options_.poisson_ratio, coefficient, VectorX(0),
                                              start.size() ? &start : nullptr, extra);
     if (!state.converged)
-      throw Error("the true cube found no equilibrium under " + std::to_string(force_n) + " N (" + state.reason +
+      throw Error("the true block found no equilibrium under " + std::to_string(force_n) + " N (" + state.reason +
                       "): press less deep",
                   "PressedBlock");
     displacement_m_ = std::move(state.displacement_m);
     force_n_ = force_n;
   }
 
-  /// Mean motion of the pad's face into the cube.
+  /// Mean motion of the pad's face into the block.
   double travel_m() const {
     double travel = 0;
-    for (Eigen::Index n = 0; n < share_.size(); ++n) travel -= share_(n) * displacement_m_(3 * n + 2);
+    const Vec3 direction = R_base_mesh_.transpose() * options_.direction;
+    for (Eigen::Index n = 0; n < share_.size(); ++n) travel += share_(n) * displacement_m_.segment<3>(3 * n).dot(direction);
     return travel;
   }
 
@@ -87,8 +101,8 @@ struct PressedBlock::Impl {
     for (Eigen::Index i = 0; i < n; ++i) {
       Vec3 p = mesh_.nodes_m.row(i);
       if (displacement_m_.size()) p += displacement_m_.segment<3>(3 * i);
-      whole.vertices_m.row(i) = options_.base_centre_m + p;
-      whole.vertices_m.row(n + i) = options_.base_centre_m + Vec3(p.x(), -p.y(), p.z());
+      whole.vertices_m.row(i) = options_.base_centre_m + R_base_mesh_ * p;
+      whole.vertices_m.row(n + i) = options_.base_centre_m + R_base_mesh_ * Vec3(p.x(), -p.y(), p.z());
     }
     std::vector<Eigen::RowVector3i> kept;
     for (Eigen::Index t = 0; t < half_surface_.rows(); ++t) {
@@ -104,7 +118,8 @@ struct PressedBlock::Impl {
   }
 
   PressedBlockOptions options_;
-  TetMesh mesh_;
+  Mat3 R_base_mesh_ = Mat3::Identity();
+  TetMesh mesh_;  // in its own frame: pressed at its highest face
   Triangles half_surface_;
   VectorX share_;           // of the pad's force, a node
   VectorX displacement_m_;  // empty = at rest
@@ -120,6 +135,7 @@ void PressedBlock::press(double force_n) { impl_->press(force_n); }
 double PressedBlock::force_n() const { return impl_->force_n_; }
 double PressedBlock::travel_m() const { return impl_->displacement_m_.size() ? impl_->travel_m() : 0.0; }
 TriMesh PressedBlock::surface() const { return impl_->surface(); }
+Index PressedBlock::nodes() const { return Index(impl_->mesh_.nodes_m.rows()); }
 const TetMesh& PressedBlock::mesh() const { return impl_->mesh_; }
 
 }  // namespace palpate::lab

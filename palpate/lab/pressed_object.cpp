@@ -13,6 +13,7 @@
 #include "palpate/fem/statics.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
@@ -42,35 +43,65 @@ double worst_bend(const TetMesh& mesh, Index e) {
   return worst;
 }
 
-// Midpoints of boundary edges go onto the surface where that bends no element much; straight facets would make the truth
-// smaller than the thing that it stands for.
+// Boundary nodes go onto the surface, corners first, where that bends no element much: the truth is then the thing that the
+// recording says it is. Elements that would be bent too much stay straight, alone.
 void curve_boundary(TetMesh& mesh, const TriMesh& surface, const std::vector<char>& held) {
   const geometry::TriangleTree tree(surface);
   const Tetrahedra faces = fem::boundary_faces(mesh);
   std::map<Index, std::array<Index, 2>> midpoints;
   for (Index f = 0; f < faces.rows(); ++f)
     for (int k = 0; k < 3; ++k) midpoints[faces(f, 3 + k)] = {faces(f, k), faces(f, (k + 1) % 3)};
-  const Points straight = mesh.nodes_m;
-  for (const auto& [node, ends] : midpoints) {
-    if (held[std::size_t(node)]) continue;
+  const auto onto_surface = [&](Index node, double edge_m) {
     const Vec3 p = mesh.nodes_m.row(node);
-    const double edge = (straight.row(ends[0]) - straight.row(ends[1])).norm();
     const Vec3 onto = tree.closest(p).point_m;
-    if ((onto - p).norm() < 0.15 * edge) mesh.nodes_m.row(node) = onto;
+    if (held[std::size_t(node)] == 0 && (onto - p).norm() < 0.15 * edge_m) mesh.nodes_m.row(node) = onto;
+  };
+  std::map<Index, double> shortest_m;  // of the boundary edges at a corner
+  for (const auto& [node, ends] : midpoints)
+    for (const Index corner : ends) {
+      const double edge_m = (mesh.nodes_m.row(ends[0]) - mesh.nodes_m.row(ends[1])).norm();
+      const auto [at, fresh] = shortest_m.emplace(corner, edge_m);
+      if (!fresh) at->second = std::min(at->second, edge_m);
+    }
+  const Points before = mesh.nodes_m;
+  for (const auto& [corner, edge_m] : shortest_m) onto_surface(corner, edge_m);
+  const auto volume = [&](const Points& nodes_m, Index e) {
+    const auto node = [&](int k) { return Vec3(nodes_m.row(mesh.tetrahedra(e, k))); };
+    return (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0));
+  };
+  for (bool again = true; again;) {
+    again = false;
+    for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
+      if (volume(mesh.nodes_m, e) > 0.4 * volume(before, e)) continue;
+      for (int k = 0; k < 4; ++k) {
+        const Index n = mesh.tetrahedra(e, k);
+        again = again || mesh.nodes_m.row(n) != before.row(n);
+        mesh.nodes_m.row(n) = before.row(n);
+      }
+    }
   }
-  for (int pass = 0; pass < 5; ++pass) {
-    bool fine = true;
+  const auto middle = [&](Index e, int k) {
+    const auto [a, b] = edges[std::size_t(k - 4)];
+    return Eigen::RowVector3d(0.5 * (mesh.nodes_m.row(mesh.tetrahedra(e, a)) + mesh.nodes_m.row(mesh.tetrahedra(e, b))));
+  };
+  for (Index e = 0; e < mesh.tetrahedra.rows(); ++e)
+    for (int k = 4; k < 10; ++k) mesh.nodes_m.row(mesh.tetrahedra(e, k)) = middle(e, k);
+  for (const auto& [node, ends] : midpoints)
+    onto_surface(node, (mesh.nodes_m.row(ends[0]) - mesh.nodes_m.row(ends[1])).norm());
+  for (bool fine = false; !fine;) {  // every pass straightens an element that was not straight
+    fine = true;
     for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
       if (worst_bend(mesh, e) > 0.3) continue;
-      fine = false;
-      for (int k = 4; k < 10; ++k) mesh.nodes_m.row(mesh.tetrahedra(e, k)) = straight.row(mesh.tetrahedra(e, k));
+      for (int k = 4; k < 10; ++k) {
+        const Eigen::RowVector3d straight = middle(e, k);
+        fine = fine && mesh.nodes_m.row(mesh.tetrahedra(e, k)) == straight;
+        mesh.nodes_m.row(mesh.tetrahedra(e, k)) = straight;
+      }
     }
-    if (fine) return;
   }
-  mesh.nodes_m = straight;
 }
 
-// The mesher keeps flat faces flat to within a small share of the edges that are there (far from the pad they are long).
+// What stands on a plane was laid on it: a wider tolerance would hold what only comes near it, as a ball does around its foot.
 bool holds(const Support& support, const TetMesh& mesh, const Tetrahedra& faces, Index f) {
   const auto corner = [&](int k) { return Vec3(mesh.nodes_m.row(faces(f, k))); };
   const Vec3 a = corner(0), b = corner(1), c = corner(2);
@@ -80,7 +111,7 @@ bool holds(const Support& support, const TetMesh& mesh, const Tetrahedra& faces,
     return true;
   }
   const Vec3& normal = support.plane.normal;
-  const double tolerance_m = 0.2 * std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+  const double tolerance_m = 0.02 * std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
   for (const Vec3& p : {a, b, c})
     if (std::abs(normal.dot(p - support.plane.point_m)) > tolerance_m) return false;
   return (b - a).cross(c - a).normalized().dot(normal) < -0.9;
@@ -98,7 +129,16 @@ struct PressedObject::Impl {
     filling.tetrahedra = options.tetrahedra;
     filling.finer.push_back(
         {options.contact_m, 1.5 * options.pad_radius_m, options.pad_radius_m / options.cells_in_radius});
-    const TetMesh linear = geometry::tetrahedralise(options.surface, filling).mesh;
+    const auto flat = [](const Support& one) { return one.kind == SupportKind::plane; };
+    for (const Support& support : options.supports)
+      if (flat(support))
+        for (auto near : geometry::finer_at_feet(support.plane, options.surface)) {
+          near.edge_m *= 0.5;
+          filling.finer.push_back(near);
+        }
+    TetMesh linear = geometry::tetrahedralise(options.surface, filling).mesh;
+    for (const Support& support : options.supports)
+      if (flat(support)) geometry::stand_on(support.plane, options.surface, linear);
     mesh = fem::to_quadratic(linear);
 
     std::vector<char> held(std::size_t(mesh.nodes_m.rows()), 0);
@@ -189,6 +229,7 @@ void PressedObject::press(double force_n) { impl_->press(force_n); }
 double PressedObject::force_n() const { return impl_->at_n; }
 double PressedObject::travel_m() const { return impl_->displacement_m.size() ? impl_->travel_m() : 0.0; }
 TriMesh PressedObject::surface() const { return impl_->surface(); }
+Index PressedObject::nodes() const { return Index(impl_->mesh.nodes_m.rows()); }
 const TetMesh& PressedObject::mesh() const { return impl_->mesh; }
 
 }  // namespace palpate::lab

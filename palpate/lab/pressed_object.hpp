@@ -41,7 +41,8 @@ class PressedObject : public Pressed {
   double force_n() const override;
   double travel_m() const override;
   TriMesh surface() const override;
-  const TetMesh& mesh() const override;
+  Index nodes() const override;
+  const TetMesh& mesh() const;
 
  private:
   struct Impl;

@@ -73,14 +73,14 @@ LabObject cube_of(const PressedBlockOptions& block) {
   LabObject object;
   object.name = "cube";
   object.description = "a foam cube";
-  const Vec3 half(0.5 * block.edge_m, 0.5 * block.edge_m, 0);
-  object.surface = box_surface(block.base_centre_m - half, block.base_centre_m + half + block.edge_m * Vec3::UnitZ(), 1);
+  const Vec3 half(0.5 * block.size_m.x(), 0.5 * block.size_m.y(), 0), up(0, 0, block.size_m.z());
+  object.surface = box_surface(block.base_centre_m - half, block.base_centre_m + half + up, 1);
   Support table;
   table.kind = SupportKind::plane;
   table.name = "table";
   table.plane.point_m = block.base_centre_m;
   object.supports.push_back(table);
-  object.sites.push_back({"top", block.base_centre_m + Vec3(block.site_m, 0, block.edge_m), -Vec3::UnitZ()});
+  object.sites.push_back({"top", block.base_centre_m + Vec3(block.site_m, 0, 0) + up, -Vec3::UnitZ()});
   object.pad_radius_m = block.pad_radius_m;
   object.material = block.material;
   object.young_modulus_pa = block.young_modulus_pa;
@@ -101,6 +101,10 @@ void check(const LabOptions& o) {
   need(o.camera_std_rad >= 0, "camera_std_rad", "must not be negative");
   need(o.relaxation >= 0 && o.relaxation < 1, "relaxation", "must be in [0, 1)");
   need(o.relaxation_s > 0, "relaxation_s", "must be positive");
+  need(o.slip_at_m > 0, "slip_at_m", "must be positive");
+  need(o.compliance_m_per_n >= 0, "compliance_m_per_n", "must not be negative");
+  need(!o.stated_compliance_m_per_n || *o.stated_compliance_m_per_n >= 0, "stated_compliance_m_per_n", "must not be negative");
+  need(o.slides_at_n > 0, "slides_at_n", "must be positive");
   check(o.force);
   check(o.depth);
 }
@@ -145,12 +149,32 @@ struct LabRobot::Impl {
     return mask.kinematics().link_poses(mask.kinematics().free_joints(), joints)[std::size_t(tip)];
   }
   const PushSite& site() const { return object.sites[active]; }
-  // The pad's face touches the object at rest at travel 0; negative before that.
-  double travel() const {
-    const Vec3 offset = tip_of(true_joints).translation() - site().contact_m;
+  // How far the encoders' tip has come beyond the object's surface at rest, wherever that has slid to; negative before.
+  double reach() const {
+    const Vec3 offset = tip_of(true_joints).translation() - site().contact_m - slid_m;
     const double along = offset.dot(site().direction);
     return (offset - along * site().direction).norm() < 0.014 ? along : 0;
   }
+  Vec3 sideways() const { return Vec3(site().direction.x(), site().direction.y(), 0); }
+  // Travel of the pad into the object: what stick and arm yield is taken off, and the object slides rather than bear more
+  // sideways than friction holds. Solved on the curve, which rises.
+  double travel_at(double reach_m) {
+    const auto needs = [&](double travel_m) { return travel_m + options.compliance_m_per_n * curve().force_n(curve().at(travel_m)); };
+    if (reach_m <= 0 || options.compliance_m_per_n == 0) return reach_m;
+    double low = 0, high = reach_m;
+    for (int k = 0; k < 60; ++k) (needs(0.5 * (low + high)) < reach_m ? low : high) = 0.5 * (low + high);
+    return 0.5 * (low + high);
+  }
+  void slide() {
+    const double share = sideways().norm(), most_n = share > 1e-9 ? options.slides_at_n / share : 1e300;
+    if (travel() <= 0 || curve().force_n(curve().at(travel())) <= most_n) return;
+    double low = 0, high = travel();
+    for (int k = 0; k < 60; ++k)
+      (curve().force_n(curve().at(0.5 * (low + high))) < most_n ? low : high) = 0.5 * (low + high);
+    const double bears_m = low + options.compliance_m_per_n * most_n;
+    slid_m += (reach() - bears_m) / (share * share) * sideways();
+  }
+  double travel() { return travel_at(reach()); }
   ForceCurve& curve() {
     if (!curves[active]) {
       const double a = object.pad_radius_m;
@@ -159,7 +183,7 @@ struct LabRobot::Impl {
     }
     return *curves[active];
   }
-  bool slipped() const { return travel() > options.slip_at_m; }
+  bool slipped() { return travel() > options.slip_at_m; }
   double force() {
     const double travelled = travel();
     if (travelled <= 0) return 0;  // nothing has to be solved before contact
@@ -180,6 +204,7 @@ struct LabRobot::Impl {
   std::vector<std::pair<std::size_t, TriMesh>> bodies;  // link, mesh in its frame
   Camera camera;
   Pose T_base_camera, T_true_stated = Pose::Identity();
+  Vec3 slid_m = Vec3::Zero();  // of the object on the table
   double clock_s = 0, moved_s = -1e3, fading_n = 0;
 };
 
@@ -213,6 +238,7 @@ acquisition::Motion LabRobot::move(const Pose& T_base_tip, double speed_m_s) {
   lab.commanded = *joints;
   lab.true_joints = *joints;
   for (double& q : lab.true_joints) q += lab.options.joint_std_rad * lab.joint_random.normal();
+  lab.slide();
   lab.moved_s = lab.clock_s;
   lab.fading_n = lab.options.relaxation * std::max(0.0, lab.force() - before);
   return acquisition::Motion::done;
@@ -239,7 +265,9 @@ DepthFrame LabRobot::take_depth_image() {
   frame.noise = lab.options.depth.noise;
   const auto& names = lab.mask.kinematics().free_joints();
   const auto poses = lab.mask.kinematics().link_poses(names, lab.true_joints);
-  const geometry::TriangleTree object(lab.travel() > 0 ? lab.curve().surface(lab.curve().at(lab.travel())) : lab.object.surface);
+  TriMesh shape = lab.travel() > 0 ? lab.curve().surface(lab.curve().at(lab.travel())) : lab.object.surface;
+  shape.vertices_m.rowwise() += lab.slid_m.transpose();
+  const geometry::TriangleTree object(std::move(shape));
   std::vector<std::unique_ptr<geometry::TriangleTree>> arm_trees;
   Scene scene;
   scene.bodies.push_back(&object);
@@ -296,7 +324,7 @@ Recording LabRobot::scene() const {
   recording.name = lab.object.name;
   recording.description = "Simulated: palpate's software arm presses " + lab.object.description + " with a round soft pad";
   recording.rest.surface = lab.object.surface;
-  recording.rest.state = RestState::stress_free;
+  recording.rest.state = lab.object.state;
   recording.supports = lab.object.supports;
   for (const TrueRegion& one : lab.object.regions) recording.regions.push_back(one.region);
   recording.environment.planes.push_back(lab.table);
@@ -305,6 +333,7 @@ Recording LabRobot::scene() const {
   pad.name = "stick";
   pad.shape = ToolShape::disc;
   pad.radius_m = lab.object.pad_radius_m;
+  pad.compliance_m_per_n = lab.options.stated_compliance_m_per_n.value_or(lab.options.compliance_m_per_n);
   recording.tools.push_back(pad);
   recording.joint_names = lab.mask.kinematics().free_joints();
   recording.robot = lab.mask.kinematics().robot();

@@ -26,6 +26,11 @@ struct LabOptions {
   double relaxation = 0.05;           ///< share of a force's increase that fades after each motion ...
   double relaxation_s = 0.4;          ///< ... with this time constant
   double slip_at_m = 1e9;             ///< travel at which the tip slides off sideways by 5 mm
+  double compliance_m_per_n = 0;      ///< of stick and arm: the tip stays behind the encoders by this times the force
+  std::optional<double> stated_compliance_m_per_n;  ///< what the recording says of it; not given: the truth
+  /// Sideways force at which the object starts to slide on the table; it then moves with the push, at this force, and stays
+  /// where it was pushed to (Coulomb friction; without turning, and the tip keeps its place on the object).
+  double slides_at_n = 1e9;
   std::optional<Pose> T_base_camera;  ///< a camera that stands; not given: one that looks at the object from the side
   double camera_std_m = 0.0005;       ///< error of that pose, drawn once and stated with every image ...
   double camera_std_rad = 0.0005;     ///< ... and of its rotation

@@ -6,8 +6,8 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
+#include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
-#include "palpate/reconstruction/stand_on.hpp"
 #include "palpate/registration/views.hpp"
 
 namespace palpate::reconstruction {
@@ -97,8 +97,8 @@ BuiltObject fill(const TriMesh& surface, bool loose_facets, const std::vector<Su
   out.model.volume = std::move(filled.mesh);
   for (const Support& s : supports) {
     if (!is_plane(s.kind)) continue;
-    if (loose_facets) lay_on(s.plane, out.model.volume);
-    else stand_on(s.plane, surface, out.model.volume);
+    if (loose_facets) geometry::lay_on(s.plane, out.model.volume);
+    else geometry::stand_on(s.plane, surface, out.model.volume);
   }
   out.model.embedding = geometry::embed(surface.vertices_m, out.model.volume);
   out.model.supports = supports;

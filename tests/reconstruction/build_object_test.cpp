@@ -8,7 +8,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
-#include "palpate/reconstruction/stand_on.hpp"
+#include "palpate/geometry/stand_on.hpp"
 
 namespace palpate::reconstruction {
 namespace {
@@ -59,7 +59,7 @@ TEST(StandOn, a_slender_object_stands_on_its_whole_foot) {
   o.mesh.tetrahedra = 3000;
   o.mesh.finer.push_back({Vec3(0.03, 0.03, 0.18), 0.02, 0.005});
   const auto coarse = build_object(bar, {table}, o);
-  for (const auto& near : finer_at_feet(table.plane, bar)) o.mesh.finer.push_back(near);
+  for (const auto& near : geometry::finer_at_feet(table.plane, bar)) o.mesh.finer.push_back(near);
   const auto built = build_object(bar, {table}, o);
   EXPECT_EQ(built.check.inverted, 0);
   const double foot_m2 = 0.06 * 0.06;
@@ -71,13 +71,13 @@ TEST(StandOn, a_slender_object_stands_on_its_whole_foot) {
 
 TEST(StandOn, feet_are_told_apart) {
   const TriMesh two = shapes::join(shapes::box(Vec3(0.02, 0.02, 0.05)), shapes::box(Vec3(0.05, 0.05, 0.05), Vec3(0.1, 0, 0)));
-  const auto finer = finer_at_feet({Vec3::Zero(), Vec3::UnitZ()}, two);
+  const auto finer = geometry::finer_at_feet({Vec3::Zero(), Vec3::UnitZ()}, two);
   ASSERT_GE(finer.size(), 8u);
   for (const auto& near : finer) {
     EXPECT_EQ(near.point_m.z(), 0);
     EXPECT_NEAR(near.edge_m, near.point_m.x() < 0.05 ? 0.004 : 0.01, 1e-9);
   }
-  EXPECT_TRUE(finer_at_feet({Vec3(0, 0, -1), Vec3::UnitZ()}, two).empty());
+  EXPECT_TRUE(geometry::finer_at_feet({Vec3(0, 0, -1), Vec3::UnitZ()}, two).empty());
 }
 
 TEST(BuildObject, a_given_volume_stays_as_it_is_and_a_broken_one_is_refused) {

@@ -6,7 +6,7 @@
 #include "palpate/core/mesh.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
 
-namespace palpate::reconstruction {
+namespace palpate::geometry {
 
 /// Makes a filled object stand on a plane as its surface does, whatever the size of the elements: boundary faces that run along
 /// the plane, within 0.15 of their longest edge, are laid flat on it, and nodes around them go out to the outline of the
@@ -19,6 +19,6 @@ void lay_on(const Plane& plane, TetMesh& volume);
 
 /// Where a volume must be fine enough to stand on a plane: over each foot of the surface in it, edges of a fifth of the foot's
 /// size (the root of its area). A slender object else hangs on two or three elements.
-std::vector<geometry::FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface);
+std::vector<FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface);
 
-}  // namespace palpate::reconstruction
+}  // namespace palpate::geometry

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/reconstruction/stand_on.hpp"
+#include "palpate/geometry/stand_on.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 
 #include "palpate/geometry/mesh_checks.hpp"
 
-namespace palpate::reconstruction {
+namespace palpate::geometry {
 namespace {
 
 constexpr double reach = 0.15;         // of the longest edge: faces that near the plane are laid on it
@@ -43,7 +43,7 @@ void keep_volumes(const Points& before, TetMesh& volume) {
 
 /// Boundary triangles in the volume's numbering.
 Triangles boundary_of(const TetMesh& volume) {
-  const TriMesh boundary = geometry::boundary_surface(volume).surface;  // in a numbering of its own: matched by place
+  const TriMesh boundary = boundary_surface(volume).surface;  // in a numbering of its own: matched by place
   std::map<std::array<double, 3>, Index> node_at;
   for (Index i = 0; i < volume.nodes_m.rows(); ++i)
     node_at[{volume.nodes_m(i, 0), volume.nodes_m(i, 1), volume.nodes_m(i, 2)}] = i;
@@ -125,7 +125,7 @@ Vec3 nearest_on(const Outline& outline, const Vec3& p) {
 
 }  // namespace
 
-std::vector<geometry::FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface) {
+std::vector<FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface) {
   // Triangles that share a vertex are of one foot.
   const std::vector<Index> triangles = foot_triangles(plane, surface);
   std::map<Index, Index> parent;
@@ -137,7 +137,7 @@ std::vector<geometry::FinerNear> finer_at_feet(const Plane& plane, const TriMesh
     for (int k = 1; k < 3; ++k) parent[root(surface.triangles(t, k))] = root(surface.triangles(t, 0));
   std::map<Index, std::vector<Index>> feet;
   for (const Index t : triangles) feet[root(surface.triangles(t, 0))].push_back(t);
-  std::vector<geometry::FinerNear> finer;
+  std::vector<FinerNear> finer;
   for (const auto& [foot, members] : feet) {
     double area = 0;
     for (const Index t : members) {
@@ -210,4 +210,4 @@ void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume) {
   keep_volumes(before, volume);
 }
 
-}  // namespace palpate::reconstruction
+}  // namespace palpate::geometry

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/paper_figures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "palpate/report/axes.hpp"
+#include "palpate/report/words.hpp"
+
+namespace palpate::cli {
+namespace {
+
+using report::Axes;
+using report::Range;
+using report::Spot;
+
+constexpr double width_pt = 420, height_pt = 260;
+const report::Colour truth_colour{22, 32, 44}, paper_colour = report::category(1), own_colour = report::category(0);
+
+void legend(report::Canvas& canvas, std::initializer_list<std::pair<const char*, report::Colour>> entries) {
+  double x = 60;
+  for (const auto& [words, colour] : entries) {
+    canvas.dot({x, 12}, 3, colour);
+    canvas.text({x + 7, 15}, words, 9, report::Align::left, report::ink);
+    x += 16 + 5.4 * static_cast<double>(std::string_view(words).size());
+  }
+}
+
+}  // namespace
+
+std::string surface_figure(const TrialAnswer& trial) {
+  const ErrorSurface& surface = trial.surface;
+  if (surface.error_m2.size() == 0) return {};
+  auto canvas = report::svg_canvas(width_pt, height_pt);
+  const Index rows = static_cast<Index>(surface.error_m2.rows()), columns = static_cast<Index>(surface.error_m2.cols());
+  Axes axes(*canvas, width_pt, height_pt, "log10 E (Pa)",
+            {std::log10(surface.young_modulus_pa(0)), std::log10(surface.young_modulus_pa(rows - 1))}, "Poisson ratio",
+            {surface.poisson_ratio(0), surface.poisson_ratio(columns - 1)});
+  const double low = std::log(surface.smallest_m2());
+  double high = low;
+  for (double e : surface.error_m2.reshaped())
+    if (std::isfinite(e)) high = std::max(high, std::log(e));
+  const auto x_at = [&](double i) {
+    const double a = std::log10(surface.young_modulus_pa(0)), b = std::log10(surface.young_modulus_pa(rows - 1));
+    return std::clamp(a + (b - a) * i / static_cast<double>(rows - 1), a, b);
+  };
+  const auto y_at = [&](double k) {
+    const double a = surface.poisson_ratio(0), b = surface.poisson_ratio(columns - 1);
+    return std::clamp(a + (b - a) * k / static_cast<double>(columns - 1), a, b);
+  };
+  for (Index i = 0; i < rows; ++i)
+    for (Index k = 0; k < columns; ++k) {
+      const double e = surface.error_m2(i, k);
+      const double share = std::isfinite(e) && high > low ? (std::log(e) - low) / (high - low) : 1;
+      const auto tone = [&](double from, double to) { return static_cast<std::uint8_t>(from + (to - from) * share); };
+      const Spot corner = axes.at(x_at(static_cast<double>(i) - 0.5), y_at(static_cast<double>(k) + 0.5)),
+                 opposite = axes.at(x_at(static_cast<double>(i) + 0.5), y_at(static_cast<double>(k) - 0.5));
+      canvas->box(corner, opposite.x - corner.x + 0.3, opposite.y - corner.y + 0.3, {tone(40, 245), tone(90, 246), tone(140, 248)});
+    }
+  const auto path = [&](const MethodAnswer& method, report::Colour colour) {
+    std::vector<Spot> spots;
+    for (const FitIteration& at : method.path) {
+      const double x = std::log10(at.young_modulus_pa), y = at.poisson_ratio;
+      if (x < x_at(0) || x > x_at(static_cast<double>(rows)) || y < y_at(0) || y > y_at(static_cast<double>(columns))) continue;
+      spots.push_back({x, y});
+    }
+    if (spots.size() > 1) axes.line(spots, colour, 1.4);
+    axes.dot(std::log10(method.young_modulus_pa), method.poisson_ratio, 4, colour);
+  };
+  path(trial.paper, paper_colour);
+  path(trial.palpate, own_colour);
+  axes.dot(std::log10(trial.young_modulus_pa), trial.poisson_ratio, 3, truth_colour);
+  legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate", own_colour}});
+  return canvas->bytes();
+}
+
+std::string force_figure(const TrialAnswer& trial) {
+  std::map<std::string, std::vector<Spot>> pushes;
+  std::vector<double> travels, forces;
+  for (const SampleAnswer& sample : trial.samples) {
+    if (!std::isfinite(sample.travel_m)) continue;
+    pushes[sample.push].push_back({1000 * sample.travel_m, sample.force_n});
+    travels.push_back(1000 * sample.travel_m);
+    forces.push_back(sample.force_n);
+  }
+  if (travels.size() < 2) return {};
+  auto canvas = report::svg_canvas(width_pt, height_pt);
+  Axes axes(*canvas, width_pt, height_pt, "travel of the tool (mm)", report::range_of(travels, true), "force (N)",
+            report::range_of(forces, true));
+  std::size_t i = 0;
+  double x = 60;
+  for (const auto& [name, spots] : pushes) {
+    const auto colour = report::category(i++);
+    axes.line(spots, colour, 1.4);
+    for (const Spot& spot : spots) axes.dot(spot.x, spot.y, 2.5, colour);
+    canvas->dot({x, 12}, 3, colour);
+    canvas->text({x + 7, 15}, name, 9, report::Align::left, report::ink);
+    x += 24 + 5.4 * static_cast<double>(name.size());
+  }
+  return canvas->bytes();
+}
+
+std::string samples_figure(const TrialAnswer& trial) {
+  if (trial.samples.empty()) return {};
+  std::vector<double> values{trial.young_modulus_pa / 1000};
+  for (const SampleAnswer& sample : trial.samples)
+    for (double e : {sample.paper.young_modulus_pa, sample.palpate.young_modulus_pa})
+      if (e < 6 * trial.young_modulus_pa) values.push_back(e / 1000);
+  auto canvas = report::svg_canvas(width_pt, height_pt);
+  const double count = static_cast<double>(trial.samples.size());
+  const Range range = report::range_of(values, true);
+  Axes axes(*canvas, width_pt, height_pt, "sample, all pushes one after the other", {0, count + 1}, "E (kPa)", range);
+  axes.line(std::vector<Spot>{{0.0, trial.young_modulus_pa / 1000}, {count + 1, trial.young_modulus_pa / 1000}}, truth_colour, 1, true);
+  for (std::size_t i = 0; i < trial.samples.size(); ++i) {
+    const SampleAnswer& sample = trial.samples[i];
+    const double x = static_cast<double>(i) + 1;
+    if (i > 0 && trial.samples[i - 1].push != sample.push)
+      axes.line(std::vector<Spot>{{x - 0.5, range.from}, {x - 0.5, range.to}}, report::rule, 0.8);
+    const double top = std::min(sample.palpate.upper_95_pa / 1000, range.to), foot = sample.palpate.lower_95_pa / 1000;
+    if (foot < top) axes.line(std::vector<Spot>{{x + 0.12, foot}, {x + 0.12, top}}, own_colour, 1);
+    if (sample.palpate.young_modulus_pa / 1000 < range.to) axes.dot(x + 0.12, sample.palpate.young_modulus_pa / 1000, 2.5, own_colour);
+    if (sample.paper.young_modulus_pa / 1000 < range.to) axes.dot(x - 0.12, sample.paper.young_modulus_pa / 1000, 2.5, paper_colour);
+  }
+  legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate, 95 %", own_colour}});
+  return canvas->bytes();
+}
+
+std::string registration_figure(const TrialAnswer& trial) {
+  if (trial.pictures.empty()) return {};
+  constexpr double side_pt = 210, rows_pt = 190;
+  const auto& first = trial.pictures.front().simulated_m;
+  const Vec3 low = first.colwise().minCoeff(), high = first.colwise().maxCoeff();
+  // Along the object's longer horizontal side, and upwards.
+  const int across = high.x() - low.x() > high.y() - low.y() ? 0 : 1;
+  const double scale = std::min((side_pt - 20) / (high(across) - low(across)), (rows_pt - 40) / (high.z() - low.z()));
+  const std::size_t lines = (trial.pictures.size() + 1) / 2;
+  auto canvas = report::svg_canvas(2 * side_pt, rows_pt * static_cast<double>(lines));
+  for (std::size_t k = 0; k < trial.pictures.size(); ++k) {
+    const RegistrationPicture& picture = trial.pictures[k];
+    const double left = 10 + side_pt * static_cast<double>(k % 2), foot = rows_pt * static_cast<double>(k / 2 + 1) - 14;
+    const auto dots = [&](const Points& points_m, double radius, report::Colour colour) {
+      for (Index i = 0; i < static_cast<Index>(points_m.rows()); ++i)
+        canvas->dot({left + scale * (points_m(i, across) - low(across)), foot - scale * (points_m(i, 2) - low.z())}, radius, colour);
+    };
+    dots(picture.simulated_m, 0.9, report::rule);
+    dots(picture.registered_m, 0.8, paper_colour);
+    canvas->text({left, foot - rows_pt + 28},
+                 "E = " + report::quantity(picture.young_modulus_pa, "Pa") + ", rms " + fmt::format("{:.2f} mm", 1000 * picture.rms_m), 9,
+                 report::Align::left, report::ink);
+  }
+  return canvas->bytes();
+}
+
+}  // namespace palpate::cli
