@@ -36,9 +36,18 @@ TEST(Paper, BothMethodsAnswerAndAGridJudgesTheBaseline) {
   EXPECT_GT(grid.at("smallest_m2").get<double>(), 0);
   EXPECT_LT(grid.at("at_found_m2").get<double>(), 1.1 * grid.at("smallest_m2").get<double>());
   EXPECT_GE(trial.at("samples").size(), 3u);
+  // At a place that no method saw: the force within a fifth, the surface nearer than if nothing had moved.
+  ASSERT_GE(trial.at("unused_place").size(), 3u);
+  const auto& unused = trial.at("unused_place").back();
+  EXPECT_NEAR(unused.at("force_palpate_n").get<double>() / unused.at("force_n").get<double>(), 1, 0.2);
+  EXPECT_LT(unused.at("surface_rms_m").at("palpate").get<double>(), unused.at("surface_rms_m").at("still").get<double>());
+  const auto& registrations = trial.at("registrations");
+  ASSERT_EQ(registrations.size(), 4u);
+  EXPECT_LT(registrations.at(3).at("rms_m").get<double>(), registrations.at(0).at("rms_m").get<double>()) << "at the truth, at 3 E";
   std::stringstream page;
   page << std::ifstream(out / "paper.html").rdbuf();
   EXPECT_NE(page.str().find("<svg"), std::string::npos);
+  EXPECT_NE(page.str().find("What it should show"), std::string::npos);
   EXPECT_EQ(page.str().find("http"), page.str().find("http://www.w3.org/2000/svg"));  // nothing is fetched
 }
 

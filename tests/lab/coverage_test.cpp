@@ -123,7 +123,8 @@ Lab pushed(const std::string& name, std::uint64_t seed) {
 std::vector<SceneOfLabs> scenes() {
   std::vector<SceneOfLabs> all{{"demo", cube_on_a_table}};
   for (const BuiltInObject& row : built_in_objects())
-    all.push_back({std::string(row.name), [name = std::string(row.name)](std::uint64_t seed) { return pushed(name, seed); }});
+    if (row.name != "balloon")  // no solid: it has no E that an interval could hold
+      all.push_back({std::string(row.name), [name = std::string(row.name)](std::uint64_t seed) { return pushed(name, seed); }});
   return all;
 }
 
