@@ -61,6 +61,24 @@ TEST_F(Driver, RecordsASpringWhoseStiffnessComesOut) {
   EXPECT_EQ(palpate("--json check '" + path("recording") + "' --stiffness 800"), 1) << "a fifth stiffer is noticed";
 }
 
+TEST_F(Driver, FolderAndBagGiveTheSameAnswer) {
+  ASSERT_EQ(palpate(record(spring, one_push + " --bag '" + path("bag") + "'")), 0) << folder.get("err");
+  const auto errors_of = [&](const std::string& name) {
+    EXPECT_EQ(palpate("--json check '" + path(name) + "' --stiffness 800"), 0) << folder.get("err");
+    return nlohmann::json::parse(folder.get("out")).at("errors");
+  };
+  const nlohmann::json from_folder = errors_of("recording"), from_bag = errors_of("bag");
+  ASSERT_EQ(from_folder.size(), from_bag.size());
+  ASSERT_GT(from_folder.size(), 3u);
+  for (std::size_t i = 0; i < from_folder.size(); ++i) {
+    EXPECT_EQ(from_folder[i].at("name"), from_bag[i].at("name"));
+    const double std = from_folder[i].at("std");
+    // What is not determined wanders within its prior on rounding.
+    EXPECT_NEAR(from_folder[i].at("value").get<double>(), from_bag[i].at("value").get<double>(), 1e-6 * std);
+    EXPECT_NEAR(from_bag[i].at("std").get<double>() / std, 1, 1e-6);
+  }
+}
+
 TEST_F(Driver, GoesOnWhereARecordingWasCutOff) {
   ASSERT_EQ(palpate(record(spring, one_push)), 0) << folder.get("err");
   Recording made = read_recording(folder.path() / "recording");
