@@ -14,9 +14,9 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr Index most_uniform = 5000;   // tetrahedra of a mesh that is halved everywhere
-constexpr Index most_growth = 4;       // of the number of nodes, where it is not
-constexpr Index most_corners = 4000;   // of a mesh that is fitted with
+constexpr Index most_uniform = 5000;  // tetrahedra of a mesh that is halved everywhere
+constexpr Index most_growth = 4;      // of the number of nodes, where it is not
+constexpr Index most_corners = 4000;  // of a mesh that is fitted with
 
 struct RoundContact {
   fem::ContactPatch patch;
@@ -50,7 +50,8 @@ std::vector<RoundContact> round_contacts(const Recording& recording) {
           if (known) continue;
           const bool bar = tool.shape == ToolShape::capsule || tool.shape == ToolShape::edge;
           contacts.push_back(
-              {{load.contact_m, tool.radius_m, bar ? Vec3(0.5 * tool.length_m * tool.axis) : Vec3(Vec3::Zero())}, *load.force_n});
+              {{load.contact_m, tool.radius_m, bar ? Vec3(0.5 * tool.length_m * tool.axis) : Vec3(Vec3::Zero())},
+               *load.force_n});
         }
       }
     }

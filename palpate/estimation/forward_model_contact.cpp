@@ -57,11 +57,13 @@ bool depends_on_path(const Recording& recording) {
     return lifts_off(support) && support.contact == ContactLaw::friction;
   });
   for (const auto& push : recording.pushes)
-    for_each_driven(recording, push, [&](const Tool& tool, const Load&) { any = any || tool.contact != ContactLaw::frictionless; });
+    for_each_driven(recording, push,
+                    [&](const Tool& tool, const Load&) { any = any || tool.contact != ContactLaw::frictionless; });
   return any;
 }
 
-void ForwardModel::add_contacts(Body& body, const Push& push, fem::Boundary boundary, std::vector<fem::RigidContact> supports) {
+void ForwardModel::add_contacts(Body& body, const Push& push, fem::Boundary boundary,
+                                std::vector<fem::RigidContact> supports) {
   std::vector<fem::RigidContact> contacts = std::move(supports);
   for_each_driven(*recording_, push, [&](const Tool& tool, const Load& load) {
     const int column = body.node_motions + static_cast<int>(body.driven.size());
@@ -72,7 +74,8 @@ void ForwardModel::add_contacts(Body& body, const Push& push, fem::Boundary boun
   fem::ContactOptions options;
   options.statics = options_;
   options.friction_tolerance = std::min(options.friction_tolerance, 100 * options_.residual_tolerance);
-  body.contact = std::make_unique<fem::ContactStatics>(object_.mesh, object_.material, std::move(boundary), std::move(contacts), options);
+  body.contact = std::make_unique<fem::ContactStatics>(object_.mesh, object_.material, std::move(boundary),
+                                                       std::move(contacts), options);
 }
 
 /// With friction a step depends on everything that the steps before it depend on.
@@ -112,7 +115,8 @@ ForwardModel::ContactStatePtr ForwardModel::solve_contact(Body& body, const Coef
 
   state->columns = before ? before->columns : std::vector<int>();
   for (int column : c.columns) {
-    if (std::find(state->columns.begin(), state->columns.end(), column) == state->columns.end()) state->columns.push_back(column);
+    if (std::find(state->columns.begin(), state->columns.end(), column) == state->columns.end())
+      state->columns.push_back(column);
   }
   const Index parameters = first_ratio + static_cast<Index>(state->columns.size());
   fem::ContactLoadsAlong along = statics.no_loads_along(parameters);
@@ -154,14 +158,16 @@ ForwardModel::ContactStatePtr ForwardModel::lying(std::size_t s, Body& body, con
   return body.lying;
 }
 
-ForwardModel::ContactStatePtr ForwardModel::contact_state(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives) {
+ForwardModel::ContactStatePtr ForwardModel::contact_state(std::size_t s, Body& body, const VectorX& unknowns,
+                                                          bool derivatives) {
   ContactStatePtr& known = memory_[s].contact;
   if (known && known->unknowns == unknowns && (known->differentiated || !derivatives)) return known;
   ContactStatePtr before = lying(s, body, unknowns, derivatives && path_);
   if (path_ && steps_[s].step > 0) before = contact_state(s - 1, body, unknowns, derivatives);
   if (before && !before->at.converged) return before;
   const ContactStatePtr start = path_ ? before : known ? known : before;
-  known = solve_contact(body, coefficients(s, body, unknowns), unknowns, derivatives, start, path_ ? before : nullptr, worker_of(s));
+  known = solve_contact(body, coefficients(s, body, unknowns), unknowns, derivatives, start, path_ ? before : nullptr,
+                        worker_of(s));
   return known;
 }
 

@@ -20,12 +20,14 @@ class GapAlong {
     const Triangles triangles = fem::boundary_triangles(mesh);
     const Vec3 centre = pose * shape.bounding_centre_m();
     for (Index t = 0; t < triangles.rows(); ++t) {
-      const Vec3 a = mesh.nodes_m.row(triangles(t, 0)), b = mesh.nodes_m.row(triangles(t, 1)), c = mesh.nodes_m.row(triangles(t, 2));
+      const Vec3 a = mesh.nodes_m.row(triangles(t, 0)), b = mesh.nodes_m.row(triangles(t, 1)),
+                 c = mesh.nodes_m.row(triangles(t, 2));
       const double size = std::max({(b - a).norm(), (c - a).norm(), (c - b).norm()});
       if (((a + b + c) / 3 - centre).norm() > 2 * shape.bounding_radius_m() + size) continue;
       cell_m_ = std::max(cell_m_, size / across);
       for (int i = 0; i <= across; ++i)
-        for (int j = 0; i + j <= across; ++j) points_.push_back(a + (b - a) * i / double(across) + (c - a) * j / double(across));
+        for (int j = 0; i + j <= across; ++j)
+          points_.push_back(a + (b - a) * i / double(across) + (c - a) * j / double(across));
     }
   }
   bool misses() const { return points_.empty(); }

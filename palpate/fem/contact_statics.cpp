@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/contact/contact_path.hpp"
@@ -43,6 +44,47 @@ MatrixX any_translation() { return MatrixX::Identity(6, 3); }
 struct ContactStatics::Impl {
   ContactSystem system;
 
+  double update_limits(const ContactProblem& p, std::vector<TouchMemory>& memory, const ContactState& s) const {
+    double change = 0;
+    for (std::size_t c = 0; c < system.contacts.size(); ++c)
+      change += system.terms.update_limits(system.body(c, p.m, s.poses[c], memory), s.u,
+                                           system.contacts[c].friction_coefficient, memory[c]);
+    return change;
+  }
+
+  // Newton's method with friction limits that follow the pressures at once. There is no energy to watch, so it must win
+  // fast, or it is left (false, nothing changed) to the fixed point.
+  bool settle(const ContactProblem& p, std::vector<TouchMemory>& memory, ContactState& s, ContactEquilibrium& out) {
+    constexpr int most = 12;
+    constexpr double krylov_tolerance = 1e-3;
+    ContactState now = s;
+    std::vector<TouchMemory> now_memory = memory;
+    ContactTangent t;
+    double best = std::numeric_limits<double>::infinity();
+    for (int step = 0, worse = 0; step < most; ++step) {
+      update_limits(p, now_memory, now);
+      if (!system.evaluate(p, now_memory, now)) return false;
+      if (now.residual <= system.options.statics.residual_tolerance) {
+        s = std::move(now);
+        memory = std::move(now_memory);
+        return true;
+      }
+      if (now.residual > 0.5 * best && ++worse > 2) return false;
+      best = std::min(best, now.residual);
+      system.tangent(p, now_memory, now, false, t);
+      ++out.factorisations;
+      if (!system.factorise(t, 0, 1e-9)) return false;
+      MatrixX du, dz;
+      SlidingLimits(system, p, now_memory, now)
+          .solve(system, t, -now.unbalanced, -now.unbalanced_tool, du, dz, krylov_tolerance);
+      if (!du.allFinite() || !dz.allFinite()) return false;
+      ++out.newton_steps;
+      now.u += du.col(0);
+      if (dz.size() > 0) system.move(now, dz.col(0));
+    }
+    return false;
+  }
+
   // One increment from an equilibrium; `s` and `memory` are changed only when it converges.
   std::string increment(const ContactProblem& p, const ContactLoads& from, const ContactLoads& to, ContactState& s,
                         std::vector<TouchMemory>& memory, ContactEquilibrium& out, std::vector<ContactIncrement>& path) {
@@ -59,14 +101,13 @@ struct ContactStatics::Impl {
     if (!system.evaluate(p, next_memory, next)) return "the law does not exist at the start of the increment";
     system.soften_start(p, next_memory, next, out);
     std::string reason = system.newton(p, next_memory, next, out);
+    bool remembers_open = remembers;
+    if (reason.empty() && remembers && settle(p, next_memory, next, out)) remembers_open = false;
     // Friction limits follow the pressures: a fixed point around problems that each have an energy.
-    for (int round = 0; reason.empty() && remembers; ++round) {
-      double change = 0, force = 0;
-      for (std::size_t c = 0; c < count; ++c) {
-        change += system.terms.update_limits(system.body(c, p.m, next.poses[c], next_memory), next.u,
-                                             system.contacts[c].friction_coefficient, next_memory[c]);
-        force = std::max(force, next.gradients[c].head<3>().norm());
-      }
+    for (int round = 0; reason.empty() && remembers_open; ++round) {
+      const double change = update_limits(p, next_memory, next);
+      double force = 0;
+      for (const Vec6& wrench : next.gradients) force = std::max(force, wrench.head<3>().norm());
       const double tolerance = system.options.friction_tolerance * force;
       if (change <= tolerance) break;
       if (round == system.options.max_friction_rounds) {

@@ -1,7 +1,7 @@
 // label: contract
 // SPDX-License-Identifier: Apache-2.0
-// Objects that lie on tables and lean on walls, rough or smooth, and rigid tools whose motion is imposed: derivatives against
-// differences, lift-off and sliding against statics, and E of a block whose truth is solved without this room.
+// Objects that lie on tables and lean on walls, rough or smooth, and rigid tools whose motion is imposed: derivatives
+// against differences, lift-off and sliding against statics, and E of a block whose truth is solved without this room.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -92,7 +92,8 @@ std::vector<Scene> scenes() {
   }
   for (const RestState state : {RestState::stress_free, RestState::under_gravity}) {  // rubs over the table
     Recording r = lying_block(table(ContactLaw::friction, 0.3), state);
-    r.pushes = {push_of("aside", {force_of("pad", Vec3(0.1, 0, -1), middle), force_of("pad", Vec3(0.45, 0.05, -1.5), middle)})};
+    r.pushes = {
+        push_of("aside", {force_of("pad", Vec3(0.1, 0, -1), middle), force_of("pad", Vec3(0.45, 0.05, -1.5), middle)})};
     for (auto& step : r.pushes[0].steps) step.loads[0].force_std_n = 0.01;
     out.push_back({state == RestState::stress_free ? "rough_table" : "rough_table_seen_lying", "linear", r, 1});
   }
@@ -153,7 +154,8 @@ TEST_P(ContactDerivatives, AreThoseOfSurfaceForceAndTravel) {
     const VectorX measured = (flat(model.predict(scene.step, ahead)) - flat(model.predict(scene.step, behind))) / (2 * h);
     const auto compare = [&](Index first, Index size, double matters, const char* what) {
       const double scale = std::max(measured.segment(first, size).cwiseAbs().maxCoeff(), matters / prior);
-      EXPECT_LT((claimed - measured).segment(first, size).cwiseAbs().maxCoeff(), 1e-3 * scale) << what << " to " << unknowns[k].name;
+      EXPECT_LT((claimed - measured).segment(first, size).cwiseAbs().maxCoeff(), 1e-3 * scale)
+          << what << " to " << unknowns[k].name;
     };
     compare(0, here.d_surface.rows(), 1e-7, "surface");
     compare(here.d_surface.rows(), 1, 1e-7, "travel");
@@ -164,7 +166,8 @@ TEST_P(ContactDerivatives, AreThoseOfSurfaceForceAndTravel) {
 INSTANTIATE_TEST_SUITE_P(Scenes, ContactDerivatives, testing::Range<std::size_t>(0, 5),
                          [](const auto& each) { return std::string(scenes()[each.param].name); });
 
-StepPrediction predicted(const Recording& recording, const TetMesh& mesh, const std::string& material, std::size_t step = 0) {
+StepPrediction predicted(const Recording& recording, const TetMesh& mesh, const std::string& material,
+                         std::size_t step = 0) {
   Unknowns unknowns;
   ForwardModel model(recording, simulated(mesh, material), unknowns, tight());
   VectorX at = unknowns.prior_mean();
@@ -243,7 +246,8 @@ TEST(RigidTool, StartsWhereItJustTouches) {
   }
 }
 
-/// What sensors would say of a block on a rough table: solved by the contact solver alone on a mesh twice as fine as the fit's.
+/// What sensors would say of a block on a rough table: solved by the contact solver alone on a mesh twice as fine as the
+/// fit's.
 class LyingBlock : public testing::Test {
  protected:
   LyingBlock() {

@@ -60,7 +60,9 @@ TEST_F(FinerMesh, IsTakenUntilTheErrorInYoungsModulusIsAsSmallAsAskedFor) {
   EXPECT_FALSE(says(fine.answer, "mesh_too_coarse"));
   EXPECT_NE(fine.answer.provenance.at("coarser meshes").find("144 tet10"), std::string::npos);
   EXPECT_EQ(fine.answer.provenance.at("mesh").find(std::to_string(fine.volume.tetrahedra.rows()) + " tet10"), 0u);
-  const auto error = [&](const Identified& found) { return std::abs(std::log(found.answer.parameters[0].value / young_pa)); };
+  const auto error = [&](const Identified& found) {
+    return std::abs(std::log(found.answer.parameters[0].value / young_pa));
+  };
   EXPECT_LT(error(fine), 0.01) << "the promise, and as much again for noise and the mesh of the truth";
   EXPECT_LT(error(fine), 0.5 * error(coarse));
   RecordProperty("coarse_error_percent", std::to_string(100 * error(coarse)));

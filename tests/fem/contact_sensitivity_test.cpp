@@ -174,6 +174,7 @@ TEST(ContactPath, CarriesDerivativesThroughStepsInSequence) {
   const ContactEquilibrium base = run(at, &d);
   EXPECT_GT(base.touches[0].slipping_points, 20);
   EXPECT_LT(base.touches[0].slipping_points, base.touches[0].active_points - 20);
+  RecordProperty("factorisations", base.factorisations);
   ASSERT_EQ(d.displacement.cols(), 5);
   for (Index k = 0; k < 5; ++k) {
     VectorX up = at, down = at;

@@ -25,7 +25,8 @@ Mat3 rotation_slope(const Vec3& w) {
 
 MatrixX at_point(const SurfacePoints& points, Index face, int point, const MatrixX& field) {
   MatrixX x = MatrixX::Zero(3, field.cols());
-  for (int a = 0; a < points.nodes_per_face(); ++a) x += points.shape(point)(a) * field.middleRows<3>(3 * points.node(face, a));
+  for (int a = 0; a < points.nodes_per_face(); ++a)
+    x += points.shape(point)(a) * field.middleRows<3>(3 * points.node(face, a));
   return x;
 }
 
@@ -42,7 +43,8 @@ MatrixX seen_by_tool(const MatrixX& dx, const MatrixX& twist, const Vec3& arm) {
 /// d of the tangential offset at fixed y as its anchor and the normal there move.
 MatrixX offset_change(const ContactTerms::Held& h, const MatrixX& anchor, const MatrixX& normal) {
   const Vec3 d = h.y_m - h.anchor_m;
-  return -(anchor - h.normal * (h.normal.transpose() * anchor)) - h.normal * (d.transpose() * normal) - h.normal.dot(d) * normal;
+  return -(anchor - h.normal * (h.normal.transpose() * anchor)) - h.normal * (d.transpose() * normal) -
+         h.normal.dot(d) * normal;
 }
 
 }  // namespace
@@ -75,7 +77,7 @@ void SlidingLimits::add(const MatrixX& du, const std::vector<MatrixX>& twist, Ma
 }
 
 void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, MatrixX& du,
-                          MatrixX& dz) const {
+                          MatrixX& dz, double tolerance) const {
   system.solve(t, ru, rz, false, du, dz);
   if (empty()) return;
   const Index n = static_cast<Index>(du.rows()), z = static_cast<Index>(dz.rows()), q = static_cast<Index>(du.cols());
@@ -102,7 +104,6 @@ void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const 
   };
   // One Krylov space a column; products of all columns share the back-substitutions.
   constexpr int most = 80;
-  constexpr double tolerance = 1e-11;
   const MatrixX right = stacked(du, dz);
   const VectorX size = right.colwise().norm();
   std::vector<MatrixX> basis{right * size.unaryExpr([](double s) { return s > 0 ? 1 / s : 0.0; }).asDiagonal()};
@@ -137,7 +138,8 @@ void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const 
       MatrixX x = MatrixX::Zero(n + z, q);
       for (Index c = 0; c < q; ++c) {
         if (!(size(c) > 0)) continue;
-        for (int j = 0; j <= k; ++j) x.col(c) += weights[static_cast<std::size_t>(c)](j) * basis[static_cast<std::size_t>(j)].col(c);
+        for (int j = 0; j <= k; ++j)
+          x.col(c) += weights[static_cast<std::size_t>(c)](j) * basis[static_cast<std::size_t>(j)].col(c);
       }
       du = x.topRows(n);
       dz = x.bottomRows(z);
@@ -147,8 +149,9 @@ void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const 
   }
 }
 
-void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactIncrement& before, const ContactIncrement& after,
-             const ContactLoadsAlong& from, const ContactLoadsAlong& to, ContactPathSensitivity& d) {
+void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactIncrement& before,
+             const ContactIncrement& after, const ContactLoadsAlong& from, const ContactLoadsAlong& to,
+             ContactPathSensitivity& d) {
   const auto count = system.contacts.size();
   const Index q = static_cast<Index>(to.log_young.size());
   const ContactProblem p = system.problem(at.young_modulus_pa, at.poisson_ratio, after.loads, at.extra);
@@ -213,8 +216,8 @@ void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactI
       } else {  // it sticks where it was when the increment began
         const Pose& pose = before.poses[c];
         const Vec3 arm = system.terms.position(before.displacement_m, h.face, h.point) - pose.translation();
-        anchor = pose.linear().transpose() *
-                 seen_by_tool(at_point(points, h.face, h.point, d.displacement), d.motion[c], arm);
+        anchor =
+            pose.linear().transpose() * seen_by_tool(at_point(points, h.face, h.point, d.displacement), d.motion[c], arm);
         normal = system.terms.normal_slope(body, h.face, h.anchor_m) * anchor +
                  system.terms.normal_d_radius(body, h.face, h.anchor_m) * to.radius[c].transpose();
       }
@@ -274,7 +277,8 @@ void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactI
         if (!h.slips) continue;
         auto anchor = anchors[c].anchor.middleRows<3>(3 * static_cast<Index>(i));
         auto normal = anchors[c].normal.middleRows<3>(3 * static_cast<Index>(i));
-        const MatrixX dy = r.transpose() * seen_by_tool(at_point(points, h.face, h.point, d.displacement), twist[c], h.arm_m);
+        const MatrixX dy =
+            r.transpose() * seen_by_tool(at_point(points, h.face, h.point, d.displacement), twist[c], h.arm_m);
         const MatrixX offset = offset_change(h, anchor, normal) + dy - h.normal * (h.normal.transpose() * dy);
         const Eigen::RowVectorXd limit =
             system.contacts[c].friction_coefficient *

@@ -4,8 +4,8 @@
 //
 //   R(u, z; a, theta) = 0,   friction limits mu p(u, z) inside R     =>   (S + B) d(u, z) = -dR/dtheta - dR/da da/dtheta
 //
-// S is the symmetric tangent at fixed limits, B what the limits of sliding points add, which is not symmetric: B is brought in
-// by GMRES, preconditioned with the factor of S (Saad & Schultz 1986).
+// S is the symmetric tangent at fixed limits, B what the limits of sliding points add, which is not symmetric: B is brought
+// in by GMRES, preconditioned with the factor of S (Saad & Schultz 1986).
 #pragma once
 
 #include "palpate/fem/contact/contact_problem.hpp"
@@ -20,9 +20,9 @@ class SlidingLimits {
   bool empty() const { return points_.empty(); }
   /// Adds B (du, twists) to forces on nodes (3n x q) and to the tools' gradients (6 x q, one a contact).
   void add(const MatrixX& du, const std::vector<MatrixX>& twist, MatrixX& forces, std::vector<MatrixX>& gradients) const;
-  /// Solves (S + B) x = r along free axes with the last factor of S.
-  void solve(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, MatrixX& du,
-             MatrixX& dz) const;
+  /// Solves (S + B) x = r along free axes with the last factor of S. @param tolerance  of what is left, relative
+  void solve(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, MatrixX& du, MatrixX& dz,
+             double tolerance = 1e-11) const;
 
  private:
   struct Point {
@@ -37,8 +37,9 @@ class SlidingLimits {
 
 /// Takes derivatives of a state on to the end of the next increment.
 /// @param before  end of the increment before; @param from, to  derivatives of the loads at the two ends
-void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactIncrement& before, const ContactIncrement& after,
-             const ContactLoadsAlong& from, const ContactLoadsAlong& to, ContactPathSensitivity& d);
+void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactIncrement& before,
+             const ContactIncrement& after, const ContactLoadsAlong& from, const ContactLoadsAlong& to,
+             ContactPathSensitivity& d);
 
 /// All increments of a load step (ContactStatics::sensitivity_along).
 ContactPathSensitivity path_sensitivity(ContactSystem& system, const ContactEquilibrium& at,

@@ -76,7 +76,8 @@ ContactPathSensitivity path_sensitivity(ContactSystem& system, const ContactEqui
 
 ContactSensitivity sensitivity_of(ContactSystem& system, const ContactStatics& statics, const ContactEquilibrium& at) {
   const auto count = system.contacts.size();
-  if (at.displacement_m.size() != 3 * system.mesh.nodes_m.rows() || at.touches.size() != count || !at.path || at.path->size() < 2)
+  if (at.displacement_m.size() != 3 * system.mesh.nodes_m.rows() || at.touches.size() != count || !at.path ||
+      at.path->size() < 2)
     throw Error("is not a state of this mesh and these contacts", "sensitivity.at");
   bool path_matters = false;
   for (std::size_t c = 0; c < count; ++c) {

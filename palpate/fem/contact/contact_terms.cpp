@@ -44,6 +44,8 @@ void ContactTerms::for_each_candidate(const TouchingBody& body, const VectorX& u
   const int nodes = points_.nodes_per_face();
   const double reach = body.shape->bounding_radius_m();
   const Vec3 centre = body.T_base_tool * body.shape->bounding_centre_m();
+  const Pose to_tool = body.T_base_tool.inverse();
+  ShapePoint corner;
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> x(3, nodes);
   for (Index f = 0; f < points_.face_count(); ++f) {
     double nearest2 = kInfinity;
@@ -55,6 +57,13 @@ void ContactTerms::for_each_candidate(const TouchingBody& body, const VectorX& u
     double size2 = 0;
     for (int a = 1; a < nodes; ++a) size2 = std::max(size2, (x.col(a) - x.col(0)).squaredNorm());
     if (reach < kInfinity && std::sqrt(nearest2) > reach + std::sqrt(size2)) continue;
+    if (reach == kInfinity) {  // a plane: faces that are farther from it than they are long
+      double gap = kInfinity;
+      for (int a = 0; a < nodes && gap > std::sqrt(size2); ++a) {
+        if (body.shape->at(to_tool * x.col(a), points_.cell_m(f), corner)) gap = std::min(gap, corner.gap_m);
+      }
+      if (gap > std::sqrt(size2)) continue;
+    }
     for (int p = 0; p < points_.per_face(); ++p) {
       const Eigen::Matrix<double, 3, 2> t = x * points_.d_shape(p);
       visit(f, p, Vec3(x * points_.shape(p)), Vec3(t.col(0).cross(t.col(1))));
