@@ -161,11 +161,13 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 }
 
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
-                   const OnProgress& on_progress, const FinerModel* finer) {
+                   const OnProgress& on_progress, const FinerModel* finer, FitMemory* memory) {
   check(options);
   const OnProgress progress = paced(on_progress);
   Unknowns unknowns;
-  ForwardModel model(recording, object, unknowns, statics_options(recording, object, options));
+  ForwardModel model(recording, object, unknowns, statics_options(recording, object, options),
+                     memory != nullptr ? memory->model : nullptr);
+  if (memory != nullptr) memory->model = model.solved();
   Objective objective(model, inputs, unknowns);
   if (recording.model.poisson_fixed) unknowns[poisson].fixed = true;
 
@@ -261,7 +263,8 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
 
   std::optional<AnswerShift> mesh;
   if (finer != nullptr && optimum.termination == Termination::converged) {
-    mesh = mesh_shift(recording, objective, optimum, loss, *finer, options, progress);
+    mesh = mesh_shift(recording, objective, optimum, loss, *finer, options, progress,
+                      memory != nullptr ? &memory->finer : nullptr);
   }
   const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
   if (posterior.cancelled) {

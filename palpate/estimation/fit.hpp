@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,6 +33,12 @@ struct FitOptions {
 
 struct FinerModel;
 
+/// What a fit leaves for the next one of the same object, held and touched in the same way: what was solved for and does not
+/// depend on what was measured.
+struct FitMemory {
+  std::shared_ptr<ForwardModel::Solved> model, finer;
+};
+
 /// @throws Error naming the option that is out of range.
 void check(const FitOptions& options);
 
@@ -45,9 +52,11 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 /// @param inputs     one list a step
 /// @param finer      the same object on a finer mesh, nullptr where the mesh is to be taken as it is: what the mesh does to the
 ///                   answer then widens the intervals (mesh_error.hpp)
+/// @param memory     used and filled; nullptr: nothing is kept
 /// @throws Error when no answer can exist (no observation, supports that hold nothing, ...). Numbers that did not work out
 ///         are said in `termination`, `message` and `verdicts`.
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
-                   const OnProgress& progress = {}, const FinerModel* finer = nullptr);
+                   const OnProgress& progress = {}, const FinerModel* finer = nullptr,
+                   FitMemory* memory = nullptr);
 
 }  // namespace palpate::estimation

@@ -19,8 +19,18 @@ const std::vector<std::string> xyz{"_x", "_y", "_z"};
 
 ForwardModel::~ForwardModel() = default;
 
-ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns,
-                           fem::StaticsOptions options)
+bool ForwardModel::Solved::holds_for(const Solved& other) const {
+  const auto same = [](const VectorX& a, const VectorX& b) { return a.size() == b.size() && a == b; };
+  return material == other.material && nodes == other.nodes && vertices == other.vertices && place_m == other.place_m &&
+         supports == other.supports &&
+         options.dilatation == other.options.dilatation && options.threads == other.options.threads &&
+         options.residual_tolerance == other.options.residual_tolerance && options.region == other.options.region &&
+         same(options.region_stiffness, other.options.region_stiffness) && poisson_lower == other.poisson_lower &&
+         poisson_upper == other.poisson_upper && bodies.size() == other.bodies.size();
+}
+
+ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options,
+                           std::shared_ptr<Solved> earlier)
     : recording_(&recording), object_(std::move(object)), options_(options) {
   // From a hundredth of a pascal to diamond: beyond that the fit has lost its way.
   unknowns.add({"young_modulus", "log Pa", 0, std::numeric_limits<double>::infinity(), std::log(1e-2), std::log(1.2e12)});
@@ -39,8 +49,18 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     if (density_ >= 0) unknowns[density_].prior_mean = recording.density_kg_m3;
   }
 
+  solved_ = std::make_shared<Solved>();
   if (recording.rest.surface_std_m > 0) {
-    field_.emplace(object_.surface.rest(), recording.rest.surface_std_m, recording.rest.surface_correlation_m);
+    solved_->field_std_m = recording.rest.surface_std_m;
+    solved_->field_correlation_m = recording.rest.surface_correlation_m;
+    if (earlier && earlier->field && earlier->vertices == object_.surface.vertex_count() &&
+        earlier->field_std_m == solved_->field_std_m && earlier->field_correlation_m == solved_->field_correlation_m) {
+      solved_->field = std::move(earlier->field);
+    } else {
+      solved_->field =
+          std::make_unique<SurfaceField>(object_.surface.rest(), solved_->field_std_m, solved_->field_correlation_m);
+    }
+    field_ = solved_->field.get();
     field_unknown_ = unknowns.size();
     for (Index k = 0; k < field_->modes(); ++k) unknowns.add({"rest_surface[" + std::to_string(k) + "]", "1", 0, 1});
   }
@@ -122,7 +142,21 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
       recording.model.poisson_fixed ? poisson_lower_ : unknowns[poisson].upper;  // one ratio needs no polynomial
   // Steps share the threads; the solves in them use what is left over.
   if (!linear_) options_.threads = std::max(1, options_.threads / static_cast<int>(workers_));
-  bodies_.resize(linear_ ? 1 : workers_);
+  solved_->material = object_.material;
+  solved_->nodes = static_cast<Index>(object_.mesh.nodes_m.rows());
+  solved_->vertices = object_.surface.vertex_count();
+  solved_->place_m = object_.mesh.nodes_m.sum();
+  solved_->supports = recording.supports.size();
+  solved_->options = options_;
+  solved_->poisson_lower = poisson_lower_;
+  solved_->poisson_upper = poisson_upper_;
+  solved_->bodies.resize(linear_ ? 1 : workers_);
+  if (earlier && solved_->holds_for(*earlier)) {
+    solved_->bodies = std::move(earlier->bodies);
+    for (auto& bodies : solved_->bodies) {
+      for (const auto& push : recording.pushes) drop_if_unfit(bodies, push);
+    }
+  }
   solves_.assign(workers_, 0);
   for (std::size_t s = 0; s < steps_.size(); ++s) body_of(push(s), worker_of(s));
 }
@@ -303,7 +337,7 @@ void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const V
     out.surface_m.row(v) = clamp.apply(out.surface_m.row(v).transpose() + moved_m.segment<3>(3 * v));
   }
   if (!field_) return;
-  out.field = &*field_;
+  out.field = field_;
   out.field_unknown = field_unknown_;
   out.material_m = out.surface_m;
   out.field_directions = field_->normals() * clamp.rotation().transpose();
@@ -392,18 +426,17 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
       for (Index k = parameters_; k < count; ++k) out.d_travel(l, k) = c.d_motion(m, k - parameters_);
     } else {
       out.force_n[at_load] = load.force_n.value_or(Vec3::Zero());
-      const LoadParts parts = load_parts(s, at_load, body, unknowns);
-      if (parts.first < 0) continue;
+      const std::vector<LoadPart> parts = load_parts(s, at_load, body, unknowns);
+      if (parts.empty()) continue;
       const Vec3 direction = rotation.transpose() * load.direction.normalized();
       Vec3 mean_motion_m = Vec3::Zero();
-      for (std::size_t part = 0; part < parts.weight.size(); ++part) {
-        const Index first = parts.first + static_cast<Index>(3 * part);
-        const Vec3 conjugate_m = at.conjugate_m.segment<3>(first);
-        mean_motion_m += parts.weight[part] * conjugate_m;
-        out.d_travel.row(l) += parts.weight[part] * direction.transpose() * at.d_conjugate.middleRows<3>(first);
-        if (part == 0) continue;
-        const auto shift = std::find(out.columns.begin(), out.columns.end(), parts.shift_unknown + static_cast<int>(part) - 1);
-        out.d_travel(l, shift - out.columns.begin()) += direction.dot(conjugate_m);
+      for (const LoadPart& part : parts) {
+        const Vec3 conjugate_m = at.conjugate_m.segment<3>(part.first);
+        mean_motion_m += part.weight * conjugate_m;
+        out.d_travel.row(l) += part.weight * direction.transpose() * at.d_conjugate.middleRows<3>(part.first);
+        if (part.unknown < 0) continue;
+        const auto own = std::find(out.columns.begin(), out.columns.end(), part.unknown);
+        out.d_travel(l, own - out.columns.begin()) += direction.dot(conjugate_m);
       }
       out.travel_m(l) = direction.dot(mean_motion_m);
       if (clamp_[s] < 0) continue;

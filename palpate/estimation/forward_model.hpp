@@ -56,11 +56,19 @@ struct SimulatedObject {
 
 class ForwardModel {
  public:
+  /// What was solved for and does not depend on what was measured: bodies, a linear one's answers to unit loads over nu, the
+  /// modes of the rest surface's error.
+  struct Solved;
+
   /// Registers log E, nu and every nuisance that belongs to loads and supports in `unknowns` (which must be empty).
   /// `recording` must outlive this object.
+  /// @param earlier  of a model of the same object, held in the same way, that has done its work: it is used again where law,
+  ///                 options and contacts are the same, else made anew
   /// @throws Error when a load names no tool, or supports leave a motion free that a load works on.
-  ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options = {});
+  ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options = {},
+               std::shared_ptr<Solved> earlier = nullptr);
   ~ForwardModel();
+  const std::shared_ptr<Solved>& solved() const { return solved_; }
 
   std::size_t step_count() const { return steps_.size(); }
   const Step& step(std::size_t s) const;
@@ -125,10 +133,12 @@ class ForwardModel {
   void set_ratios(Body& body, const VectorX& unknowns) const;
   std::vector<int> parameter_columns() const;
   void place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const;
+  /// Forgets the push's body where it lacks columns of a contact.
+  void drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies, const Push& push) const;
   Body& body_of(const Push& push, std::size_t worker);
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
-  struct LoadParts;  // of one load: columns that work together
-  LoadParts load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const;
+  struct LoadPart;  // of one load: columns that work together
+  std::vector<LoadPart> load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const;
   RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;
 
   const Recording* recording_;
@@ -139,7 +149,7 @@ class ForwardModel {
   std::size_t workers_ = 1;
   bool contact_ = false, path_ = false;  // bodies touch what only pushes; a step depends on the steps before
   bool linear_ = false;  // workers share one solver for each set of platens, else each has its own
-  std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies_;
+  std::shared_ptr<Solved> solved_;
   std::vector<Memory> memory_;
   double reuse_ = 0;
   std::vector<double> followed_;  // a step: share of itself by which the last prediction left a solution
@@ -152,7 +162,7 @@ class ForwardModel {
   std::vector<Vec3> tare_axis_;                // a push: zero = three unknowns, else one along this axis
   int force_scale_ = -1, density_ = -1;
   int parameters_ = first_ratio;  ///< log E, nu and the regions' ratios: the first columns of every derivative
-  std::optional<SurfaceField> field_;
+  const SurfaceField* field_ = nullptr;  // of solved_; nullptr: none
   int field_unknown_ = -1;
   std::vector<int> solves_;  // a worker
 };

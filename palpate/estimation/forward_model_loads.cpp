@@ -60,8 +60,27 @@ bool has_place(const Recording& recording, const Load& load) {
   return tool != recording.tools.end() && tool->shape != ToolShape::vertices && tool->shape != ToolShape::platen;
 }
 
+bool has_columns(const Load& load) { return !load.travel_m && load.force_n.value_or(Vec3::Zero()).norm() + load.force_std_n > 0; }
+
+void ForwardModel::drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies, const Push& push) const {
+  const auto known = bodies.find(body_key(push));
+  if (known == bodies.end()) return;
+  for (const auto& step : push.steps) {
+    for (const auto& load : step.loads) {
+      if (!has_columns(load)) continue;
+      const auto at = known->second->contacts.find(key_of(load));
+      const bool shifts = load.contact_std_m > 0 && has_place(*recording_, load);
+      if (at == known->second->contacts.end() ||
+          (shifts && (at->second.shift < 0 || at->second.direction != load.direction))) {
+        bodies.erase(known);
+        return;
+      }
+    }
+  }
+}
+
 ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) {
-  auto& bodies = bodies_[linear_ ? 0 : worker];
+  auto& bodies = solved_->bodies[linear_ ? 0 : worker];
   const auto known = bodies.find(body_key(push));
   if (known != bodies.end()) return *known->second;
   auto& body = bodies[body_key(push)];
@@ -85,12 +104,19 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
     if (body_key(other) != body_key(push)) continue;
     for (const auto& step : other.steps) {
       for (const auto& load : step.loads) {
-        if (load.travel_m || load.force_n.value_or(Vec3::Zero()).norm() + load.force_std_n == 0) continue;
-        if (!body->force_column.emplace(key_of(load), static_cast<int>(3 * parts.size())).second) continue;
+        if (!has_columns(load)) continue;
+        Body::Contact& contact = body->contacts[key_of(load)];
+        const auto next_column = [&] { return static_cast<int>(3 * parts.size()); };
         const Tool& tool = this->tool(load.tool);
-        parts.push_back(load_columns(object_.mesh, tool, load));
-        if (!(load.contact_std_m > 0) || !has_place(*recording_, load)) continue;
-        for (const Vec3& tangent : tangents(load.direction)) parts.push_back(shifted_columns(object_.mesh, tool, load, tangent));
+        if (contact.force < 0) {
+          contact.force = next_column();
+          parts.push_back(load_columns(object_.mesh, tool, load));
+        }
+        if (contact.shift < 0 && load.contact_std_m > 0 && has_place(*recording_, load)) {
+          contact.shift = next_column();
+          contact.direction = load.direction;
+          for (const Vec3& tangent : tangents(load.direction)) parts.push_back(shifted_columns(object_.mesh, tool, load, tangent));
+        }
       }
     }
   }
@@ -138,6 +164,7 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
     fem::LinearResponse::Options options;
     options.poisson_lower = poisson_lower_;
     options.poisson_upper = poisson_upper_;
+    options.tolerance = 100 * options_.residual_tolerance;
     body->response = std::make_unique<fem::LinearResponse>(*body->statics, watched, options);
   }
   return *body;
@@ -153,13 +180,14 @@ RigidOffset ForwardModel::clamp_offset(std::size_t s, const VectorX& unknowns) c
   return offset;
 }
 
-ForwardModel::LoadParts ForwardModel::load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const {
-  LoadParts parts;
-  const auto found = body.force_column.find(key_of(step(s).loads[l]));
-  if (found == body.force_column.end()) return parts;
-  parts.first = found->second;
-  parts.shift_unknown = contact_shift_[s][l];
-  for (int k = 0; parts.shift_unknown >= 0 && k < 2; ++k) parts.weight.push_back(unknowns(parts.shift_unknown + k));
+std::vector<ForwardModel::LoadPart> ForwardModel::load_parts(std::size_t s, std::size_t l, const Body& body,
+                                                             const VectorX& unknowns) const {
+  const auto found = body.contacts.find(key_of(step(s).loads[l]));
+  if (found == body.contacts.end()) return {};
+  const Body::Contact& contact = found->second;
+  std::vector<LoadPart> parts{{contact.force}};
+  const int shift = contact_shift_[s][l];
+  for (int k = 0; shift >= 0 && k < 2; ++k) parts.push_back({contact.shift + 3 * k, unknowns(shift + k), shift + k});
   return parts;
 }
 
@@ -207,8 +235,8 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
       }
       continue;
     }
-    const LoadParts parts = load_parts(s, l, body, unknowns);
-    if (parts.first < 0) continue;
+    const std::vector<LoadPart> parts = load_parts(s, l, body, unknowns);
+    if (parts.empty()) continue;
     const int error = force_error_[s][l];
     Vec3 measured = load.force_n.value_or(Vec3::Zero());
     if (error >= 0) measured += unknowns.segment<3>(error);
@@ -216,13 +244,11 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     Vec3 tare = Vec3::Zero();
     if (tare_[p] >= 0) tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
     const Vec3 force = scale * measured + tare;
-    for (std::size_t part = 0; part < parts.weight.size(); ++part) {
-      const int first = parts.first + static_cast<int>(3 * part);
-      const double weight = parts.weight[part];
+    for (const auto& [first, weight, own_unknown] : parts) {
       add_vector(first, weight * force);
-      const auto add_derivative = [&](int unknown, const Vec3& d) {
+      const auto add_derivative = [&, first_column = first, factor = weight](int unknown, const Vec3& d) {
         const int at = column(unknown);
-        c.d_force.block<3, 1>(first, at) += weight * (into_object * d);
+        c.d_force.block<3, 1>(first_column, at) += factor * (into_object * d);
       };
       for (int k = 0; error >= 0 && k < 3; ++k) add_derivative(error + k, scale * Vec3::Unit(k));
       if (force_scale_ >= 0) add_derivative(force_scale_, measured);
@@ -230,8 +256,8 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
       for (int k = 0; tare_[p] >= 0 && k < (one_axis ? 1 : 3); ++k) {
         add_derivative(tare_[p] + k, one_axis ? tare_axis_[p] : Vec3(Vec3::Unit(k)));
       }
-      if (part > 0) {
-        const int at = column(parts.shift_unknown + static_cast<int>(part) - 1);
+      if (own_unknown >= 0) {
+        const int at = column(own_unknown);
         c.d_force.block<3, 1>(first, at) += into_object * force;
       }
     }

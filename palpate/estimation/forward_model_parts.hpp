@@ -40,8 +40,16 @@ struct ForwardModel::ContactState {
   fem::ContactPathSensitivity d;
 };
 
+/// True for a load that acts by columns of force.
+bool has_columns(const Load& load);
+
 struct ForwardModel::Body {
-  std::map<std::string, int> force_column;   // of a load's key: first of three; of nine where the contact may have shifted
+  struct Contact {
+    int force = -1;                // first of three columns
+    int shift = -1;                // first of six, or -1
+    Vec3 direction = Vec3::Zero();  // that the shifts are across
+  };
+  std::map<std::string, Contact> contacts;   // of a load's key
   std::map<std::string, int> motion_column;  // of a platen
   int gravity_column = -1;
   MatrixX free_motions;
@@ -57,6 +65,21 @@ struct ForwardModel::Body {
   int node_motions = 0;                                 // columns of platens whose nodes are moved
   std::shared_ptr<const ContactState> lying;            // under its weight alone, where it was last asked for
   std::unique_ptr<fem::LinearResponse> response;  // linear materials only: surface rows, then the forces' own (3 a load)
+};
+
+struct ForwardModel::Solved {
+  // What it holds for: the object is the caller's to keep the same, but another mesh must not pass unnoticed.
+  std::string material;
+  Index nodes = 0, vertices = 0;
+  double place_m = 0;  // sum of the nodes' coordinates
+  std::size_t supports = 0;
+  fem::StaticsOptions options;
+  double poisson_lower = 0, poisson_upper = 0;
+  bool holds_for(const Solved& other) const;
+
+  std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies;  ///< a worker (all together: linear), by driven tools
+  std::unique_ptr<SurfaceField> field;
+  double field_std_m = 0, field_correlation_m = 0;
 };
 
 struct ForwardModel::Coefficients {
@@ -86,10 +109,10 @@ struct ForwardModel::Memory {
 };
 
 /// Where a load acts: its columns, and the derivatives of those to a shift of the contact along two tangents.
-struct ForwardModel::LoadParts {
-  int first = -1;                 // of the columns; -1: this load has none
-  int shift_unknown = -1;         // first of two, or -1
-  std::vector<double> weight{1};  // of each three columns: 1, shift, shift
+struct ForwardModel::LoadPart {
+  int first = -1;     // of three columns
+  double weight = 1;  // 1, or how far the unknown is from its mean
+  int unknown = -1;   // -1: the columns themselves
 };
 
 }  // namespace palpate::estimation

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/fem/materials.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -40,19 +41,27 @@ std::vector<char> steps_that_matter(const ForwardModel& model, const std::vector
 
 std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objective& objective, const Optimum& optimum,
                                       const Loss& loss, const FinerModel& finer, const FitOptions& options,
-                                      const OnProgress& progress) {
+                                      const OnProgress& progress, std::shared_ptr<ForwardModel::Solved>* solved) {
   Loss highest = loss;
   highest.every = 1;
   highest.steps = steps_that_matter(objective.model(), objective.last_rows());
+  const bool linear = fem::material_law(objective.model().object().material).is_linear();
+  const bool kept = solved != nullptr && linear;
   const auto small_strains = [&](Recording copy, SimulatedObject object) {
-    copy.model.poisson_fixed = optimum.unknowns(poisson);
-    copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
+    // Both meshes integrate alike: as the fit did, or as this ratio alone asks for.
+    auto statics = statics_options(copy, object, options);
+    if (!kept) {
+      copy.model.poisson_fixed = optimum.unknowns(poisson);
+      copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
+      if (!linear) statics = statics_options(copy, object, options);
+    }
+    if (kept) statics.residual_tolerance = 1e-5;  // of a change that is a per cent itself: a few ratios are enough
     object.material = "linear";
     copy.supports = held_both_ways(std::move(copy.supports));
-    const auto statics = statics_options(copy, object, options);  // of this ratio alone
     Unknowns unknowns;
     auto held = std::make_unique<Recording>(std::move(copy));
-    ForwardModel model(*held, std::move(object), unknowns, statics);
+    ForwardModel model(*held, std::move(object), unknowns, statics, kept ? *solved : nullptr);
+    if (kept) *solved = model.solved();
     std::vector<StepPrediction> predicted(model.step_count());
     for (std::size_t s = 0; s < model.step_count(); ++s) {
       if (highest.steps[s] != 0) predicted[s] = model.predict(s, optimum.unknowns);
@@ -60,7 +69,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
     return predicted;
   };
   if (progress && !progress("mesh error", 0)) return std::nullopt;
-  const auto coarse = small_strains(recording, objective.model().object());
+  const auto coarse = linear ? objective.last_predictions() : small_strains(recording, objective.model().object());
   const auto fine = small_strains(finer.recording, finer.object);
   if (progress && !progress("mesh error", 1)) return std::nullopt;
 

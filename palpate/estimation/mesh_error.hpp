@@ -22,10 +22,14 @@ struct AnswerShift {
 /// step of Gauss and Newton. Small strains are used for the change, one factorisation each. Where the error falls with the
 /// power p of the edge length, the coarse mesh is off by the change over 1 - 2^-p; p = 1.5 lies between the first order at the
 /// rim of a tool and the second of smooth regions (fem.discretisation).
-/// The objective's last evaluation must be the optimum's. @returns nothing when the caller asked to stop.
+/// The objective's last evaluation must be the optimum's.
+/// @param solved  nullptr: the finer mesh is solved for at the optimum's nu. Else what is used and filled: a linear object is
+///                then solved for over all of nu's range, once for all fits that share it
+/// @returns nothing when the caller asked to stop.
 std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objective& objective, const Optimum& optimum,
                                       const Loss& loss, const FinerModel& finer, const FitOptions& options,
-                                      const OnProgress& progress);
+                                      const OnProgress& progress,
+                                      std::shared_ptr<ForwardModel::Solved>* solved = nullptr);
 
 /// Adds an error of known direction and normally distributed size (one standard deviation: `shift`) to a posterior. Exact for
 /// normal posteriors; bounds of nu are kept.
