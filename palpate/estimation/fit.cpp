@@ -7,6 +7,7 @@
 #include <map>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/answer_parts.hpp"
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/error_budget.hpp"
 #include "palpate/estimation/mesh_error.hpp"
@@ -19,88 +20,6 @@ namespace palpate::estimation {
 namespace {
 
 constexpr double z_95 = 1.959963984540054;
-
-Parameter young_from(const Posterior& posterior, const std::string& region) {
-  Parameter young{"young_modulus", region, "Pa"};
-  young.value = std::exp(posterior.log_young_quantile(0.5));
-  young.std = young.value * posterior.log_young_std_total();
-  young.lower_95 = std::exp(posterior.log_young_quantile(0.025));
-  young.upper_95 = std::exp(posterior.log_young_quantile(0.975));
-  young.determined = posterior.log_young_std_total() < 0.5;
-  return young;
-}
-
-Parameter ratio_from(const Posterior& posterior, const Unknown& nu) {
-  Parameter ratio{"poisson_ratio", "", "1"};
-  ratio.value = posterior.poisson_quantile(0.5);
-  ratio.std = posterior.poisson_std();
-  ratio.lower_95 = posterior.poisson_quantile(0.025);
-  ratio.upper_95 = posterior.poisson_quantile(0.975);
-  // A uniform prior has the standard deviation range / sqrt(12); data that leave 60 % of it say little.
-  ratio.determined = nu.fixed || ratio.std < 0.6 * (nu.upper - nu.lower) / std::sqrt(12.0);
-  return ratio;
-}
-
-/// (log E of the first region, nu, log E of the others), in the order of the parameters.
-MatrixX covariance_of(const std::vector<Posterior>& regions) {
-  const Index count = static_cast<Index>(regions.size());
-  MatrixX out = MatrixX::Zero(1 + count, 1 + count);
-  const auto place = [](Index region) { return region == 0 ? 0 : region + 1; };
-  const Posterior& first = regions.front();
-  const auto about_mean = [&](const VectorX& values) { return VectorX(values.array() - first.weight.dot(values)); };
-  out(1, 1) = first.covariance(1, 1);
-  for (Index a = 0; a < count; ++a) {
-    const Posterior& one = regions[static_cast<std::size_t>(a)];
-    out(place(a), 1) = out(1, place(a)) = one.covariance(0, 1);
-    for (Index b = 0; b < count; ++b) {
-      const Posterior& other = regions[static_cast<std::size_t>(b)];
-      const VectorX given_poisson = first.correlation(a, b) * one.log_young_std.cwiseProduct(other.log_young_std);
-      out(place(a), place(b)) =
-          first.weight.dot(about_mean(one.log_young_mean).cwiseProduct(about_mean(other.log_young_mean)) + given_poisson);
-    }
-  }
-  return out;
-}
-
-std::vector<Nuisance> nuisances_from(const Unknowns& list, const Optimum& optimum, const MatrixX& covariance,
-                                     const std::vector<int>& moving) {
-  std::vector<Nuisance> out;
-  for (std::size_t k = 0; k < moving.size(); ++k) {
-    if (moving[k] < list.parameter_count() || list[moving[k]].name.rfind("rest_surface[", 0) == 0) continue;
-    const Unknown& unknown = list[moving[k]];
-    Nuisance nuisance;
-    nuisance.name = unknown.name;
-    nuisance.unit = unknown.unit;
-    nuisance.value = optimum.unknowns(moving[k]);
-    nuisance.std = std::sqrt(std::max(covariance(static_cast<Index>(k), static_cast<Index>(k)), 0.0));
-    nuisance.lower_95 = nuisance.value - z_95 * nuisance.std;
-    nuisance.upper_95 = nuisance.value + z_95 * nuisance.std;
-    nuisance.prior_std = unknown.prior_std;
-    nuisance.pull = (nuisance.value - unknown.prior_mean) / unknown.prior_std;
-    out.push_back(nuisance);
-  }
-  return out;
-}
-
-/// The rest surface's slow error as one number: its rms over the surface.
-Nuisance rest_surface_from(const StepPrediction& predicted, const Optimum& optimum, const MatrixX& covariance,
-                           const std::vector<int>& moving) {
-  const SurfaceField& field = *predicted.field;
-  const Index first = static_cast<Index>(std::find(moving.begin(), moving.end(), predicted.field_unknown) - moving.begin());
-  const MatrixX& basis = field.basis();
-  const double vertices = static_cast<double>(basis.rows());
-  Nuisance nuisance;
-  nuisance.name = "rest_surface";
-  nuisance.unit = "m";
-  nuisance.value = (basis * optimum.unknowns.segment(predicted.field_unknown, field.modes())).norm() / std::sqrt(vertices);
-  const MatrixX block = covariance.block(first, first, field.modes(), field.modes());
-  nuisance.std = std::sqrt(std::max(0.0, (basis * block).cwiseProduct(basis).sum() / vertices));
-  nuisance.lower_95 = std::max(0.0, nuisance.value - z_95 * nuisance.std);
-  nuisance.upper_95 = nuisance.value + z_95 * nuisance.std;
-  nuisance.prior_std = field.std_m();
-  nuisance.pull = nuisance.value / nuisance.prior_std;
-  return nuisance;
-}
 
 /// E of each push (or site) alone, nu held at the joint optimum.
 std::vector<Parameter> young_of_parts(const std::vector<PartialYoung>& parts) {
@@ -223,6 +142,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   if (residuals.variance_inflation > 1.05) {
     loss.surface_weight = 1 / residuals.variance_inflation;
     optimum = optimise(objective, optimum.unknowns, loss, optimiser, progress);
+    optimum.loss = loss;
     if (optimum.termination == Termination::cancelled) {
       answer.termination = optimum.termination;
       answer.message = optimum.message;
@@ -237,26 +157,11 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   const std::vector<int> moving = free_unknowns(unknowns);
   const MatrixX hessian = optimum.evaluation.information(factor)(moving, moving);
   const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
-  answer.nuisances = nuisances_from(unknowns, optimum, covariance, moving);
-  for (const auto& predicted : objective.last_predictions()) {
-    if (predicted.field == nullptr) continue;
-    answer.nuisances.push_back(rest_surface_from(predicted, optimum, covariance, moving));
-    break;
-  }
-
-  double pulls = 0;
-  std::size_t flat = 0;
-  for (int k : moving) {
-    if (!std::isfinite(unknowns[k].prior_std)) {
-      ++flat;
-    } else {
-      pulls += std::pow((optimum.unknowns(k) - unknowns[k].prior_mean) / unknowns[k].prior_std, 2);
-    }
-  }
-  answer.fit.points_used = residuals.rows + residuals.missed - residuals.outliers;
-  answer.fit.rms_m = residuals.lengths > 0 ? std::sqrt(residuals.sum_squared_m2 / static_cast<double>(residuals.lengths)) : 0;
-  answer.fit.chi2_per_dof =
-      (residuals.chi2 + pulls) / std::max(1.0, static_cast<double>(residuals.rows) - static_cast<double>(flat));
+  answer.nuisances = nuisances_from(objective, optimum, covariance, moving);
+  const FitSummary summary = summary_of(unknowns, optimum, residuals);
+  answer.fit.points_used = summary.points_used;
+  answer.fit.rms_m = summary.rms_m;
+  answer.fit.chi2_per_dof = summary.chi2_per_dof;
   answer.steps = step_fits(objective);
   add_bands(answer.steps, objective, covariance, moving);
   answer.budget = error_budget(unknowns, hessian, moving);

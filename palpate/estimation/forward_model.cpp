@@ -26,11 +26,11 @@ bool ForwardModel::Solved::holds_for(const Solved& other) const {
          options.dilatation == other.options.dilatation && options.threads == other.options.threads &&
          options.residual_tolerance == other.options.residual_tolerance && options.region == other.options.region &&
          same(options.region_stiffness, other.options.region_stiffness) && poisson_lower == other.poisson_lower &&
-         poisson_upper == other.poisson_upper && bodies.size() == other.bodies.size();
+         poisson_upper == other.poisson_upper && response_tolerance == other.response_tolerance && bodies.size() == other.bodies.size();
 }
 
 ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options,
-                           std::shared_ptr<Solved> earlier)
+                           std::shared_ptr<Solved> earlier, double response_tolerance)
     : recording_(&recording), object_(std::move(object)), options_(options) {
   // From a hundredth of a pascal to diamond: beyond that the fit has lost its way.
   unknowns.add({"young_modulus", "log Pa", 0, std::numeric_limits<double>::infinity(), std::log(1e-2), std::log(1.2e12)});
@@ -150,8 +150,9 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   solved_->options = options_;
   solved_->poisson_lower = poisson_lower_;
   solved_->poisson_upper = poisson_upper_;
+  solved_->response_tolerance = response_tolerance;
   solved_->bodies.resize(linear_ ? 1 : workers_);
-  if (earlier && solved_->holds_for(*earlier)) {
+  if (earlier && !contact_ && solved_->holds_for(*earlier)) {
     solved_->bodies = std::move(earlier->bodies);
     for (auto& bodies : solved_->bodies) {
       for (const auto& push : recording.pushes) drop_if_unfit(bodies, push);

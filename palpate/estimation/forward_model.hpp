@@ -64,9 +64,10 @@ class ForwardModel {
   /// `recording` must outlive this object.
   /// @param earlier  of a model of the same object, held in the same way, that has done its work: it is used again where law,
   ///                 options and contacts are the same, else made anew
+  /// @param response_tolerance  of a linear body's answers between the Poisson ratios that it is solved at, relative
   /// @throws Error when a load names no tool, or supports leave a motion free that a load works on.
   ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options = {},
-               std::shared_ptr<Solved> earlier = nullptr);
+               std::shared_ptr<Solved> earlier = nullptr, double response_tolerance = 1e-7);
   ~ForwardModel();
   const std::shared_ptr<Solved>& solved() const { return solved_; }
 

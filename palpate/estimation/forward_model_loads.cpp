@@ -164,7 +164,7 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
     fem::LinearResponse::Options options;
     options.poisson_lower = poisson_lower_;
     options.poisson_upper = poisson_upper_;
-    options.tolerance = 100 * options_.residual_tolerance;
+    options.tolerance = solved_->response_tolerance;
     body->response = std::make_unique<fem::LinearResponse>(*body->statics, watched, options);
   }
   return *body;

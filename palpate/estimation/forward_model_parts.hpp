@@ -74,7 +74,7 @@ struct ForwardModel::Solved {
   double place_m = 0;  // sum of the nodes' coordinates
   std::size_t supports = 0;
   fem::StaticsOptions options;
-  double poisson_lower = 0, poisson_upper = 0;
+  double poisson_lower = 0, poisson_upper = 0, response_tolerance = 0;
   bool holds_for(const Solved& other) const;
 
   std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies;  ///< a worker (all together: linear), by driven tools

@@ -54,10 +54,120 @@ Objective::Objective(ForwardModel& model, const std::vector<std::vector<TermInpu
   if (terms == 0) throw Error("no step has an observation that says anything about the object", "pushes");
 }
 
+namespace {
+
+/// Adds what some rows say. @param place  where their unknowns are in `out`
+void add_rows(const TermRows& rows, const Loss& loss, const std::vector<int>& place, Evaluation& out) {
+  double relevance = rows.cell.empty() ? 1 : loss.surface_weight;
+  if (rows.robust) relevance /= loss.widening * loss.widening;
+  VectorX weight = VectorX::Constant(rows.residual.size(), relevance);
+  for (Index i = 0; i < rows.residual.size(); ++i) {
+    if (rows.robust) {
+      out.robust_cost += relevance * tukey_rho(rows.residual(i), loss.tukey);
+      weight(i) *= tukey_weight(rows.residual(i), loss.tukey);
+    } else {
+      out.cost += relevance * 0.5 * rows.residual(i) * rows.residual(i);
+    }
+  }
+  VectorX finite = rows.residual;
+  for (Index i = 0; i < finite.size(); ++i) {
+    if (weight(i) == 0) finite(i) = 0;
+  }
+  const MatrixX weighted = weight.asDiagonal() * rows.jacobian;
+  const MatrixX block = rows.jacobian.transpose() * weighted;
+  const VectorX slope = weighted.transpose() * finite;
+  for (std::size_t a = 0; a < place.size(); ++a) {
+    out.gradient(place[a]) += slope(static_cast<Index>(a));
+    for (std::size_t b = 0; b < place.size(); ++b) {
+      const double entry = block(static_cast<Index>(a), static_cast<Index>(b));
+      out.hessian(place[a], place[b]) += entry;
+      if (rows.robust) out.robust_hessian(place[a], place[b]) += entry;
+    }
+  }
+}
+
+Evaluation nothing(Index count) {
+  Evaluation out;
+  out.hessian = MatrixX::Zero(count, count);
+  out.robust_hessian = MatrixX::Zero(count, count);
+  out.gradient = VectorX::Zero(count);
+  return out;
+}
+
+}  // namespace
+
+bool Objective::may_reuse(const KeptStep& kept, const VectorX& unknowns, const Loss& loss) const {
+  if (kept.unknowns.empty() || kept.loss.tukey != loss.tukey || kept.loss.widening != loss.widening ||
+      kept.loss.along_rays != loss.along_rays || kept.loss.surface_weight != loss.surface_weight) {
+    return false;
+  }
+  const VectorX change = unknowns(kept.unknowns) - kept.at;
+  return change.dot(kept.normal.hessian * change) <= reuse_ * reuse_;
+}
+
+void Objective::keep(std::size_t s, const VectorX& unknowns, const Loss& loss) {
+  KeptStep& kept = kept_[s];
+  kept = {};
+  for (const TermRows& rows : rows_[s]) kept.unknowns.insert(kept.unknowns.end(), rows.unknowns.begin(), rows.unknowns.end());
+  std::sort(kept.unknowns.begin(), kept.unknowns.end());
+  kept.unknowns.erase(std::unique(kept.unknowns.begin(), kept.unknowns.end()), kept.unknowns.end());
+  kept.at = unknowns(kept.unknowns);
+  kept.normal = nothing(static_cast<Index>(kept.unknowns.size()));
+  kept.loss = loss;
+  kept.rows = rows_[s];
+  for (const TermRows& rows : rows_[s]) {
+    std::vector<int> place;
+    for (int unknown : rows.unknowns) {
+      place.push_back(static_cast<int>(std::lower_bound(kept.unknowns.begin(), kept.unknowns.end(), unknown) - kept.unknowns.begin()));
+    }
+    add_rows(rows, loss, place, kept.normal);
+  }
+  kept.normal.cost += kept.normal.robust_cost;
+}
+
+void Objective::adopt(const std::vector<KeptStep>& kept, const std::vector<int>& moved) {
+  kept_.assign(model_.step_count(), {});
+  const auto renumber = [&](std::vector<int>& unknowns) {
+    for (int& unknown : unknowns) unknown = moved[static_cast<std::size_t>(unknown)];
+    return std::none_of(unknowns.begin(), unknowns.end(), [](int unknown) { return unknown < 0; });
+  };
+  for (std::size_t s = 0; s < std::min(kept.size(), kept_.size()); ++s) {
+    KeptStep step = kept[s];
+    bool whole = renumber(step.unknowns);
+    for (TermRows& rows : step.rows) whole = renumber(rows.unknowns) && whole;
+    if (whole) kept_[s] = std::move(step);
+  }
+}
+
+Evaluation Objective::sum_kept(const VectorX& unknowns, const Loss& loss) const {
+  Evaluation out = nothing(unknowns_.size());
+  for (std::size_t s = 0; s < kept_.size(); ++s) {
+    const KeptStep& kept = kept_[s];
+    if (kept.unknowns.empty() || !loss.counts(s)) continue;
+    const VectorX change = unknowns(kept.unknowns) - kept.at;
+    const VectorX bent = kept.normal.hessian * change;
+    const double gain = kept.normal.gradient.dot(change) + 0.5 * change.dot(bent);
+    out.cost += kept.normal.cost + gain;
+    out.robust_cost += kept.normal.robust_cost + (kept.normal.robust_cost > 0 ? gain : 0);
+    for (std::size_t a = 0; a < kept.unknowns.size(); ++a) {
+      const Index row = static_cast<Index>(a);
+      out.gradient(kept.unknowns[a]) += kept.normal.gradient(row) + bent(row);
+      for (std::size_t b = 0; b < kept.unknowns.size(); ++b) {
+        const Index column = static_cast<Index>(b);
+        out.hessian(kept.unknowns[a], kept.unknowns[b]) += kept.normal.hessian(row, column);
+        out.robust_hessian(kept.unknowns[a], kept.unknowns[b]) += kept.normal.robust_hessian(row, column);
+      }
+    }
+  }
+  add_priors(unknowns, out);
+  return out;
+}
+
 Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const OnProgress& progress) {
   Evaluation out;
   rows_.assign(model_.step_count(), {});
   predictions_.assign(model_.step_count(), {});
+  if (reuse_ > 0) kept_.resize(model_.step_count());
   // Every worker solves and linearises its own steps; what follows adds them up in order, so that digits do not depend on
   // who finished first.
   std::atomic<std::size_t> done{0};
@@ -67,10 +177,16 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
     try {
       for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
         if (terms_[s].empty() || !loss.counts(s)) continue;
+        if (reuse_ > 0 && may_reuse(kept_[s], unknowns, loss)) {
+          rows_[s] = kept_[s].rows;
+          continue;
+        }
+        ++steps_evaluated_;
         predictions_[s] = model_.predict(s, unknowns);
         if (!predictions_[s].converged) stop = true;
         if (stop) return;
         for (const auto& term : terms_[s]) rows_[s].push_back(term->rows(predictions_[s], unknowns, loss.along_rays));
+        if (reuse_ > 0) keep(s, unknowns, loss);
         ++done;
         // Only the calling thread speaks to the caller.
         if (worker == 0 && progress && !progress("fit", static_cast<double>(done) / static_cast<double>(model_.step_count()))) {
@@ -98,49 +214,23 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
     }
   }
 
-  return assemble(rows_, unknowns, loss);
+  return reuse_ > 0 ? sum_kept(unknowns, loss) : assemble(rows_, unknowns, loss);
 }
 
 Evaluation Objective::assemble(const std::vector<std::vector<TermRows>>& all_rows, const VectorX& unknowns, const Loss& loss) const {
-  const Index count = unknowns_.size();
-  Evaluation out;
-  out.hessian = MatrixX::Zero(count, count);
-  out.robust_hessian = MatrixX::Zero(count, count);
-  out.gradient = VectorX::Zero(count);
+  Evaluation out = nothing(unknowns_.size());
   for (std::size_t s = 0; s < all_rows.size(); ++s) {
     if (!loss.counts(s)) continue;
-    for (const TermRows& rows : all_rows[s]) {
-      double relevance = rows.cell.empty() ? 1 : loss.surface_weight;
-      if (rows.robust) relevance /= loss.widening * loss.widening;
-      VectorX weight = VectorX::Constant(rows.residual.size(), relevance);
-      for (Index i = 0; i < rows.residual.size(); ++i) {
-        if (rows.robust) {
-          out.robust_cost += relevance * tukey_rho(rows.residual(i), loss.tukey);
-          weight(i) *= tukey_weight(rows.residual(i), loss.tukey);
-        } else {
-          out.cost += relevance * 0.5 * rows.residual(i) * rows.residual(i);
-        }
-      }
-      VectorX finite = rows.residual;
-      for (Index i = 0; i < finite.size(); ++i) {
-        if (weight(i) == 0) finite(i) = 0;
-      }
-      const MatrixX weighted = weight.asDiagonal() * rows.jacobian;
-      const MatrixX block = rows.jacobian.transpose() * weighted;
-      const VectorX slope = weighted.transpose() * finite;
-      for (std::size_t a = 0; a < rows.unknowns.size(); ++a) {
-        out.gradient(rows.unknowns[a]) += slope(static_cast<Index>(a));
-        for (std::size_t b = 0; b < rows.unknowns.size(); ++b) {
-          const double entry = block(static_cast<Index>(a), static_cast<Index>(b));
-          out.hessian(rows.unknowns[a], rows.unknowns[b]) += entry;
-          if (rows.robust) out.robust_hessian(rows.unknowns[a], rows.unknowns[b]) += entry;
-        }
-      }
-    }
+    for (const TermRows& rows : all_rows[s]) add_rows(rows, loss, rows.unknowns, out);
   }
   out.cost += out.robust_cost;
-  for (Index k = 0; k < count; ++k) {
-    const Unknown& unknown = unknowns_[static_cast<int>(k)];
+  add_priors(unknowns, out);
+  return out;
+}
+
+void Objective::add_priors(const VectorX& unknowns, Evaluation& out) const {
+  for (int k = 0; k < unknowns_.size(); ++k) {
+    const Unknown& unknown = unknowns_[k];
     if (!std::isfinite(unknown.prior_std) || unknown.fixed) continue;
     const double precision = 1 / (unknown.prior_std * unknown.prior_std);
     const double off = unknowns(k) - unknown.prior_mean;
@@ -149,7 +239,6 @@ Evaluation Objective::assemble(const std::vector<std::vector<TermRows>>& all_row
     out.hessian(k, k) += precision;
   }
   out.usable = std::isfinite(out.cost);
-  return out;
 }
 
 std::vector<TermRows> Objective::rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns,
@@ -204,7 +293,7 @@ ResidualSummary Objective::summarise(const Loss& loss) const {
         ++summary.rows;
         const bool inside = std::abs(r) < loss.tukey;
         if (rows.robust && !inside) ++summary.outliers;
-        summary.chi2 += rows.robust ? std::min(r * r, loss.tukey * loss.tukey) : r * r;
+        if (inside || !rows.robust) summary.chi2 += r * r;  // what was called an outlier does not test the model
         if (rows.unit == "m" && (inside || !rows.robust)) {
           summary.sum_squared_m2 += std::pow(r * rows.sigma(i), 2);
           ++summary.lengths;

@@ -3,6 +3,7 @@
 // equations. One evaluation solves every step once.
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <vector>
@@ -46,7 +47,7 @@ struct ResidualSummary {
   std::size_t outliers = 0;      ///< of them, beyond the cut
   std::size_t missed = 0;        ///< of the outliers, rays that pass the object by
   std::size_t rows = 0;          ///< all rows
-  double chi2 = 0;               ///< all rows, each at most the cut squared
+  double chi2 = 0;               ///< all rows but outliers
   double sum_squared_m2 = 0;     ///< of length residuals inside the cut
   std::size_t lengths = 0;
   double variance_inflation = 1; ///< of cell means: above 1 where neighbours err together
@@ -67,6 +68,22 @@ class Objective {
   /// Rows of step s for a prediction that was made elsewhere.
   std::vector<TermRows> rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns, bool along_rays) const;
 
+  /// Normal equations of one step, and the unknowns that they were made at.
+  struct KeptStep {
+    std::vector<int> unknowns;  ///< empty: nothing is kept
+    VectorX at;
+    Evaluation normal;  ///< of those unknowns, without priors
+    Loss loss;
+    std::vector<TermRows> rows;
+  };
+  /// A step is not evaluated anew while the unknowns have moved by at most this many standard deviations of what it says of them
+  /// by itself since its normal equations were made: those are moved along. 0 (the default): every step is evaluated.
+  void set_reuse(double standard_deviations) { reuse_ = standard_deviations; }
+  const std::vector<KeptStep>& kept() const { return kept_; }  ///< a step; filled while reuse is set
+  /// Takes over what another objective kept of the first steps. @param moved  where its unknowns are in this one, -1: gone
+  void adopt(const std::vector<KeptStep>& kept, const std::vector<int>& moved);
+  int steps_evaluated() const { return steps_evaluated_; }
+
   ResidualSummary summarise(const Loss& loss) const;            ///< of the last evaluation
   const std::vector<std::vector<TermRows>>& last_rows() const { return rows_; }  ///< a step: its terms
   const std::vector<StepPrediction>& last_predictions() const { return predictions_; }
@@ -84,12 +101,20 @@ class Objective {
   double residual_scale() const;
 
  private:
+  bool may_reuse(const KeptStep& kept, const VectorX& unknowns, const Loss& loss) const;
+  void keep(std::size_t s, const VectorX& unknowns, const Loss& loss);
+  Evaluation sum_kept(const VectorX& unknowns, const Loss& loss) const;
+  void add_priors(const VectorX& unknowns, Evaluation& out) const;
+
   ForwardModel& model_;
   Unknowns& unknowns_;
   std::map<std::string, int> shared_;
   std::vector<std::vector<std::unique_ptr<Term>>> terms_;
   std::vector<std::vector<TermRows>> rows_;
   std::vector<StepPrediction> predictions_;
+  double reuse_ = 0;
+  std::vector<KeptStep> kept_;
+  std::atomic<int> steps_evaluated_{0};
 };
 
 /// Tukey's biweight: rho (half a square near zero) and weight.
