@@ -6,8 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/step_checks.hpp"
+
 namespace palpate::estimation {
 namespace {
+
+constexpr double least_slip_m = 5e-4;      // less is within what a contact point means
+constexpr double least_settling = 0.01;    // of E
+constexpr double pattern_deviate = 4.3;    // one recording in a hundred thousand
+constexpr double pattern_inflation = 1.3;  // of the variance of cell means
+constexpr double largest_pressure = 0.4;   // over E: beyond it a Neo-Hookean solid under an even dead pressure caves in
 
 std::string number(double value, const char* format = "{:.3g}") { return fmt::format(fmt::runtime(format), value); }
 
@@ -42,7 +50,7 @@ void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
                      "These pushes hardly determine the Poisson ratio: its interval [" + number(parameter.lower_95) + ", " +
                          number(parameter.upper_95) +
                          "] is mostly the prior's. Push where the object can bulge sideways in view, or deeper, or from a "
-                         "second side."});
+                         "second side; `palpate suggest` ranks pushes by how much they would narrow it."});
     }
   }
   if (determined && (in.optimum.poisson_at_lower || in.optimum.poisson_at_upper)) {
@@ -161,6 +169,47 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
   }
 }
 
+/// What one step says against the others is said where chance makes it once in a thousand recordings.
+constexpr double very_rare = 0.001;
+
+void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
+  const ForwardModel& model = in.objective.model();
+  const double factor = in.residuals.points > 0 ? tukey_information_factor(in.optimum.loss.tukey) : 1;
+  const auto where = [&](std::size_t s) { return "step " + std::to_string(model.index(s).step) + " of push '" + model.push(s).name + "'"; };
+  const auto millimetres = [](double metres) { return number(1e3 * metres, "{:.2g}") + " mm"; };
+  const auto moved = object_motion(in.objective, in.optimum);
+  if (moved && moved->p_value < very_rare) {
+    out.push_back({"object_moved", "From " + where(moved->step) + " on the frames stand " + millimetres(moved->size) +
+                                       " from where they stood before, more than their pose's prior allows: the object or the "
+                                       "camera was moved. Fix them better, or leave out the steps from there on."});
+  }
+  const auto slip = contact_slip(in.objective, in.optimum, factor);
+  if (slip && slip->p_value < very_rare && slip->size > least_slip_m) {
+    out.push_back({"contact_slipped", "The tool seems to have slipped by " + millimetres(slip->size) + " at " + where(slip->step) +
+                                          ": the steps from there on ask for another contact point than those before. Leave "
+                                          "them out, or push along the surface's normal."});
+  }
+  const auto settled = settling(in.objective, in.optimum, factor);
+  if (settled && settled->p_value < very_rare && settled->size > least_settling) {
+    out.push_back({"not_settled", "While the load stayed the same up to " + where(settled->step) + ", the object went on giving way: E fell by " +
+                                      number(100 * settled->size, "{:.2g}") + " %. Wait longer at each step, until it stands still."});
+  }
+  const Pattern pattern = residual_pattern(in.objective, in.optimum.loss);
+  if (pattern.deviate > pattern_deviate && pattern.inflation > pattern_inflation) {
+    out.push_back({"residual_pattern",
+                   "Residuals of neighbouring points agree: means over small cells scatter " + number(std::sqrt(pattern.inflation), "{:.2g}") +
+                       " times more than independent errors would. The intervals are widened for it, but look at the residual map: "
+                       "where it follows the object's shape, the rest shape, a support or the material is not as modelled."});
+  }
+  const PatchPressure pressure = highest_pressure(in.objective, in.optimum);
+  if (pressure.over_young > largest_pressure) {
+    out.push_back({"pressure_beyond_model", "At " + where(pressure.step) + " the mean pressure under the tool is " +
+                                                number(pressure.over_young, "{:.2g}") +
+                                                " times E: a patch of even pressure is then no picture of how the tool touches. Believe "
+                                                "lower loads, or use a larger tool."});
+  }
+}
+
 }  // namespace
 
 std::vector<Verdict> judge(const VerdictInput& input) {
@@ -172,6 +221,7 @@ std::vector<Verdict> judge(const VerdictInput& input) {
   judge_nuisances(input, verdicts);
   judge_state(input, verdicts);
   judge_parts(input, verdicts);
+  judge_steps(input, verdicts);
   return verdicts;
 }
 

@@ -11,6 +11,9 @@
 namespace palpate::estimation {
 namespace {
 
+// What the fit makes of a recording hangs on means over wide parts of the picture: a cell must hold most of the neighbours that a
+// point's error is correlated with (a few times the sensor's correlation length, 5 to 20 pixels), or their effect is missed.
+constexpr Index cell_px = 48;
 constexpr double grazing_cosine = 0.17;  // beyond 80 degrees a depth says little and its noise model is void
 
 class RayTerm : public Term {
@@ -108,8 +111,10 @@ class RayTerm : public Term {
     const auto corner = [&](int k) { return Vec3(tree_.mesh().vertices_m.row(tree_.mesh().triangles(triangle, k))); };
     return (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
   }
-  /// Square image cells of 16 pixels, numbered along rows of up to 4096 cells.
-  int cell(Index i) const { return rays_.pixel.rows() == 0 ? static_cast<int>(i) : (rays_.pixel(i, 1) / 16) * 4096 + rays_.pixel(i, 0) / 16; }
+  /// Square image cells, numbered along rows of up to 4096 cells.
+  int cell(Index i) const {
+    return rays_.pixel.rows() == 0 ? static_cast<int>(i) : (rays_.pixel(i, 1) / cell_px) * 4096 + rays_.pixel(i, 0) / cell_px;
+  }
 
   RayCloud rays_;
   int pose_, bias_;

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/step_checks.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "palpate/estimation/cross_check.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+std::string in_push(const ForwardModel& model, std::size_t s) { return "[" + model.push(s).name + "]"; }
+std::string in_step(const ForwardModel& model, std::size_t s) {
+  return "[" + model.push(s).name + ":" + std::to_string(model.index(s).step) + "]";
+}
+
+bool has_rows(const Objective& objective, std::size_t s) { return s < objective.last_rows().size() && !objective.last_rows()[s].empty(); }
+
+/// What one step asks of a few unknowns, its frames' poses free under their priors and all else where the fit put it: the change
+/// and its covariance.
+struct Asked {
+  VectorX change;
+  MatrixX covariance;
+};
+std::optional<Asked> asked_by(const Objective& objective, const Optimum& optimum, std::size_t s, const std::vector<int>& about, double factor) {
+  const Unknowns& unknowns = objective.unknowns();
+  Loss one = optimum.loss;
+  one.every = 1;
+  one.steps.assign(objective.model().step_count(), 0);
+  one.steps[s] = 1;
+  const Evaluation evaluation = objective.assemble(objective.last_rows(), optimum.unknowns, one);
+  MatrixX hessian = evaluation.information(factor);
+  VectorX gradient = evaluation.gradient;
+  for (int k : about) {  // the data alone
+    if (!std::isfinite(unknowns[k].prior_std)) continue;
+    const double precision = 1 / (unknowns[k].prior_std * unknowns[k].prior_std);
+    hessian(k, k) -= precision;
+    gradient(k) -= precision * (optimum.unknowns(k) - unknowns[k].prior_mean);
+  }
+  std::vector<int> frames;
+  const std::string suffix = in_step(objective.model(), s);
+  for (int k : free_unknowns(unknowns)) {
+    const std::string& name = unknowns[k].name;
+    const bool own = name.size() > suffix.size() && name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0;
+    if (own && name.rfind("frame", 0) == 0) frames.push_back(k);
+  }
+  MatrixX left = hessian(about, about);
+  VectorX slope = gradient(about);
+  if (!frames.empty()) {
+    const MatrixX across = hessian(about, frames);
+    const Eigen::LDLT<MatrixX> own(hessian(frames, frames));
+    left -= across * own.solve(across.transpose());
+    slope -= across * own.solve(VectorX(gradient(frames)));
+  }
+  const Eigen::LLT<MatrixX> factorised(left);
+  if (factorised.info() != Eigen::Success) return std::nullopt;
+  return Asked{-factorised.solve(slope), factorised.solve(MatrixX::Identity(left.rows(), left.cols()))};
+}
+
+/// Steps of a push, and for each a vector with its covariance: where do they change most?
+struct Told {
+  std::size_t step;
+  VectorX value;
+  MatrixX covariance;
+};
+std::optional<StepChange> largest_change(const std::vector<Told>& told) {
+  if (told.size() < 2) return std::nullopt;
+  const Index size = static_cast<Index>(told.front().value.size());
+  const auto mean = [&](std::size_t from, std::size_t to) {
+    MatrixX information = MatrixX::Zero(size, size);
+    VectorX sum = VectorX::Zero(size);
+    for (std::size_t i = from; i < to; ++i) {
+      const MatrixX one = told[i].covariance.inverse();
+      information += one;
+      sum += one * told[i].value;
+    }
+    const MatrixX covariance = information.inverse();
+    return std::pair<VectorX, MatrixX>(covariance * sum, covariance);
+  };
+  StepChange best;
+  for (std::size_t k = 1; k < told.size(); ++k) {
+    const auto before = mean(0, k), after = mean(k, told.size());
+    const VectorX change = after.first - before.first;
+    const double chi2 = change.dot((before.second + after.second).ldlt().solve(change));
+    const double p = std::min(1.0, chi_square_tail(chi2, static_cast<int>(size)) * static_cast<double>(told.size() - 1));
+    if (p < best.p_value) best = {told[k].step, change.norm(), p};
+  }
+  return best;
+}
+
+/// The more significant of the pushes' changes.
+void keep_rarest(std::optional<StepChange>& rarest, const std::optional<StepChange>& other) {
+  if (other && (!rarest || other->p_value < rarest->p_value)) rarest = other;
+}
+
+std::optional<int> unknown_named(const Unknowns& unknowns, const std::string& name) {
+  for (int k = 0; k < unknowns.size(); ++k) {
+    if (unknowns[k].name == name) return k;
+  }
+  return std::nullopt;
+}
+
+bool concerns(const std::vector<TermRows>& rows, int unknown) {
+  return std::any_of(rows.begin(), rows.end(), [&](const TermRows& term) {
+    return std::find(term.unknowns.begin(), term.unknowns.end(), unknown) != term.unknowns.end();
+  });
+}
+
+}  // namespace
+
+std::optional<StepChange> contact_slip(const Objective& objective, const Optimum& optimum, double factor) {
+  const ForwardModel& model = objective.model();
+  std::map<std::size_t, std::vector<Told>> pushes;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    const auto first = unknown_named(objective.unknowns(), "contact_shift" + in_push(model, s) + "_1");
+    if (!first || !has_rows(objective, s) || !concerns(objective.last_rows()[s], *first)) continue;
+    const auto asked = asked_by(objective, optimum, s, {*first, *first + 1}, factor);
+    if (asked) pushes[model.index(s).push].push_back({s, asked->change, asked->covariance});
+  }
+  std::optional<StepChange> rarest;
+  for (const auto& [push, told] : pushes) keep_rarest(rarest, largest_change(told));
+  return rarest;
+}
+
+std::optional<StepChange> object_motion(const Objective& objective, const Optimum& optimum) {
+  const ForwardModel& model = objective.model();
+  std::map<std::size_t, std::vector<Told>> pushes;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    const auto first = unknown_named(objective.unknowns(), "frame_x" + in_step(model, s));
+    if (!has_rows(objective, s) || !first || objective.unknowns()[*first].fixed) continue;
+    // An estimate under its prior scatters by less than the prior itself: the test errs on the quiet side.
+    const double std_m = objective.unknowns()[*first].prior_std;
+    pushes[model.index(s).push].push_back({s, optimum.unknowns.segment<3>(*first), std_m * std_m * MatrixX::Identity(3, 3)});
+  }
+  std::optional<StepChange> rarest;
+  for (const auto& [push, told] : pushes) keep_rarest(rarest, largest_change(told));
+  return rarest;
+}
+
+std::optional<StepChange> settling(const Objective& objective, const Optimum& optimum, double factor) {
+  constexpr double same_load = 0.01;
+  const ForwardModel& model = objective.model();
+  const auto force_n = [&](std::size_t s) {
+    Vec3 sum = Vec3::Zero();
+    for (const Load& load : model.step(s).loads) sum += load.force_n.value_or(Vec3::Zero());
+    return sum;
+  };
+  std::optional<StepChange> rarest;
+  for (std::size_t from = 0; from < model.step_count(); ++from) {
+    const Vec3 held_n = force_n(from);
+    if (held_n.norm() == 0 || !has_rows(objective, from)) continue;
+    std::size_t last = from;
+    while (last + 1 < model.step_count() && model.index(last + 1).push == model.index(from).push && has_rows(objective, last + 1) &&
+           (force_n(last + 1) - held_n).norm() < same_load * held_n.norm()) {
+      ++last;
+    }
+    if (last == from) continue;
+    const auto one = asked_by(objective, optimum, from, {log_young}, factor), other = asked_by(objective, optimum, last, {log_young}, factor);
+    if (one && other) {
+      const double fell = one->change(0) - other->change(0);
+      const double deviate = fell / std::sqrt(one->covariance(0, 0) + other->covariance(0, 0));
+      keep_rarest(rarest, StepChange{last, 1 - std::exp(-fell), 0.5 * std::erfc(deviate / std::sqrt(2.0))});
+    }
+    from = last;
+  }
+  return rarest;
+}
+
+Pattern residual_pattern(const Objective& objective, const Loss& loss) {
+  double between = 0, total = 0, cells = 0, count = 0;
+  for (const auto& step : objective.last_rows()) {
+    for (const TermRows& rows : step) {
+      if (rows.cell.empty()) continue;
+      std::map<int, std::pair<double, double>> sums;
+      for (Index i = 0; i < rows.residual.size(); ++i) {
+        const double r = rows.residual(i);
+        if (!(std::abs(r) < loss.tukey)) continue;
+        auto& [sum, n] = sums[rows.cell[static_cast<std::size_t>(i)]];
+        sum += r;
+        ++n;
+        total += r * r;
+        ++count;
+      }
+      for (const auto& [cell, sum] : sums) between += sum.first * sum.first / sum.second;
+      cells += static_cast<double>(sums.size());
+    }
+  }
+  Pattern out;
+  if (cells < 10 || count < 2 * cells) return out;  // a cell of one point has no neighbours
+  const double within = std::max(1.0, total / count);  // where residuals are smaller than sigma they say nothing about the sensor
+  const double ratio = between / cells / within;
+  out.inflation = std::max(1.0, ratio);
+  out.deviate = (std::cbrt(ratio) - (1 - 2 / (9 * cells))) / std::sqrt(2 / (9 * cells));
+  return out;
+}
+
+PatchPressure highest_pressure(const Objective& objective, const Optimum& optimum) {
+  const ForwardModel& model = objective.model();
+  PatchPressure highest;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    for (const Load& load : model.step(s).loads) {
+      const Tool& tool = model.tool(load.tool);
+      const bool round = tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc;
+      if (!round || !load.force_n || !(tool.radius_m > 0)) continue;
+      const double pressure_pa = std::abs(load.force_n->dot(load.direction.normalized())) / (EIGEN_PI * tool.radius_m * tool.radius_m);
+      const double over_young = pressure_pa / std::exp(optimum.unknowns(log_young));
+      if (over_young > highest.over_young) highest = {over_young, s};
+    }
+  }
+  return highest;
+}
+
+}  // namespace palpate::estimation
