@@ -255,13 +255,6 @@ std::optional<double> mesh_error(const Identification& answer) {
   return std::nullopt;
 }
 
-/// Whether the interval of E would be narrower on a perfect mesh: by a twentieth at least.
-bool widens(double mesh_error, const Identification& answer) {
-  const Parameter& young = answer.parameters.front();
-  const double all = young.std / young.value, others = std::sqrt(std::max(0.0, all * all - mesh_error * mesh_error));
-  return mesh_error > others / 3;
-}
-
 std::string mesh_words(const estimation::SimulatedObject& object) {
   return std::to_string(object.mesh.tetrahedra.rows()) + " " + (object.mesh.tetrahedra.cols() == 10 ? "tet10" : "tet4") + ", " +
          std::to_string(object.mesh.nodes_m.rows()) + " nodes";
@@ -272,32 +265,39 @@ std::string mesh_words(const estimation::SimulatedObject& object) {
 Identification fit_on_fine_mesh(Recording& recording, estimation::SimulatedObject& object, const estimation::Inputs& observed,
                                 const IdentifyOptions& options, const OnProgress& progress) {
   constexpr int most_refinements = 3;
+  constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
+  const auto percent = [](double share) {
+    std::ostringstream text;
+    text << std::setprecision(2) << 100 * share << " %";
+    return text.str();
+  };
   estimation::FitOptions fit_options = options.fit;
   std::string history;
   for (int refinements = 0;; ++refinements) {
-    std::optional<estimation::FinerModel> finer;
+    std::optional<estimation::FinerModel> finer, better;
     if (recording.model.refine == "auto") finer = estimation::finer_model(recording, object);
+    bool too_coarse = false;
+    fit_options.take_finer = [&](double error, double young_std) {
+      too_coarse = error > std::max(options.mesh_tolerance, hardly * young_std);
+      if (!too_coarse || refinements == most_refinements) return false;
+      better = estimation::refined_within(recording, object, options.mesh_tolerance);
+      if (better) history += mesh_words(object) + ": " + percent(error) + " of E; ";
+      return better.has_value();
+    };
     Identification answer = estimation::fit(recording, object, observed, fit_options, progress, finer ? &*finer : nullptr);
-    const std::optional<double> error = mesh_error(answer);
-    std::ostringstream percent;
-    if (error) percent << std::setprecision(2) << 100 * *error << " %";
-    const bool too_coarse =
-        error && *error > options.mesh_tolerance && answer.termination == Termination::converged && widens(*error, answer);
-    if (too_coarse && refinements < most_refinements) {
-      if (auto better = estimation::refined_within(recording, object, options.mesh_tolerance)) {
-        history += mesh_words(object) + ": " + percent.str() + " of E; ";
-        recording = std::move(better->recording);
-        object = std::move(better->object);
-        fit_options.young_start_pa = answer.parameters[0].value;
-        fit_options.poisson_start = answer.parameters[1].value;
-        continue;
-      }
+    if (better) {
+      recording = std::move(better->recording);
+      object = std::move(better->object);
+      fit_options.young_start_pa = answer.parameters[0].value;
+      fit_options.poisson_start = answer.parameters[1].value;
+      continue;
     }
+    const std::optional<double> error = mesh_error(answer);
     answer.provenance["mesh"] = mesh_words(object);
-    answer.provenance["mesh's error in E"] = error ? percent.str() : "not estimated";
+    answer.provenance["mesh's error in E"] = error ? percent(*error) : "not estimated";
     if (!history.empty()) answer.provenance["coarser meshes"] = history.substr(0, history.size() - 2);
-    if (too_coarse) {
-      answer.verdicts.push_back({"mesh_too_coarse", "The mesh is estimated to put E off by " + percent.str() +
+    if (too_coarse && error) {
+      answer.verdicts.push_back({"mesh_too_coarse", "The mesh is estimated to put E off by " + percent(*error) +
                                                         ", and no finer one can be had: the interval holds that error; give a finer "
                                                         "volume mesh to be rid of it."});
     }

@@ -171,6 +171,10 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     mesh = mesh_shift(recording, objective, optimum, loss, *finer, options, progress,
                       memory != nullptr ? &memory->finer : nullptr);
   }
+  if (mesh && options.take_finer && options.take_finer(std::abs(mesh->log_young), std::sqrt(covariance(0, 0)))) {
+    answer.parameters = parameters_so_far(optimum.unknowns);
+    return answer;
+  }
   const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;

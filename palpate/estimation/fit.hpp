@@ -29,6 +29,9 @@ struct FitOptions {
   bool stresses = true;                   ///< von Mises stress of every step, for figures
   int threads = 1;
   OnEstimate on_estimate;                 ///< for those who watch; empty: nobody does
+  /// Asked once it is known what the mesh does to E and what all else leaves unknown of it, both as shares of E. True ends the
+  /// fit at its optimum, without intervals: the caller fits again on a finer mesh.
+  std::function<bool(double mesh_error, double young_std)> take_finer;
 };
 
 struct FinerModel;
