@@ -15,6 +15,7 @@
 #include "palpate/io/recording.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/report/mesh_picture.hpp"
+#include "palpate/sensing/free_space.hpp"
 #include "palpate/sensing/observe.hpp"
 
 namespace palpate::cli {
@@ -49,6 +50,7 @@ reconstruction::BuiltObject build_from_recording(const Options& o, const reconst
   }
   reconstruction::FuseOptions fuse;
   if (!recording.environment.planes.empty()) fuse.support = recording.environment.planes.front();
+  fuse.free = sensing::FreeSpace(rest.views);
   return reconstruction::build_object(clouds, fuse, recording.supports, options, session.progress());
 }
 

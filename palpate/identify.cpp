@@ -12,14 +12,17 @@
 #include "palpate/core/version.hpp"
 #include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/paper_method.hpp"
+#include "palpate/estimation/shape_error.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/regions.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/sensing/back_projection.hpp"
+#include "palpate/sensing/free_space.hpp"
 #include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/observe.hpp"
 #include "palpate/sensing/plane_mask.hpp"
@@ -30,6 +33,7 @@ namespace {
 
 constexpr Index default_tetrahedra = 3000;
 constexpr Index masked_a_step = 1500;  // points under the masks that are kept for figures
+constexpr double most_unseen = 0.1;    // of a surface: beyond that, what the rest may look like is part of the interval
 constexpr double rays_a_frame = 6000;  // beyond that, noise is not what limits E: neighbouring pixels err together
 
 /// Every n-th row and column of an image, so that some thousand rays are left.
@@ -172,16 +176,61 @@ std::optional<Plane> hiding_plane(const Recording& recording) {
   return std::nullopt;
 }
 
+/// Where round tools met the object.
+std::vector<reconstruction::Touch> touched_places(const Recording& recording) {
+  std::vector<reconstruction::Touch> touched;
+  for (const auto& push : recording.pushes) {
+    for (const auto& step : push.steps) {
+      for (const auto& load : step.loads) {
+        const auto tool = std::find_if(recording.tools.begin(), recording.tools.end(),
+                                       [&](const Tool& each) { return each.name == load.tool; });
+        if (tool == recording.tools.end() || !(tool->radius_m > 0)) continue;
+        const bool known = std::any_of(touched.begin(), touched.end(),
+                                       [&](const auto& each) { return (each.point_m - load.contact_m).norm() < 1e-6; });
+        if (!known) touched.push_back({load.contact_m, load.direction.normalized(), tool->radius_m});
+      }
+    }
+  }
+  return touched;
+}
+
+/// The object at rest: its views, and the first image of each push while nothing loaded it, the robot masked.
+std::vector<DepthFrame> images_at_rest(const Recording& recording) {
+  std::vector<DepthFrame> frames = recording.rest.views;
+  std::optional<sensing::RobotMask> robot;
+  if (recording.robot && has_shapes(*recording.robot)) robot.emplace(*recording.robot);
+  for (const auto& push : recording.pushes) {
+    if (push.steps.empty()) continue;
+    const Step& step = push.steps.front();
+    const bool loaded = std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) {
+      return !load.force_n || load.force_n->norm() > 0 || load.travel_m.value_or(0) != 0;
+    });
+    if (loaded || step.unloading) continue;
+    for (const auto& observation : step.observations) {
+      const auto* frame = std::get_if<DepthFrame>(&observation);
+      if (frame == nullptr) continue;
+      frames.push_back(robot && !step.joints_rad.empty()
+                           ? sensing::with_mask(*frame, robot->mask(*frame, recording.joint_names, step.joints_rad))
+                           : *frame);
+    }
+  }
+  return frames;
+}
+
 reconstruction::BuiltObject build_from_views(const Recording& recording, const reconstruction::BuildOptions& options,
-                                             const OnProgress& progress) {
+                                             reconstruction::Completion completion, const OnProgress& progress) {
   std::vector<PointCloud> clouds;
-  for (const DepthFrame& view : recording.rest.views) {
+  const std::vector<DepthFrame> images = images_at_rest(recording);
+  for (const DepthFrame& view : images) {
     Points normals;
     const RayCloud rays = sensing::observe(view, recording.environment, {}, &normals);
     clouds.push_back(sensing::to_point_cloud(rays, normals));
   }
   reconstruction::FuseOptions fuse;
   fuse.support = hiding_plane(recording);
+  fuse.free = sensing::FreeSpace(images);
+  fuse.completion = completion;
+  fuse.touched = touched_places(recording);
   return reconstruction::build_object(clouds, fuse, recording.supports, options, progress);
 }
 
@@ -198,7 +247,8 @@ double seen_std_m(const reconstruction::BuiltObject& built) {
 }
 
 /// Volume mesh of a recording that gives a surface or views of one.
-void fill_with_tetrahedra(Recording& recording, const OnProgress& progress) {
+void fill_with_tetrahedra(Recording& recording, reconstruction::Completion completion, std::vector<char>* seen,
+                          const OnProgress& progress) {
   if (!recording.rest.surface && recording.rest.views.empty()) {
     throw Error("give the object's shape as rest.volume_mesh, rest.surface_mesh or rest.views", "rest");
   }
@@ -213,13 +263,75 @@ void fill_with_tetrahedra(Recording& recording, const OnProgress& progress) {
   }
   auto built = recording.rest.surface
                    ? reconstruction::build_object(*recording.rest.surface, recording.supports, options, progress)
-                   : build_from_views(recording, options, progress);
+                   : build_from_views(recording, options, completion, progress);
   if (recording.rest.surface_std_m == 0) recording.rest.surface_std_m = seen_std_m(built);
+  if (seen != nullptr) *seen = built.seen;
   for (const auto& warning : built.model.warnings) recording.warnings.push_back(warning);
   recording.supports = std::move(built.model.supports);
   recording.rest.surface = std::move(built.model.surface);
   recording.rest.volume = std::move(built.model.volume);
   recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
+}
+
+/// Share of a surface's area that was not seen, without what stands on the plane.
+double unseen_share(const TriMesh& surface, const std::vector<char>& seen, const std::optional<Plane>& plane) {
+  const double height = (surface.vertices_m.colwise().maxCoeff() - surface.vertices_m.colwise().minCoeff()).norm();
+  double unseen = 0, all = 0;
+  for (Index t = 0; t < surface.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(surface.vertices_m.row(surface.triangles(t, k))); };
+    bool was_seen = false, on_plane = plane.has_value();
+    for (int k = 0; k < 3; ++k) {
+      was_seen = was_seen || seen[static_cast<std::size_t>(surface.triangles(t, k))] != 0;
+      on_plane = on_plane && std::abs(plane->normal.dot(corner(k) - plane->point_m)) < 0.01 * height;
+    }
+    if (on_plane) continue;
+    const double area = (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+    all += area;
+    if (!was_seen) unseen += area;
+  }
+  return all > 0 ? unseen / all : 0;
+}
+
+/// Takes out what shows parts of the object that no view of it at rest showed: a guess is nothing to compare with.
+void drop_unseen(const TriMesh& surface, const std::vector<char>& seen, estimation::Inputs& inputs) {
+  const geometry::TriangleTree tree(surface);
+  const auto shown = [&](const Vec3& point_m) {
+    const auto row = surface.triangles.row(tree.closest(point_m).triangle);
+    return seen[static_cast<std::size_t>(row(0))] != 0 || seen[static_cast<std::size_t>(row(1))] != 0 ||
+           seen[static_cast<std::size_t>(row(2))] != 0;
+  };
+  for (auto& step : inputs) {
+    for (auto& input : step) {
+      if (auto* frame = std::get_if<estimation::RayObservation>(&input)) {
+        const RayCloud& all = frame->rays;
+        std::vector<Index> kept;
+        for (Index i = 0; i < all.range_m.size(); ++i)
+          if (shown(Vec3(all.origins_m.row(i)) + all.range_m(i) * Vec3(all.directions.row(i)))) kept.push_back(i);
+        RayCloud rays{all.origins_m(kept, Eigen::all), all.directions(kept, Eigen::all), all.range_m(kept), all.sigma_m(kept), {}};
+        if (all.pixel.rows() == all.range_m.size()) rays.pixel = all.pixel(kept, Eigen::all);
+        frame->rays = std::move(rays);
+      }
+    }
+    std::erase_if(step, [](const auto& input) {
+      const auto* frame = std::get_if<estimation::RayObservation>(&input);
+      return frame != nullptr && frame->rays.range_m.size() == 0;
+    });
+  }
+}
+
+/// What else may stand where nobody looked: all that was hidden, and less than what is fitted.
+estimation::ShapeDoubt shape_doubt(const Recording& given, double unseen) {
+  estimation::ShapeDoubt doubt;
+  doubt.unseen_share = unseen;
+  for (const auto completion : {reconstruction::Completion::tapered, reconstruction::Completion::planar, reconstruction::Completion::hidden}) {
+    Recording recording = given;
+    try {
+      auto object = build_simulated_object(recording, {}, completion);
+      doubt.shapes.push_back({std::move(recording), std::move(object)});
+    } catch (const Error&) {  // such a shape falls apart or encloses nothing: it is none that may stand there
+    }
+  }
+  return doubt;
 }
 
 std::map<std::string, std::string> provenance(const Recording& recording, const IdentifyOptions& options) {
@@ -263,7 +375,7 @@ std::string mesh_words(const estimation::SimulatedObject& object) {
 /// Fits, and once more on a finer mesh as long as the mesh's share of E is too large. Leaves recording and object as they
 /// were fitted last.
 Identification fit_on_fine_mesh(Recording& recording, estimation::SimulatedObject& object, const estimation::Inputs& observed,
-                                const IdentifyOptions& options, const OnProgress& progress) {
+                                estimation::ShapeDoubt* doubt, const IdentifyOptions& options, const OnProgress& progress) {
   constexpr int most_refinements = 3;
   constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
   const auto percent = [](double share) {
@@ -284,7 +396,8 @@ Identification fit_on_fine_mesh(Recording& recording, estimation::SimulatedObjec
       if (better) history += mesh_words(object) + ": " + percent(error) + " of E; ";
       return better.has_value();
     };
-    Identification answer = estimation::fit(recording, object, observed, fit_options, progress, finer ? &*finer : nullptr);
+    Identification answer = estimation::fit(recording, object, observed, fit_options, progress, finer ? &*finer : nullptr,
+                                            nullptr, doubt);
     if (better) {
       recording = std::move(better->recording);
       object = std::move(better->object);
@@ -373,8 +486,9 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
   return inputs;
 }
 
-estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress) {
-  if (!recording.rest.volume) fill_with_tetrahedra(recording, progress);
+estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress,
+                                                   reconstruction::Completion completion, std::vector<char>* seen) {
+  if (!recording.rest.volume) fill_with_tetrahedra(recording, completion, seen, progress);
   const TetMesh& given = *recording.rest.volume;
   estimation::SimulatedObject object;
   object.material = recording.model.material;
@@ -408,12 +522,23 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   Recording recording = with_overrides(given, options);
   if (options.method == "paper") recording.regions.clear();  // the paper fits one stiffness
   std::vector<Points> masked_m;
-  const estimation::Inputs observed = observe(recording, &masked_m);               // sec. IV-B: point clouds, robot masked
-  estimation::SimulatedObject object = build_simulated_object(recording, progress);  // sec. IV-C: tetrahedral model
+  estimation::Inputs observed = observe(recording, &masked_m);  // sec. IV-B: point clouds, robot masked
+  const Recording as_given = recording;
+  std::vector<char> seen;
+  estimation::SimulatedObject object =
+      build_simulated_object(recording, progress, reconstruction::Completion::mirrored, &seen);  // sec. IV-C: tetrahedral model
+  std::optional<estimation::ShapeDoubt> doubt;
+  if (!seen.empty()) {
+    const double unseen = unseen_share(*recording.rest.surface, seen, hiding_plane(recording));
+    if (unseen > most_unseen) {
+      drop_unseen(*recording.rest.surface, seen, observed);
+      if (options.method != "paper") doubt = shape_doubt(as_given, unseen);
+    }
+  }
   Identified out;
   out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
                    ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
-                   : fit_on_fine_mesh(recording, object, observed, options, progress);
+                   : fit_on_fine_mesh(recording, object, observed, doubt ? &*doubt : nullptr, options, progress);
   for (std::size_t s = 0; s < out.answer.steps.size() && s < masked_m.size(); ++s) {
     out.answer.steps[s].masked_m = std::move(masked_m[s]);
   }

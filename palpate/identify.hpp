@@ -10,6 +10,7 @@
 #include "palpate/core/progress.hpp"
 #include "palpate/core/recording.hpp"
 #include "palpate/estimation/fit.hpp"
+#include "palpate/reconstruction/fuse_views.hpp"
 
 namespace palpate {
 
@@ -46,6 +47,10 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
 
 /// Stage 2: the object as the solver sees it: volume mesh, element, simulated surface. Says the chosen element in the
 /// recording's model, and what was built (surface, volume, supports with the tolerance that their nodes need) in the recording.
-estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress = {});
+/// @param completion  of a side that no view of rest.views shows
+/// @param seen        if given: a vertex of rest.surface as built, 1 where a view showed it; empty where the shape was given
+estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress = {},
+                                                   reconstruction::Completion completion = reconstruction::Completion::mirrored,
+                                                   std::vector<char>* seen = nullptr);
 
 }  // namespace palpate

@@ -13,6 +13,7 @@
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
+#include "palpate/estimation/shape_error.hpp"
 #include "palpate/estimation/step_fits.hpp"
 #include "palpate/estimation/verdicts.hpp"
 
@@ -80,7 +81,7 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 }
 
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
-                   const OnProgress& on_progress, const FinerModel* finer, FitMemory* memory) {
+                   const OnProgress& on_progress, const FinerModel* finer, FitMemory* memory, ShapeDoubt* doubt) {
   check(options);
   const OnProgress progress = paced(on_progress);
   Unknowns unknowns;
@@ -175,6 +176,8 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     answer.parameters = parameters_so_far(optimum.unknowns);
     return answer;
   }
+  if (doubt != nullptr && !doubt->effect && optimum.termination == Termination::converged)
+    doubt->effect = shape_effect(*doubt, recording, inputs, objective, optimum, loss, options, optimiser, progress);
   const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;
@@ -183,13 +186,15 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   }
   std::vector<Posterior> regions{posterior};
   for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));
-  if (mesh) {
+  const auto widen_by = [&](const char* name, const AnswerShift& shift) {
     for (std::size_t r = 0; r < regions.size(); ++r)
-      widen(regions[r], mesh->of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
-    answer.budget.push_back({"mesh", 100 * std::abs(mesh->log_young), std::abs(mesh->poisson)});
+      widen(regions[r], shift.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
+    answer.budget.push_back({name, 100 * std::abs(shift.log_young), std::abs(shift.poisson)});
     std::stable_sort(answer.budget.begin(), answer.budget.end(),
                      [](const auto& a, const auto& b) { return a.young_modulus_percent > b.young_modulus_percent; });
-  }
+  };
+  if (mesh) widen_by("mesh", *mesh);
+  if (doubt != nullptr && doubt->effect) widen_by("unseen side", doubt->effect->shift);
   const auto region_name = [&](std::size_t r) { return object.region_names.empty() ? std::string() : object.region_names[r]; };
   answer.parameters = {young_from(regions.front(), region_name(0)), ratio_from(regions.front(), unknowns[poisson])};
   for (std::size_t r = 1; r < regions.size(); ++r) answer.parameters.push_back(young_from(regions[r], region_name(r)));
@@ -215,6 +220,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   }
   answer.fit.solves = model.solves();
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks});
+  if (doubt != nullptr) answer.verdicts.push_back(partly_seen(*doubt));
   answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   return answer;

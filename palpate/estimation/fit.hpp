@@ -35,6 +35,7 @@ struct FitOptions {
 };
 
 struct FinerModel;
+struct ShapeDoubt;
 
 /// What a fit leaves for the next one of the same object, held and touched in the same way: what was solved for and does not
 /// depend on what was measured.
@@ -56,10 +57,12 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 /// @param finer      the same object on a finer mesh, nullptr where the mesh is to be taken as it is: what the mesh does to the
 ///                   answer then widens the intervals (mesh_error.hpp)
 /// @param memory     used and filled; nullptr: nothing is kept
+/// @param doubt      other shapes that the object may have where nobody saw it, nullptr where there is no such part: what they
+///                   do to the answer then widens the intervals too (shape_error.hpp)
 /// @throws Error when no answer can exist (no observation, supports that hold nothing, ...). Numbers that did not work out
 ///         are said in `termination`, `message` and `verdicts`.
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
                    const OnProgress& progress = {}, const FinerModel* finer = nullptr,
-                   FitMemory* memory = nullptr);
+                   FitMemory* memory = nullptr, ShapeDoubt* doubt = nullptr);
 
 }  // namespace palpate::estimation

@@ -212,6 +212,15 @@ void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
 
 }  // namespace
 
+Verdict partly_seen(const ShapeDoubt& doubt) {
+  const std::optional<ShapeEffect>& effect = doubt.effect;
+  std::string said = number(100 * doubt.unseen_share, "{:.0f}") + " % of the object's surface was not seen, and is a guess. ";
+  said += effect ? "Between the shapes that may stand there E goes from " + number(effect->softest_pa) + " to " +
+                       number(effect->stiffest_pa) + " Pa; the interval counts that as its part `unseen side` of the budget. "
+                 : "What that does to E could not be found out: the interval does not hold it. ";
+  return {"partly_seen", said + "A view from another side makes it smaller."};
+}
+
 std::vector<Verdict> judge(const VerdictInput& input) {
   std::vector<Verdict> verdicts;
   judge_end(input, verdicts);

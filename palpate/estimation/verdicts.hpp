@@ -7,6 +7,7 @@
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/objective.hpp"
 #include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/shape_error.hpp"
 
 namespace palpate::estimation {
 
@@ -21,5 +22,8 @@ struct VerdictInput {
 
 /// What the numbers mean, in plain words; codes are stable and listed in docs/uncertainty.md.
 std::vector<Verdict> judge(const VerdictInput& input);
+
+/// Of an object that was not seen from all sides.
+Verdict partly_seen(const ShapeDoubt& doubt);
 
 }  // namespace palpate::estimation

@@ -286,8 +286,15 @@ DepthFrame LabRobot::take_depth_image() {
 }
 
 std::vector<DepthFrame> LabRobot::look_around(int views) const {
-  const Impl& lab = *impl_;
   if (views < 1) throw Error("must be at least 1", "views");
+  std::vector<ViewDirection> directions;
+  for (int k = 0; k < views - 1; ++k) directions.push_back({2 * M_PI * k / std::max(1, views - 1) + M_PI / 4, M_PI / 6});
+  directions.push_back({0, std::atan2(1, 0.05)});
+  return look_from(directions);
+}
+
+std::vector<DepthFrame> LabRobot::look_from(const std::vector<ViewDirection>& directions) const {
+  const Impl& lab = *impl_;
   const Vec3 low = lab.object.surface.vertices_m.colwise().minCoeff().transpose(),
              high = lab.object.surface.vertices_m.colwise().maxCoeff().transpose();
   const Vec3 middle = 0.5 * (low + high);
@@ -298,10 +305,9 @@ std::vector<DepthFrame> LabRobot::look_around(int views) const {
   scene.planes.push_back(lab.table);
   Random random(lab.options.seed, 4);
   std::vector<DepthFrame> frames;
-  for (int k = 0; k < views; ++k) {
-    const double around = 2 * M_PI * k / std::max(1, views - 1) + M_PI / 4, down = M_PI / 6;
-    Vec3 eye = middle + away_m * Vec3(std::cos(down) * std::cos(around), std::cos(down) * std::sin(around), std::sin(down));
-    if (k == views - 1) eye = middle + away_m * Vec3(0.05, 0, 1).normalized();
+  for (const auto& [around, down] : directions) {
+    if (!(down > 0 && down < M_PI / 2)) throw Error("must lie between 0 and a right angle", "elevation_rad");
+    const Vec3 eye = middle + away_m * Vec3(std::cos(down) * std::cos(around), std::cos(down) * std::sin(around), std::sin(down));
     DepthFrame frame;
     frame.camera = lab.camera;
     frame.T_base_camera = look_at(eye, middle);

@@ -58,6 +58,11 @@ class LabRobot : public acquisition::Robot {
   /// of a right angle, the last from above. Every pose errs anew by camera_std_m and camera_std_rad. The arm is out of the way.
   /// @throws Error for less than one view
   std::vector<DepthFrame> look_around(int views) const;
+  /// One such image a direction, from where the object is seen under that azimuth (from x towards y) and elevation.
+  struct ViewDirection {
+    double azimuth_rad = 0, elevation_rad = 0;
+  };
+  std::vector<DepthFrame> look_from(const std::vector<ViewDirection>& directions) const;
 
   /// A recording without pushes: object, support, table, tool, robot and priors, as a person would write them down.
   Recording scene() const;

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
@@ -64,6 +67,51 @@ void drop_support(std::vector<PointCloud>& clouds, const Plane& plane) {
 void turn(PointCloud& c, const Pose& T) {
   c.points_m = ((c.points_m * T.linear().transpose()).rowwise() + T.translation().transpose()).eval();
   c.normals = (c.normals * T.linear().transpose()).eval();
+}
+
+/// Leaves out parts that hang together neither with the largest one nor with a support's plane: nothing holds them.
+/// @returns their share of the volume
+double drop_floating(const std::vector<Support>& supports, TetMesh& volume) {
+  std::vector<Index> up(static_cast<std::size_t>(volume.nodes_m.rows()));
+  std::iota(up.begin(), up.end(), 0);
+  const auto root = [&](Index i) {
+    while (up[i] != i) i = up[i] = up[up[i]];
+    return i;
+  };
+  for (Index t = 0; t < volume.tetrahedra.rows(); ++t)
+    for (int k = 1; k < 4; ++k) up[root(volume.tetrahedra(t, k))] = root(volume.tetrahedra(t, 0));
+  std::map<Index, double> size;
+  double all = 0;
+  for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
+    const auto node = [&](int k) { return Vec3(volume.nodes_m.row(volume.tetrahedra(t, k))); };
+    const double v = (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6;
+    size[root(volume.tetrahedra(t, 0))] += v;
+    all += v;
+  }
+  if (size.size() < 2) return 0;
+  std::set<Index> kept{std::max_element(size.begin(), size.end(), [](const auto& a, const auto& b) { return a.second < b.second; })->first};
+  for (const Support& s : supports)
+    for (Index i = 0; is_plane(s.kind) && i < volume.nodes_m.rows(); ++i)
+      if (std::abs(s.plane.normal.dot(Vec3(volume.nodes_m.row(i)) - s.plane.point_m)) < 1e-9) kept.insert(root(i));
+  std::vector<Index> place(up.size(), -1);
+  Index nodes = 0, tets = 0;
+  double left = 0;
+  for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
+    if (!kept.contains(root(volume.tetrahedra(t, 0)))) continue;
+    for (int k = 0; k < 4; ++k) place[volume.tetrahedra(t, k)] = 0;
+    volume.tetrahedra.row(tets++) = volume.tetrahedra.row(t).eval();
+  }
+  for (const Index r : kept) left += size.contains(r) ? size[r] : 0;
+  for (Index i = 0; i < volume.nodes_m.rows(); ++i) {
+    if (place[i] < 0) continue;
+    volume.nodes_m.row(nodes) = volume.nodes_m.row(i).eval();
+    place[i] = nodes++;
+  }
+  volume.nodes_m.conservativeResize(nodes, 3);
+  volume.tetrahedra.conservativeResize(tets, 4);
+  for (Index t = 0; t < tets; ++t)
+    for (int k = 0; k < 4; ++k) volume.tetrahedra(t, k) = place[volume.tetrahedra(t, k)];
+  return 1 - left / all;
 }
 
 void hand_on_uncertainty(BuiltObject& out, const FusedViews& fused) {
@@ -148,6 +196,11 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   }
   const FusedViews fused = fuse_views(clouds, fuse);
   BuiltObject out = fill(fused.facets, true, supports, options, progress);
+  const double floating = drop_floating(supports, out.model.volume);
+  if (floating > 0)
+    warnings.push_back(std::to_string(static_cast<int>(100 * floating + 0.5)) +
+                                 " % of the volume floats beside the rest and was left out");
+  if (floating > 0) out.check = geometry::check_volume(out.model.volume);
   out.model.surface = geometry::boundary_surface(out.model.volume).surface;
   out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
   hand_on_uncertainty(out, fused);

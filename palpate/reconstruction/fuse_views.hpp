@@ -2,6 +2,7 @@
 // Many noisy, partial views of an object become one set of small oriented facets, whose winding number has an inside.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -9,10 +10,28 @@
 
 namespace palpate::reconstruction {
 
+/// What is taken to be there where nobody looked.
+enum class Completion {
+  planar,    ///< nothing but what the support hides: the back is flat, as in the paper
+  mirrored,  ///< what the mirror image of the front says, where that was seen
+  tapered,   ///< of the planar one, what narrows downwards as the object narrows upwards
+  hidden,    ///< all that no sensor saw to be free, up to as far behind the seen part as that is wide
+};
+
+/// A tool met the object here, coming from outside.
+struct Touch {
+  Vec3 point_m = Vec3::Zero(), inward = -Vec3::UnitZ();
+  double radius_m = 0;
+};
+
 struct FuseOptions {
   double cell_m = 0;             ///< width over which points are averaged; 0 = from noise, size and density
   int fewest_points = 3;         ///< cells with fewer points are taken for noise (>= 1)
   std::optional<Plane> support;  ///< table or wall that hides a side: the object is completed down to it
+  /// Says of a place in the clouds' frame that a sensor looked through it; empty: nothing is known, and the back stays planar.
+  std::function<bool(const Vec3&)> free;
+  std::vector<Touch> touched;  ///< used where free space is known
+  Completion completion = Completion::mirrored;
 };
 
 /// @throws Error naming the field and its bounds.
@@ -24,14 +43,14 @@ struct FusedViews {
   VectorX sigma_m;             ///< of the seen facets along their normals, from the scatter of the points and their number
   double cell_m = 0;           ///< width that was used
   double seen_area_m2 = 0;     ///< area of the facets that sensors saw
-  double support_area_m2 = 0;  ///< area of the facets that complete the object down to the support
+  double support_area_m2 = 0;  ///< area of the facets that complete the object
 };
 
 /// @param clouds  in one frame, each with unit normals that face its sensor
 /// A cell's facet lies where a quadratic surface, fitted to the points around it along their mean normal (moving least
 /// squares, Levin 1998), passes its middle: noise is averaged and curvature is not flattened. With `support`, the object's
-/// shadow along the plane's normal is closed on the plane (the planar back side of Frank et al. 2010): unseen flanks come
-/// out too wide, never too narrow.
+/// shadow along the plane's normal is closed on the plane (the planar back side of Frank et al. 2010). Where free space is
+/// known, the unseen side is completed further (see completion.hpp).
 /// @throws Error when there are too few points, or a cloud has no normals.
 FusedViews fuse_views(const std::vector<PointCloud>& clouds, const FuseOptions& options = {});
 

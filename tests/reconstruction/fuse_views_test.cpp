@@ -139,6 +139,20 @@ TEST(FuseViews, one_view_from_above_is_completed_down_to_the_table) {
   }
 }
 
+TEST(FuseViews, what_floats_beside_the_object_is_left_out_and_said) {
+  const geometry::TriangleTree tree(shapes::join(shapes::sphere(0.05, 4), shapes::sphere(0.02, 4, Vec3(0.1, 0, 0.01))));
+  std::mt19937 rng(3);
+  std::vector<PointCloud> clouds;
+  for (int k = 0; k < 8; ++k)
+    clouds.push_back(view(tree, Vec3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 0.8 : -0.8), 0.0005, rng));
+  BuildOptions o;
+  o.mesh.tetrahedra = 3000;
+  const auto built = build_object(clouds, {}, {}, o);
+  EXPECT_EQ(built.check.components, 1);
+  EXPECT_NEAR(built.check.volume_m3, 4.0 / 3 * M_PI * std::pow(0.05, 3), 2e-5);
+  EXPECT_THAT(built.model.warnings, testing::Contains(testing::HasSubstr("floats")));
+}
+
 TEST(FuseViews, says_what_is_missing) {
   PointCloud c;
   c.points_m = Points::Random(100, 3);

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a part of the object that nobody saw does to the answer: where the fit ends when other shapes stand there.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/mesh_error.hpp"
+#include "palpate/estimation/optimise.hpp"
+
+namespace palpate::estimation {
+
+/// The same object with another unseen side; the seen one is the same within the sensors' noise.
+struct AlternativeShape {
+  Recording recording;  ///< as the fit uses it: volume, surface, supports
+  SimulatedObject object;
+};
+
+struct ShapeEffect {
+  AnswerShift shift;                        ///< one standard deviation
+  double softest_pa = 0, stiffest_pa = 0;  ///< E over all shapes
+};
+
+struct ShapeDoubt {
+  std::vector<AlternativeShape> shapes;  ///< about as far from the one that is fitted as the truth may be: two deviations
+  double unseen_share = 0;               ///< of the object's surface, its foot left out
+  std::optional<ShapeEffect> effect;     ///< filled by the first fit; later ones, on finer meshes, take it as it is
+};
+
+/// Fits all shapes to the same few of the points, from the optimum on. Half of what moves log E most is one standard deviation of an error along that
+/// direction; nu moves with it. Alternatives whose fit does not end are left out.
+/// @returns nothing where none ended, or the caller asked to stop.
+std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording& recording, const Inputs& inputs,
+                                        const Objective& objective, const Optimum& optimum, const Loss& loss, const FitOptions& options,
+                                        const OptimiseOptions& optimiser, const OnProgress& progress);
+
+}  // namespace palpate::estimation

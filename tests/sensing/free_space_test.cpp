@@ -1,0 +1,67 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sensing/free_space.hpp"
+
+#include <gtest/gtest.h>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::sensing {
+namespace {
+
+// A camera at the origin that looks along z; a wall at 1 m, in the middle a box at 0.5 m, a hole without depth, a masked patch.
+DepthFrame scene() {
+  DepthFrame frame;
+  frame.camera.width_px = 64;
+  frame.camera.height_px = 48;
+  frame.camera.fx_px = frame.camera.fy_px = 60;
+  frame.camera.cx_px = 32;
+  frame.camera.cy_px = 24;
+  frame.noise = {"constant", 0.001, 0};
+  frame.depth_m = DepthImage::Constant(48, 64, 1.0F);
+  frame.depth_m.block(18, 26, 12, 12).setConstant(0.5F);
+  frame.depth_m.block(4, 4, 6, 6).setZero();
+  frame.mask = MaskImage::Zero(48, 64);
+  frame.mask.block(36, 50, 6, 6).setConstant(1);
+  return frame;
+}
+
+Vec3 at(double column, double row, double z) { return {(column - 32) / 60 * z, (row - 24) / 60 * z, z}; }
+
+TEST(FreeSpace, IsWhatTheCameraLookedThrough) {
+  const FreeSpace free({scene()}, {4, 0.003});
+  EXPECT_TRUE(free(at(10, 30, 0.9)));
+  EXPECT_FALSE(free(at(10, 30, 0.995)));  // within 3 mm and four deviations of the wall
+  EXPECT_FALSE(free(at(10, 30, 1.2)));    // behind it
+  EXPECT_TRUE(free(at(32, 24, 0.48)));
+  EXPECT_FALSE(free(at(32, 24, 0.6)));  // behind the box
+  EXPECT_TRUE(free(at(45, 24, 0.6)));   // beside it
+  EXPECT_FALSE(free(at(38, 24, 0.6)));  // right beside it: a neighbouring pixel shows the box
+  EXPECT_FALSE(free(at(6, 6, 0.3)));    // no depth there
+  EXPECT_FALSE(free(at(52, 38, 0.3)));  // masked
+  EXPECT_FALSE(free(at(80, 24, 0.3)));  // out of the picture
+  EXPECT_FALSE(free({0, 0, -0.3}));     // behind the camera
+}
+
+TEST(FreeSpace, AnotherViewFindsOutAndAnUncertainPoseKnowsLess) {
+  DepthFrame side = scene();
+  side.T_base_camera.translate(Vec3(-1, 0, 0.6)).rotate(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY()));
+  side.depth_m.setConstant(2.0F);
+  const Vec3 behind_the_box = at(32, 24, 0.6);
+  EXPECT_TRUE(FreeSpace({scene(), side})(behind_the_box));
+  DepthFrame unsure = scene();
+  unsure.pose_std_m = 0.03;
+  EXPECT_FALSE(FreeSpace({unsure})(at(10, 30, 0.9)));
+  EXPECT_TRUE(FreeSpace({unsure})(at(10, 30, 0.8)));
+}
+
+TEST(FreeSpace, SaysWhatIsWrong) {
+  EXPECT_THROW(FreeSpace({scene()}, {-1, 0}), Error);
+  EXPECT_THROW(FreeSpace({scene()}, {4, -1}), Error);
+  DepthFrame other = scene();
+  other.depth_m = DepthImage::Constant(10, 10, 1.0F);
+  EXPECT_THROW(FreeSpace({other}), Error);
+}
+
+}  // namespace
+}  // namespace palpate::sensing
