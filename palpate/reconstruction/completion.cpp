@@ -84,6 +84,7 @@ class Completer {
 
   /// Cubes of the solid that is asked for; empty where the planar completion will do.
   std::vector<char> solid() const {
+    if (toward_.isZero() && options_.completion == Completion::mirrored) return {};  // seen from all around, or from above
     const geometry::WindingNumber winding(planar_);
     const geometry::TriangleTree to_seen(seen_);
     std::vector<char> hidden(cubes_.count()), planar(cubes_.count()), anchored(cubes_.count());

@@ -18,8 +18,7 @@ namespace {
 /// the surface above it.
 std::vector<Facet> down_to(const Plane& plane, const std::vector<Facet>& facets, double cell) {
   const auto [u, v] = tangents(plane.normal);
-  const double step = cell;
-  constexpr double disc = 0.75;  // radius of a facet, in cells: no gaps between neighbours
+  const double step = 2 * cell;
   using Square = std::pair<std::int64_t, std::int64_t>;
   struct Lowest {
     double height;
@@ -31,19 +30,13 @@ std::vector<Facet> down_to(const Plane& plane, const std::vector<Facet>& facets,
     const Vec3 d = f.middle - plane.point_m;
     const double z = plane.normal.dot(d);
     if (z < -cell) continue;
-    // a facet stands for a disc, and covers the squares whose middle it does
-    const double x = u.dot(d) / step, y = v.dot(d) / step;
+    const Square at{std::int64_t(std::floor(u.dot(d) / step)), std::int64_t(std::floor(v.dot(d) / step))};
     const Lowest here{z, plane.normal.dot(f.normal) < -0.1};
-    for (auto a = std::int64_t(std::floor(x - 1)); a <= std::int64_t(std::floor(x + 1)); ++a)
-      for (auto b = std::int64_t(std::floor(y - 1)); b <= std::int64_t(std::floor(y + 1)); ++b) {
-        if (std::hypot(double(a) + 0.5 - x, double(b) + 0.5 - y) > disc) continue;
-        const Square at{a, b};
-        const auto [it, fresh] = lowest.try_emplace(at, here);
-        if (!fresh && z < it->second.height) it->second = here;
-        if (lowest.size() == 1) low = high = at;
-        low = {std::min(low.first, at.first), std::min(low.second, at.second)};
-        high = {std::max(high.first, at.first), std::max(high.second, at.second)};
-      }
+    const auto [it, fresh] = lowest.try_emplace(at, here);
+    if (!fresh && z < it->second.height) it->second = here;
+    if (lowest.size() == 1) low = high = at;
+    low = {std::min(low.first, at.first), std::min(low.second, at.second)};
+    high = {std::max(high.first, at.first), std::max(high.second, at.second)};
   }
   if (lowest.empty()) return {};
   // what the rim of the picture reaches without crossing the shadow is outside: gaps within the shadow are filled
