@@ -25,7 +25,7 @@ class Expected {
     at(estimation::poisson) = nu;
     for (std::size_t r = 1; r < by_region.size(); ++r)
       at(estimation::first_ratio + static_cast<int>(r) - 1) = std::log(by_region[r] / by_region.front());
-    return model_.predict(step, at, false);
+    return model_.predict(step, at);  // with derivatives: travel comes with them
   }
 
  private:
