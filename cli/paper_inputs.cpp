@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_inputs.hpp"
 
+#include "palpate/geometry/ray_subset.hpp"
 #include "palpate/identify.hpp"
 
 namespace palpate::cli {
@@ -8,8 +9,8 @@ namespace {
 
 /// Both methods are given every n-th pixel: about as many points a sample as the paper's time-of-flight camera has (3200).
 constexpr Index most_points = 2000;
-/// Squared distances have no defence against what is not the object (flying pixels, the table's edge), and the paper's points
-/// were cut to the object: so are those of both methods here.
+/// Squared distances have no defence against what is not the object (flying pixels, the table's edge), and the paper's
+/// points were cut to the object: so are those of both methods here.
 constexpr double near_object_m = 0.025;
 
 }  // namespace
@@ -23,9 +24,7 @@ RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest) {
   const std::size_t stride = std::max<std::size_t>(1, (near.size() + most_points - 1) / most_points);
   std::vector<Index> rows;
   for (std::size_t i = 0; i < near.size(); i += stride) rows.push_back(near[i]);
-  RayCloud out{all.origins_m(rows, Eigen::all), all.directions(rows, Eigen::all), all.range_m(rows), all.sigma_m(rows), {}};
-  if (all.pixel.rows() == all.range_m.size()) out.pixel = all.pixel(rows, Eigen::all);
-  return out;
+  return geometry::rays_at(all, rows);
 }
 
 Prepared prepare(Recording recording, const OnProgress& progress) {

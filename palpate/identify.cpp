@@ -3,26 +3,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <map>
 #include <sstream>
 #include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/version.hpp"
-#include "palpate/estimation/finer_model.hpp"
+#include "palpate/estimation/fit_on_fine_mesh.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/estimation/shape_error.hpp"
+#include "palpate/estimation/unseen_side.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/regions.hpp"
+#include "palpate/fem/regions_by_site.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/stand_on.hpp"
+#include "palpate/geometry/subdivide.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
-#include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/free_space.hpp"
+#include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/observe.hpp"
 #include "palpate/sensing/plane_mask.hpp"
@@ -55,11 +57,6 @@ std::pair<Vec3, Vec3> surroundings(const Recording& recording) {
   return {low - margin, high + margin};
 }
 
-bool has_shapes(const RobotModel& robot) {
-  return std::any_of(robot.links.begin(), robot.links.end(),
-                     [](const RobotLink& link) { return !link.visual.empty() || !link.collision.empty(); });
-}
-
 /// Corners of quadratic tetrahedra alone, renumbered only if midpoints stood between them.
 TetMesh to_linear(const TetMesh& mesh) {
   TetMesh linear{mesh.nodes_m, mesh.tetrahedra.leftCols(4)};
@@ -84,98 +81,6 @@ double typical_edge_m(const TetMesh& mesh) {
   return std::cbrt(6 * std::sqrt(2.0) * check.volume_m3 / static_cast<double>(mesh.tetrahedra.rows()));
 }
 
-/// Splits every triangle in four until none is larger than elements are, so that the surface can follow a dent; a surface
-/// that is fine already stays as it is.
-TriMesh subdivided(TriMesh surface, double edge_m) {
-  constexpr Index most = 60000;
-  const auto longest_m = [&] {
-    double longest = 0;
-    for (Index t = 0; t < surface.triangles.rows(); ++t) {
-      for (int k = 0; k < 3; ++k) {
-        longest = std::max(longest, (surface.vertices_m.row(surface.triangles(t, k)) -
-                                     surface.vertices_m.row(surface.triangles(t, (k + 1) % 3))).norm());
-      }
-    }
-    return longest;
-  };
-  while (4 * surface.triangles.rows() <= most && longest_m() > edge_m) {
-    std::map<std::pair<Index, Index>, Index> middle_of;
-    std::vector<Eigen::RowVector3d> added;
-    const Index before = static_cast<Index>(surface.vertices_m.rows());
-    const auto middle = [&](Index a, Index b) {
-      const auto [it, fresh] = middle_of.emplace(std::minmax(a, b), before + static_cast<Index>(added.size()));
-      if (fresh) added.push_back(0.5 * (surface.vertices_m.row(a) + surface.vertices_m.row(b)));
-      return it->second;
-    };
-    Triangles finer(4 * surface.triangles.rows(), 3);
-    for (Index t = 0; t < surface.triangles.rows(); ++t) {
-      const Index a = surface.triangles(t, 0), b = surface.triangles(t, 1), c = surface.triangles(t, 2);
-      const Index ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
-      finer.middleRows<4>(4 * t) << a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca;
-    }
-    surface.triangles = std::move(finer);
-    surface.vertices_m.conservativeResize(before + static_cast<Index>(added.size()), 3);
-    for (std::size_t k = 0; k < added.size(); ++k) surface.vertices_m.row(before + static_cast<Index>(k)) = added[k];
-  }
-  return surface;
-}
-
-/// The dent under a tool is what measures E, and its error is first in h / radius: three quadratic elements a radius keep it
-/// within a few per cent.
-std::vector<geometry::FinerNear> finer_under_tools(const Recording& recording) {
-  std::vector<geometry::FinerNear> finer;
-  for (const auto& push : recording.pushes) {
-    for (const auto& step : push.steps) {
-      for (const auto& load : step.loads) {
-        const auto tool = std::find_if(recording.tools.begin(), recording.tools.end(),
-                                       [&](const Tool& each) { return each.name == load.tool; });
-        if (tool == recording.tools.end() || !(tool->radius_m > 0)) continue;
-        const bool known = std::any_of(finer.begin(), finer.end(),
-                                       [&](const auto& near) { return (near.point_m - load.contact_m).norm() < 1e-6; });
-        if (!known) finer.push_back({load.contact_m, 1.5 * tool->radius_m, tool->radius_m / 3});
-      }
-    }
-  }
-  return finer;
-}
-
-/// A region around every site that was pushed: its contacts, by the push's site, or by its name where no site is said.
-std::vector<Region> regions_by_site(const Recording& recording) {
-  std::vector<Region> regions;
-  for (const Push& push : recording.pushes) {
-    const std::string name = push.site.empty() ? push.name : push.site;
-    auto region = std::find_if(regions.begin(), regions.end(), [&](const Region& each) { return each.name == name; });
-    if (region == regions.end()) {
-      regions.emplace_back();
-      region = regions.end() - 1;
-      region->name = name;
-      region->select = RegionSelection::points;
-    }
-    for (const Step& step : push.steps) {
-      for (const Load& load : step.loads) {
-        if (!load.force_n || load.force_n->norm() == 0) continue;
-        const Points& known = region->points_m;
-        if (known.rows() > 0 && (known.rowwise() - load.contact_m.transpose()).rowwise().norm().minCoeff() < 1e-6) continue;
-        region->points_m.conservativeResize(region->points_m.rows() + 1, 3);
-        region->points_m.bottomRows<1>() = load.contact_m.transpose();
-      }
-    }
-    if (region->points_m.rows() == 0)
-      throw Error("no force acts at a place in push '" + push.name + "', so no region lies around it; give the regions in the recording",
-                  "regions by-site");
-  }
-  return regions;
-}
-
-/// Table that hides a side of the object from every view: where it rests, else the first plane of the environment.
-std::optional<Plane> hiding_plane(const Recording& recording) {
-  for (const auto& support : recording.supports) {
-    if (support.kind == SupportKind::table || support.kind == SupportKind::plane) return support.plane;
-  }
-  if (!recording.environment.planes.empty()) return recording.environment.planes.front();
-  return std::nullopt;
-}
-
 /// Where round tools met the object.
 std::vector<reconstruction::Touch> touched_places(const Recording& recording) {
   std::vector<reconstruction::Touch> touched;
@@ -194,33 +99,27 @@ std::vector<reconstruction::Touch> touched_places(const Recording& recording) {
   return touched;
 }
 
-/// The object at rest: its views, and the first image of each push while nothing loaded it, the robot masked.
-std::vector<DepthFrame> images_at_rest(const Recording& recording) {
-  std::vector<DepthFrame> frames = recording.rest.views;
-  std::optional<sensing::RobotMask> robot;
-  if (recording.robot && has_shapes(*recording.robot)) robot.emplace(*recording.robot);
-  for (const auto& push : recording.pushes) {
-    if (push.steps.empty()) continue;
-    const Step& step = push.steps.front();
-    const bool loaded = std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) {
-      return !load.force_n || load.force_n->norm() > 0 || load.travel_m.value_or(0) != 0;
-    });
-    if (loaded || step.unloading) continue;
-    for (const auto& observation : step.observations) {
-      const auto* frame = std::get_if<DepthFrame>(&observation);
-      if (frame == nullptr) continue;
-      frames.push_back(robot && !step.joints_rad.empty()
-                           ? sensing::with_mask(*frame, robot->mask(*frame, recording.joint_names, step.joints_rad))
-                           : *frame);
-    }
+/// The dent under a tool is what measures E, and its error is first in h / radius: three quadratic elements a radius keep it
+/// within a few per cent.
+std::vector<geometry::FinerNear> finer_under_tools(const Recording& recording) {
+  std::vector<geometry::FinerNear> finer;
+  for (const auto& touch : touched_places(recording)) finer.push_back({touch.point_m, 1.5 * touch.radius_m, touch.radius_m / 3});
+  return finer;
+}
+
+/// Table that hides a side of the object from every view: where it rests, else the first plane of the environment.
+std::optional<Plane> hiding_plane(const Recording& recording) {
+  for (const auto& support : recording.supports) {
+    if (support.kind == SupportKind::table || support.kind == SupportKind::plane) return support.plane;
   }
-  return frames;
+  if (!recording.environment.planes.empty()) return recording.environment.planes.front();
+  return std::nullopt;
 }
 
 reconstruction::BuiltObject build_from_views(const Recording& recording, const reconstruction::BuildOptions& options,
                                              reconstruction::Completion completion, const OnProgress& progress) {
   std::vector<PointCloud> clouds;
-  const std::vector<DepthFrame> images = images_at_rest(recording);
+  const std::vector<DepthFrame> images = sensing::images_at_rest(recording);
   for (const DepthFrame& view : images) {
     Points normals;
     const RayCloud rays = sensing::observe(view, recording.environment, {}, &normals);
@@ -273,52 +172,6 @@ void fill_with_tetrahedra(Recording& recording, reconstruction::Completion compl
   recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
 }
 
-/// Share of a surface's area that was not seen, without what stands on the plane.
-double unseen_share(const TriMesh& surface, const std::vector<char>& seen, const std::optional<Plane>& plane) {
-  const double height = (surface.vertices_m.colwise().maxCoeff() - surface.vertices_m.colwise().minCoeff()).norm();
-  double unseen = 0, all = 0;
-  for (Index t = 0; t < surface.triangles.rows(); ++t) {
-    const auto corner = [&](int k) { return Vec3(surface.vertices_m.row(surface.triangles(t, k))); };
-    bool was_seen = false, on_plane = plane.has_value();
-    for (int k = 0; k < 3; ++k) {
-      was_seen = was_seen || seen[static_cast<std::size_t>(surface.triangles(t, k))] != 0;
-      on_plane = on_plane && std::abs(plane->normal.dot(corner(k) - plane->point_m)) < 0.01 * height;
-    }
-    if (on_plane) continue;
-    const double area = (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
-    all += area;
-    if (!was_seen) unseen += area;
-  }
-  return all > 0 ? unseen / all : 0;
-}
-
-/// Takes out what shows parts of the object that no view of it at rest showed: a guess is nothing to compare with.
-void drop_unseen(const TriMesh& surface, const std::vector<char>& seen, estimation::Inputs& inputs) {
-  const geometry::TriangleTree tree(surface);
-  const auto shown = [&](const Vec3& point_m) {
-    const auto row = surface.triangles.row(tree.closest(point_m).triangle);
-    return seen[static_cast<std::size_t>(row(0))] != 0 || seen[static_cast<std::size_t>(row(1))] != 0 ||
-           seen[static_cast<std::size_t>(row(2))] != 0;
-  };
-  for (auto& step : inputs) {
-    for (auto& input : step) {
-      if (auto* frame = std::get_if<estimation::RayObservation>(&input)) {
-        const RayCloud& all = frame->rays;
-        std::vector<Index> kept;
-        for (Index i = 0; i < all.range_m.size(); ++i)
-          if (shown(Vec3(all.origins_m.row(i)) + all.range_m(i) * Vec3(all.directions.row(i)))) kept.push_back(i);
-        RayCloud rays{all.origins_m(kept, Eigen::all), all.directions(kept, Eigen::all), all.range_m(kept), all.sigma_m(kept), {}};
-        if (all.pixel.rows() == all.range_m.size()) rays.pixel = all.pixel(kept, Eigen::all);
-        frame->rays = std::move(rays);
-      }
-    }
-    std::erase_if(step, [](const auto& input) {
-      const auto* frame = std::get_if<estimation::RayObservation>(&input);
-      return frame != nullptr && frame->rays.range_m.size() == 0;
-    });
-  }
-}
-
 /// What else may stand where nobody looked: all that was hidden, and less than what is fitted.
 estimation::ShapeDoubt shape_doubt(const Recording& given, double unseen) {
   estimation::ShapeDoubt doubt;
@@ -359,65 +212,6 @@ std::map<std::string, std::string> provenance(const Recording& recording, const 
   return said;
 }
 
-/// What the mesh does to E, as a share; nothing where it is not known.
-std::optional<double> mesh_error(const Identification& answer) {
-  for (const BudgetEntry& entry : answer.budget) {
-    if (entry.input == "mesh") return entry.young_modulus_percent / 100;
-  }
-  return std::nullopt;
-}
-
-std::string mesh_words(const estimation::SimulatedObject& object) {
-  return std::to_string(object.mesh.tetrahedra.rows()) + " " + (object.mesh.tetrahedra.cols() == 10 ? "tet10" : "tet4") + ", " +
-         std::to_string(object.mesh.nodes_m.rows()) + " nodes";
-}
-
-/// Fits, and once more on a finer mesh as long as the mesh's share of E is too large. Leaves recording and object as they
-/// were fitted last.
-Identification fit_on_fine_mesh(Recording& recording, estimation::SimulatedObject& object, const estimation::Inputs& observed,
-                                estimation::ShapeDoubt* doubt, const IdentifyOptions& options, const OnProgress& progress) {
-  constexpr int most_refinements = 3;
-  constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
-  const auto percent = [](double share) {
-    std::ostringstream text;
-    text << std::setprecision(2) << 100 * share << " %";
-    return text.str();
-  };
-  estimation::FitOptions fit_options = options.fit;
-  std::string history;
-  for (int refinements = 0;; ++refinements) {
-    std::optional<estimation::FinerModel> finer, better;
-    if (recording.model.refine == "auto") finer = estimation::finer_model(recording, object);
-    bool too_coarse = false;
-    fit_options.take_finer = [&](double error, double young_std) {
-      too_coarse = error > std::max(options.mesh_tolerance, hardly * young_std);
-      if (!too_coarse || refinements == most_refinements) return false;
-      better = estimation::refined_within(recording, object, options.mesh_tolerance);
-      if (better) history += mesh_words(object) + ": " + percent(error) + " of E; ";
-      return better.has_value();
-    };
-    Identification answer = estimation::fit(recording, object, observed, fit_options, progress, finer ? &*finer : nullptr,
-                                            nullptr, doubt);
-    if (better) {
-      recording = std::move(better->recording);
-      object = std::move(better->object);
-      fit_options.young_start_pa = answer.parameters[0].value;
-      fit_options.poisson_start = answer.parameters[1].value;
-      continue;
-    }
-    const std::optional<double> error = mesh_error(answer);
-    answer.provenance["mesh"] = mesh_words(object);
-    answer.provenance["mesh's error in E"] = error ? percent(*error) : "not estimated";
-    if (!history.empty()) answer.provenance["coarser meshes"] = history.substr(0, history.size() - 2);
-    if (too_coarse && error) {
-      answer.verdicts.push_back({"mesh_too_coarse", "The mesh is estimated to put E off by " + percent(*error) +
-                                                        ", and no finer one can be had: the interval holds that error; give a finer "
-                                                        "volume mesh to be rid of it."});
-    }
-    return answer;
-  }
-}
-
 }  // namespace
 
 Recording with_overrides(Recording recording, const IdentifyOptions& options) {
@@ -432,7 +226,7 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
   }
   if (options.poisson_fixed) model.poisson_fixed = options.poisson_fixed;
   if (options.regions == "none") recording.regions.clear();
-  if (options.regions == "by-site") recording.regions = regions_by_site(recording);
+  if (options.regions == "by-site") recording.regions = fem::regions_by_site(recording);
   const auto demand = [](bool fine, const std::string& where, const std::string& cure) {
     if (!fine) throw Error(cure, where);
   };
@@ -455,7 +249,7 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
   const auto [low_m, high_m] = surroundings(recording);
   if (masked_m != nullptr) masked_m->clear();
   std::optional<sensing::RobotMask> robot;  // a robot that was recorded without shapes cannot be masked
-  if (recording.robot && has_shapes(*recording.robot)) robot.emplace(*recording.robot);
+  if (recording.robot && sensing::has_shapes(*recording.robot)) robot.emplace(*recording.robot);
   for (const auto& push : recording.pushes) {
     for (const auto& step : push.steps) {
       auto& terms = inputs.emplace_back();
@@ -509,7 +303,7 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
     if (recording.model.refine == "auto") {
       for (const auto& near : finer_under_tools(recording)) edge_m = std::min(edge_m, 0.5 * near.edge_m);
     }
-    const TriMesh surface = subdivided(*recording.rest.surface, edge_m);
+    const TriMesh surface = geometry::subdivided(*recording.rest.surface, edge_m);
     object.surface = estimation::SimulatedSurface::embedded(object.mesh, surface, geometry::embed(surface.vertices_m, object.mesh));
   } else {
     object.surface = estimation::SimulatedSurface::boundary_of(
@@ -529,16 +323,17 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
       build_simulated_object(recording, progress, reconstruction::Completion::mirrored, &seen);  // sec. IV-C: tetrahedral model
   std::optional<estimation::ShapeDoubt> doubt;
   if (!seen.empty()) {
-    const double unseen = unseen_share(*recording.rest.surface, seen, hiding_plane(recording));
+    const double unseen = estimation::unseen_share(*recording.rest.surface, seen, hiding_plane(recording));
     if (unseen > most_unseen) {
-      drop_unseen(*recording.rest.surface, seen, observed);
+      estimation::drop_unseen(*recording.rest.surface, seen, observed);
       if (options.method != "paper") doubt = shape_doubt(as_given, unseen);
     }
   }
   Identified out;
   out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
                    ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
-                   : fit_on_fine_mesh(recording, object, observed, doubt ? &*doubt : nullptr, options, progress);
+                   : estimation::fit_on_fine_mesh(recording, object, observed, options.fit, options.mesh_tolerance,
+                                                  doubt ? &*doubt : nullptr, progress);
   for (std::size_t s = 0; s < out.answer.steps.size() && s < masked_m.size(); ++s) {
     out.answer.steps[s].masked_m = std::move(masked_m[s]);
   }

@@ -9,6 +9,7 @@
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/next_push.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/geometry/ray_subset.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
@@ -37,15 +38,6 @@ inline Recording block_on_table() {
 inline SimulatedObject block_object(int refinement) {
   const TetMesh mesh = kuhn_block(5 * refinement, 5 * refinement, 4 * refinement, soft_block_m);
   return simulated(fem::to_quadratic(mesh), "linear");
-}
-
-inline RayCloud only(const RayCloud& rays, const std::vector<Index>& keep) {
-  RayCloud out = rays;
-  out.origins_m = rays.origins_m(keep, Eigen::all);
-  out.directions = rays.directions(keep, Eigen::all);
-  out.range_m = rays.range_m(keep);
-  out.sigma_m = rays.sigma_m(keep);
-  return out;
 }
 
 /// Rays of a camera at `eye_m` that meet the surface, a bundle of n x n over the block.
@@ -94,7 +86,7 @@ void measure(RayObservation& image, const geometry::TriangleTree& body, const Ri
     image.rays.range_m(i) = hit->range_m + image.rays.sigma_m(i) * normal();
     keep.push_back(i);
   }
-  image.rays = only(image.rays, keep);
+  image.rays = geometry::rays_at(image.rays, keep);
 }
 
 inline const Vec3 camera_eye_m(-0.25, -0.35, 0.4);
@@ -198,7 +190,7 @@ class MadePushes {
       if (nearest > 0.014) keep.push_back(i);
     }
     RayObservation out = view;
-    out.rays = only(view.rays, keep);
+    out.rays = geometry::rays_at(view.rays, keep);
     return out;
   }
 

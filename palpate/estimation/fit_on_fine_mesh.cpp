@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/fit_on_fine_mesh.hpp"
+
+#include <algorithm>
+#include <iomanip>
+#include <optional>
+#include <sstream>
+#include <string>
+
+#include "palpate/estimation/finer_model.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// What the mesh does to E, as a share; nothing where it is not known.
+std::optional<double> mesh_error(const Identification& answer) {
+  for (const BudgetEntry& entry : answer.budget) {
+    if (entry.input == "mesh") return entry.young_modulus_percent / 100;
+  }
+  return std::nullopt;
+}
+
+std::string mesh_words(const SimulatedObject& object) {
+  return std::to_string(object.mesh.tetrahedra.rows()) + " " + (object.mesh.tetrahedra.cols() == 10 ? "tet10" : "tet4") +
+         ", " + std::to_string(object.mesh.nodes_m.rows()) + " nodes";
+}
+
+}  // namespace
+
+Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
+                                const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
+                                const OnProgress& progress) {
+  constexpr int most_refinements = 3;
+  constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
+  const auto percent = [](double share) {
+    std::ostringstream text;
+    text << std::setprecision(2) << 100 * share << " %";
+    return text.str();
+  };
+  FitOptions fit_options = options;
+  std::string history;
+  for (int refinements = 0;; ++refinements) {
+    std::optional<FinerModel> finer, better;
+    if (recording.model.refine == "auto") finer = finer_model(recording, object);
+    bool too_coarse = false;
+    fit_options.take_finer = [&](double error, double young_std) {
+      too_coarse = error > std::max(mesh_tolerance, hardly * young_std);
+      if (!too_coarse || refinements == most_refinements) return false;
+      better = refined_within(recording, object, mesh_tolerance);
+      if (better) history += mesh_words(object) + ": " + percent(error) + " of E; ";
+      return better.has_value();
+    };
+    Identification answer =
+        fit(recording, object, observed, fit_options, progress, finer ? &*finer : nullptr, nullptr, doubt);
+    if (better) {
+      recording = std::move(better->recording);
+      object = std::move(better->object);
+      fit_options.young_start_pa = answer.parameters[0].value;
+      fit_options.poisson_start = answer.parameters[1].value;
+      continue;
+    }
+    const std::optional<double> error = mesh_error(answer);
+    answer.provenance["mesh"] = mesh_words(object);
+    answer.provenance["mesh's error in E"] = error ? percent(*error) : "not estimated";
+    if (!history.empty()) answer.provenance["coarser meshes"] = history.substr(0, history.size() - 2);
+    if (too_coarse && error) {
+      answer.verdicts.push_back(
+          {"mesh_too_coarse", "The mesh is estimated to put E off by " + percent(*error) +
+                                  ", and no finer one can be had: the interval holds that error; give a finer "
+                                  "volume mesh to be rid of it."});
+    }
+    return answer;
+  }
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// A fit whose mesh is fine enough for its answer.
+#pragma once
+
+#include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/shape_error.hpp"
+
+namespace palpate::estimation {
+
+/// Fits, and with `refine: auto` once more on a finer mesh as long as what the mesh does to E is estimated to be more than
+/// `mesh_tolerance` (a share of E) and more than a third of all else that is not known of E. Leaves recording and object as
+/// they were fitted last; the answer's provenance says which meshes were taken.
+/// @param doubt  other shapes of a side that nobody saw; nullptr: none
+Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
+                                const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
+                                const OnProgress& progress);
+
+}  // namespace palpate::estimation

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images that show the object as nothing loads it.
+#pragma once
+
+#include <vector>
+
+#include "palpate/core/recording.hpp"
+
+namespace palpate::sensing {
+
+/// Whether any link has a shape: a robot that was recorded without shapes cannot be masked.
+bool has_shapes(const RobotModel& robot);
+
+/// The recording's views of the object, and the first image of each push while nothing loaded it, the robot masked.
+std::vector<DepthFrame> images_at_rest(const Recording& recording);
+
+}  // namespace palpate::sensing
