@@ -33,7 +33,7 @@ void legend(report::Canvas& canvas, std::initializer_list<std::pair<const char*,
 
 std::string surface_figure(const TrialAnswer& trial) {
   const ErrorSurface& surface = trial.surface;
-  if (surface.error_m2.size() == 0) return {};
+  if (surface.error_m2.cols() < 2) return {};
   auto canvas = report::svg_canvas(width_pt, height_pt);
   const Index rows = static_cast<Index>(surface.error_m2.rows()), columns = static_cast<Index>(surface.error_m2.cols());
   Axes axes(*canvas, width_pt, height_pt, "log10 E (Pa)",
@@ -77,14 +77,44 @@ std::string surface_figure(const TrialAnswer& trial) {
   return canvas->bytes();
 }
 
+std::string error_figure(const TrialAnswer& trial) {
+  const ErrorSurface& surface = trial.surface;
+  if (surface.error_m2.rows() < 2) return {};
+  Eigen::Index nearest = 0;
+  (surface.poisson_ratio.array() - trial.paper.poisson_ratio).abs().minCoeff(&nearest);
+  std::vector<Spot> spots;
+  std::vector<double> roots;
+  for (Eigen::Index i = 0; i < surface.error_m2.rows(); ++i) {
+    const double root_mm = 1000 * std::sqrt(surface.error_m2(i, nearest));
+    if (!std::isfinite(root_mm)) continue;
+    spots.push_back({surface.young_modulus_pa(i) / 1000, root_mm});
+    roots.push_back(root_mm);
+  }
+  if (spots.size() < 2) return {};
+  auto canvas = report::svg_canvas(width_pt, height_pt);
+  const Range range = report::range_of(roots, false);
+  Axes axes(*canvas, width_pt, height_pt, "E (kPa)", {spots.front().x, spots.back().x}, "root of the error function (mm)", range);
+  axes.line(spots, paper_colour, 1.4);
+  for (const Spot& spot : spots) axes.dot(spot.x, spot.y, 2.2, paper_colour);
+  const auto upright = [&](double young_pa, report::Colour colour, bool dashed) {
+    const double x = young_pa / 1000;
+    if (x >= spots.front().x && x <= spots.back().x) axes.line(std::vector<Spot>{{x, range.from}, {x, range.to}}, colour, 1, dashed);
+  };
+  upright(trial.young_modulus_pa, truth_colour, true);
+  upright(trial.paper.young_modulus_pa, paper_colour, false);
+  upright(trial.palpate.young_modulus_pa, own_colour, false);
+  legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate", own_colour}});
+  return canvas->bytes();
+}
+
 std::string force_figure(const TrialAnswer& trial) {
   std::map<std::string, std::vector<Spot>> pushes;
   std::vector<double> travels, forces;
-  for (const SampleAnswer& sample : trial.samples) {
-    if (!std::isfinite(sample.travel_m)) continue;
-    pushes[sample.push].push_back({1000 * sample.travel_m, sample.force_n});
-    travels.push_back(1000 * sample.travel_m);
-    forces.push_back(sample.force_n);
+  for (const ForceReading& reading : trial.readings) {
+    if (!std::isfinite(reading.travel_m)) continue;
+    pushes[reading.push].push_back({1000 * reading.travel_m, reading.force_n});
+    travels.push_back(1000 * reading.travel_m);
+    forces.push_back(reading.force_n);
   }
   if (travels.size() < 2) return {};
   auto canvas = report::svg_canvas(width_pt, height_pt);
@@ -103,17 +133,32 @@ std::string force_figure(const TrialAnswer& trial) {
   return canvas->bytes();
 }
 
-std::string samples_figure(const TrialAnswer& trial) {
+std::string samples_figure(const TrialAnswer& trial, bool truth_known) {
   if (trial.samples.empty()) return {};
-  std::vector<double> values{trial.young_modulus_pa / 1000};
+  std::vector<double> values;
+  const auto joint = [&](const MethodAnswer& answer) {
+    if (std::isfinite(answer.young_modulus_pa)) values.push_back(answer.young_modulus_pa / 1000);
+  };
+  joint(trial.paper);
+  joint(trial.palpate);
+  if (truth_known) values.push_back(trial.young_modulus_pa / 1000);
+  if (values.empty()) return {};
+  const double most_kpa = 4 * *std::max_element(values.begin(), values.end());  // a sample that says nothing must not hide the others
   for (const SampleAnswer& sample : trial.samples)
     for (double e : {sample.paper.young_modulus_pa, sample.palpate.young_modulus_pa})
-      if (e < 6 * trial.young_modulus_pa) values.push_back(e / 1000);
+      if (e / 1000 < most_kpa) values.push_back(e / 1000);
   auto canvas = report::svg_canvas(width_pt, height_pt);
   const double count = static_cast<double>(trial.samples.size());
   const Range range = report::range_of(values, true);
   Axes axes(*canvas, width_pt, height_pt, "sample, all pushes one after the other", {0, count + 1}, "E (kPa)", range);
-  axes.line(std::vector<Spot>{{0.0, trial.young_modulus_pa / 1000}, {count + 1, trial.young_modulus_pa / 1000}}, truth_colour, 1, true);
+  const auto level = [&](double young_pa, report::Colour colour, bool dashed) {
+    if (std::isfinite(young_pa)) axes.line(std::vector<Spot>{{0.0, young_pa / 1000}, {count + 1, young_pa / 1000}}, colour, 1, dashed);
+  };
+  if (truth_known) level(trial.young_modulus_pa, truth_colour, true);
+  if (trial.sites.empty()) {
+    level(trial.paper.young_modulus_pa, paper_colour, false);
+    level(trial.palpate.young_modulus_pa, own_colour, false);
+  }
   for (std::size_t i = 0; i < trial.samples.size(); ++i) {
     const SampleAnswer& sample = trial.samples[i];
     const double x = static_cast<double>(i) + 1;
@@ -124,7 +169,11 @@ std::string samples_figure(const TrialAnswer& trial) {
     if (sample.palpate.young_modulus_pa / 1000 < range.to) axes.dot(x + 0.12, sample.palpate.young_modulus_pa / 1000, 2.5, own_colour);
     if (sample.paper.young_modulus_pa / 1000 < range.to) axes.dot(x - 0.12, sample.paper.young_modulus_pa / 1000, 2.5, paper_colour);
   }
-  legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate, 95 %", own_colour}});
+  if (truth_known) {
+    legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate, 95 %", own_colour}});
+  } else {
+    legend(*canvas, {{"paper's method", paper_colour}, {"palpate, 95 %", own_colour}});
+  }
   return canvas->bytes();
 }
 

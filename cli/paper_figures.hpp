@@ -12,9 +12,11 @@ namespace palpate::cli {
 std::string registration_figure(const TrialAnswer& trial);
 /// Fig. 4: the error over (E, nu), both paths on it.
 std::string surface_figure(const TrialAnswer& trial);
+/// Fig. 6: the error over E alone, at the nu where the paper's method ended.
+std::string error_figure(const TrialAnswer& trial);
 /// Fig. 5: measured force over travel.
 std::string force_figure(const TrialAnswer& trial);
-/// Fig. 6, 8 and 9: E of every sample alone, by both methods, with ours' interval.
-std::string samples_figure(const TrialAnswer& trial);
+/// Fig. 6, 8 and 9: E of every sample alone, by both methods, with ours' interval; lines: all samples jointly.
+std::string samples_figure(const TrialAnswer& trial, bool truth_known);
 
 }  // namespace palpate::cli

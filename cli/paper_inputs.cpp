@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_inputs.hpp"
 
+#include <limits>
+
 #include "palpate/geometry/ray_subset.hpp"
 #include "palpate/identify.hpp"
+#include "palpate/reconstruction/build_object.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -12,6 +15,43 @@ constexpr Index most_points = 2000;
 /// Squared distances have no defence against what is not the object (flying pixels, the table's edge), and the paper's
 /// points were cut to the object: so are those of both methods here.
 constexpr double near_object_m = 0.025;
+
+/// A volume of the wished size, of the given surface or of one that is completed from views.
+void fill(Recording& recording, const ModelChoice& choice, reconstruction::Completion completion, std::vector<char>& seen,
+          const OnProgress& progress) {
+  if (!recording.rest.surface) {
+    Recording completed = recording;
+    build_simulated_object(completed, progress, completion, &seen);
+    recording.rest.surface = completed.rest.surface;
+    recording.rest.surface_std_m = completed.rest.surface_std_m;
+    recording.supports = completed.supports;
+  }
+  reconstruction::BuildOptions options;
+  options.mesh.tetrahedra = choice.tetrahedra;
+  if (choice.edge_m > 0)
+    for (const Push& push : recording.pushes)
+      for (const Step& step : push.steps)
+        if (loaded(step) && (options.mesh.finer.empty() || options.mesh.finer.back().point_m != step.loads[0].contact_m))
+          options.mesh.finer.push_back({step.loads[0].contact_m, 1.5 * recording.tools.front().radius_m, choice.edge_m});
+  auto built = reconstruction::build_object(*recording.rest.surface, recording.supports, options, progress);
+  recording.supports = std::move(built.model.supports);
+  recording.rest.volume = std::move(built.model.volume);
+}
+
+/// Point loads: every tool presses the node that is nearest to where it touches first.
+void press_at_nodes(Recording& recording, const TetMesh& mesh) {
+  for (Tool& tool : recording.tools) {
+    for (const Push& push : recording.pushes)
+      for (const Step& step : push.steps)
+        for (const Load& load : step.loads) {
+          if (load.tool != tool.name || tool.shape == ToolShape::vertices) continue;
+          Eigen::Index nearest = 0;
+          (mesh.nodes_m.rowwise() - load.contact_m.transpose()).rowwise().squaredNorm().minCoeff(&nearest);
+          tool.shape = ToolShape::vertices;
+          tool.vertices = {static_cast<Index>(nearest)};
+        }
+  }
+}
 
 }  // namespace
 
@@ -27,10 +67,42 @@ RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest) {
   return geometry::rays_at(all, rows);
 }
 
-Prepared prepare(Recording recording, const OnProgress& progress) {
+ModelChoice choice_of(const lab::PaperScene& scene) {
+  ModelChoice choice;
+  choice.tetrahedra = scene.tetrahedra;
+  choice.edge_m = scene.edge_m;
+  choice.planar_back = scene.shape == lab::PaperShape::planar_back;
+  return choice;
+}
+
+Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress) {
   Prepared out;
   out.inputs = observe(recording);
-  out.object = build_simulated_object(recording, progress);
+  const bool keep = shared != nullptr && recording.rest.views.empty();
+  if (keep && shared->built) {
+    recording.rest = shared->built->recording.rest;
+    recording.supports = shared->built->recording.supports;
+    recording.tools = shared->built->recording.tools;
+    recording.model.element = shared->built->recording.model.element;
+    out.object = shared->built->object;
+    if (shared->built->finer) out.finer = std::make_shared<estimation::FinerModel>(*shared->built->finer);
+  } else {
+    std::vector<char> seen;
+    const Recording as_given = recording;
+    if (choice.linear) recording.model.element = "tet4";
+    if (choice.linear) recording.model.refine = "none";
+    const auto completion = choice.planar_back ? reconstruction::Completion::planar : reconstruction::Completion::mirrored;
+    if (choice.tetrahedra > 0) fill(recording, choice, completion, seen, progress);
+    out.object = build_simulated_object(recording, progress, completion, choice.tetrahedra > 0 ? nullptr : &seen);
+    if (choice.point_load) press_at_nodes(recording, out.object.mesh);
+    const double unseen = drop_unseen_side(recording, seen, out.inputs);
+    if (unseen > 0 && !choice.planar_back)
+      out.doubt = std::make_shared<estimation::ShapeDoubt>(other_shapes(as_given, unseen));
+    if (auto finer = estimation::finer_model(recording, out.object))
+      out.finer = std::make_shared<estimation::FinerModel>(std::move(*finer));
+    if (keep) shared->built = Prepared{recording, out.object, {}, out.finer, nullptr};
+  }
+  if (out.finer) out.finer->recording.pushes = recording.pushes;
   const geometry::TriangleTree rest(out.object.surface.rest());
   for (auto& step : out.inputs)
     for (auto& input : step)
@@ -40,7 +112,7 @@ Prepared prepare(Recording recording, const OnProgress& progress) {
 }
 
 Prepared part_of(const Prepared& all, const std::function<bool(std::size_t push, std::size_t step)>& keep) {
-  Prepared out{all.recording, all.object, {}};
+  Prepared out{all.recording, all.object, {}, nullptr, nullptr};
   out.recording.pushes.clear();
   std::size_t flat = 0;
   for (std::size_t p = 0; p < all.recording.pushes.size(); ++p) {
@@ -56,12 +128,26 @@ Prepared part_of(const Prepared& all, const std::function<bool(std::size_t push,
   return out;
 }
 
+Prepared with_law(Prepared given, std::string_view law) {
+  if (given.finer) given.finer = std::make_shared<estimation::FinerModel>(*given.finer);
+  given.recording.model.material = given.object.material = std::string(law);
+  if (given.finer) given.finer->recording.model.material = given.finer->object.material = std::string(law);
+  return given;
+}
+
+double travel_of(const Step& step) {
+  for (const auto& observation : step.observations)
+    if (const auto* travel = std::get_if<ToolTravel>(&observation)) return travel->travel_m;
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
 bool loaded(const Step& step) { return !step.loads.empty() && step.loads[0].force_n && step.loads[0].force_n->norm() > 0; }
 
 Prepared as_one(Prepared given) {
   given.recording.regions.clear();
   given.object.region.clear();
   given.object.region_names.clear();
+  given.finer.reset();
   return given;
 }
 

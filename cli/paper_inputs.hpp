@@ -3,10 +3,15 @@
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <optional>
 
 #include "palpate/core/progress.hpp"
+#include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/shape_error.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/lab/paper_scenes.hpp"
 
 namespace palpate::cli {
 
@@ -15,19 +20,42 @@ struct Prepared {
   Recording recording;
   estimation::SimulatedObject object;
   estimation::Inputs inputs;
+  std::shared_ptr<estimation::FinerModel> finer;  ///< that shows what the mesh does to the answer; nullptr: it cannot be had
+  std::shared_ptr<estimation::ShapeDoubt> doubt;  ///< of an object that was completed: for the method that has intervals
 };
+
+/// What seeds of a scene share: the same object on the same mesh, pressed at the same places.
+struct SharedModel {
+  std::optional<Prepared> built;  ///< without inputs
+  estimation::FitMemory palpate, paper, unused;
+};
+
+/// How the object is modelled.
+struct ModelChoice {
+  Index tetrahedra = 0;       ///< 0: as many as the program takes by itself, fine under the pad
+  double edge_m = 0;          ///< where these are given: of those under the pad; 0: like all others
+  bool linear = false;        ///< linear elements, not quadratic ones
+  bool planar_back = false;   ///< an unseen side is completed as in the paper, and taken for true
+  bool point_load = false;    ///< forces act on the node that is nearest to their contact
+};
+ModelChoice choice_of(const lab::PaperScene& scene);
 
 /// Every n-th pixel of what lies near the object: about as many points a sample as the paper's time-of-flight camera has.
 RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest);
 
-Prepared prepare(Recording recording, const OnProgress& progress);
+/// @param shared  used and filled where the recording gives the shape; nullptr: nothing is kept
+Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress);
 
 /// Some steps of it: keep(push, step) says which.
 Prepared part_of(const Prepared& all, const std::function<bool(std::size_t push, std::size_t step)>& keep);
 
 /// The same taken for one material, whatever regions it has: the paper's method knows none.
 Prepared as_one(Prepared given);
+/// The same with another law.
+Prepared with_law(Prepared given, std::string_view law);
 
 bool loaded(const Step& step);
+/// NaN: the step has none.
+double travel_of(const Step& step);
 
 }  // namespace palpate::cli

@@ -3,6 +3,9 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <utility>
+#include <vector>
 
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
@@ -16,8 +19,11 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 /// Answers for one step of a recording by solving it at an answer: travel of the tool and surface.
 class Expected {
  public:
-  Expected(const Recording& recording, const estimation::SimulatedObject& object, const estimation::FitOptions& options)
-      : model_(recording, object, unknowns_, estimation::statics_options(recording, object, options)) {}
+  Expected(const Recording& recording, const estimation::SimulatedObject& object, const estimation::FitOptions& options,
+           estimation::FitMemory& memory)
+      : model_(recording, object, unknowns_, estimation::statics_options(recording, object, options), memory.model) {
+    memory.model = model_.solved();
+  }
   /// @param by_region  E of the regions, the first one's too; empty = one E
   estimation::StepPrediction operator()(std::size_t step, double young_pa, double nu, const std::vector<double>& by_region = {}) {
     VectorX at = unknowns_.prior_mean();
@@ -33,53 +39,81 @@ class Expected {
   estimation::ForwardModel model_;
 };
 
-double rms_to(const TriMesh& surface, const estimation::TermInput& input) {
-  const auto* seen = std::get_if<estimation::RayObservation>(&input);
-  if (seen == nullptr || seen->rays.range_m.size() == 0) return nan;
+/// @param moves  the object may have moved as a whole: registered first
+double rms_to(const TriMesh& surface, const RayCloud& seen, bool moves) {
+  if (seen.range_m.size() == 0) return nan;
   const geometry::TriangleTree tree(surface);
+  PointCloud cloud;
+  cloud.points_m = seen.origins_m + (seen.directions.array().colwise() * seen.range_m.array()).matrix();
+  const Pose T = moves ? registration::align(cloud, tree, Pose::Identity()).T_surface_cloud : Pose::Identity();
   double sum = 0;
-  for (Index i = 0; i < static_cast<Index>(seen->rays.range_m.size()); ++i)
-    sum += tree.closest(Vec3(seen->rays.origins_m.row(i)) + seen->rays.range_m(i) * Vec3(seen->rays.directions.row(i))).squared_distance_m2;
-  return std::sqrt(sum / static_cast<double>(seen->rays.range_m.size()));
+  for (Index i = 0; i < static_cast<Index>(cloud.points_m.rows()); ++i)
+    sum += tree.closest(T * Vec3(cloud.points_m.row(i))).squared_distance_m2;
+  return std::sqrt(sum / static_cast<double>(cloud.points_m.rows()));
+}
+
+/// Straight between the forces that were asked for, and on beyond them.
+double force_at(double travel_m, const std::vector<std::pair<double, double>>& travel_force) {
+  std::size_t k = 1;
+  while (k + 1 < travel_force.size() && travel_force[k].first < travel_m) ++k;
+  const auto& [t0, f0] = travel_force[k - 1];
+  const auto& [t1, f1] = travel_force[k];
+  return f0 + (f1 - f0) * (travel_m - t0) / (t1 - t0);
+}
+
+/// What one answer expects of every step; without an entry where it has no equilibrium.
+struct Course {
+  std::map<std::size_t, Expectation> at;
+};
+
+Course course_of(const Recording& recording, const Prepared& given, const MethodAnswer& answer, const std::vector<double>& by_region,
+                 const std::vector<RayCloud>& seen, const estimation::FitOptions& options, estimation::FitMemory& memory) {
+  Course course;
+  if (!std::isfinite(answer.young_modulus_pa)) return course;
+  Expected expected(recording, given.object, options, memory);
+  std::vector<std::pair<double, double>> travel_force{{0, 0}};
+  const Push& push = recording.pushes[0];
+  for (std::size_t s = 0; s < push.steps.size(); ++s) {
+    if (!loaded(push.steps[s])) continue;
+    const auto predicted = expected(s, answer.young_modulus_pa, answer.poisson_ratio, by_region);
+    if (!predicted.converged) continue;
+    const Load& load = push.steps[s].loads[0];
+    const std::pair<double, double> here{predicted.travel_m(0), load.force_n->dot(load.direction)};
+    if (here.first > travel_force.back().first) travel_force.push_back(here);
+    course.at[s] = {nan, rms_to({predicted.surface_m, given.object.surface.rest().triangles}, seen[s], recording.free)};
+  }
+  if (travel_force.size() > 1)
+    for (auto& [s, expectation] : course.at) expectation.force_n = force_at(travel_of(push.steps[s]), travel_force);
+  return course;
 }
 
 }  // namespace
 
-void predict_unused(const Prepared& given, const lab::PaperTrial& trial, const std::vector<double>& by_region,
-                    const estimation::FitOptions& options, TrialAnswer& out) {
-  if (trial.unused.steps.empty() || !std::isfinite(out.paper.young_modulus_pa) || !std::isfinite(out.palpate.young_modulus_pa)) return;
+void predict_unused(const Prepared& given, const Prepared* other, const lab::PaperTrial& trial, const std::vector<double>& by_region,
+                    const estimation::FitOptions& options, SharedModels& shared, TrialAnswer& out) {
+  if (trial.unused.steps.empty()) return;
   Recording recording = given.recording;
   recording.pushes = {trial.unused};
-  estimation::Inputs inputs = observe(recording);
   const TriMesh& rest = given.object.surface.rest();
   const geometry::TriangleTree rest_tree(rest);
-  Prepared without = as_one(given);
-  without.recording.pushes = recording.pushes;
-  Expected by_paper(without.recording, without.object, options), by_ours(recording, given.object, options);
+  std::vector<RayCloud> seen;
+  for (const auto& step : observe(recording)) {
+    seen.emplace_back();
+    for (const auto& input : step)
+      if (const auto* rays = std::get_if<estimation::RayObservation>(&input)) seen.back() = thinned(rays->rays, rest_tree);
+  }
+  const Prepared one = as_one(given);
+  const Course paper = course_of(recording, one, out.paper, {}, seen, options, shared.fine.unused),
+               ours = course_of(recording, given, out.palpate, by_region, seen, options, shared.fine.unused),
+               by_other = other != nullptr ? course_of(recording, *other, out.other, {}, seen, options, shared.other.unused) : Course{};
+  const auto expectation = [](const Course& course, std::size_t s) {
+    const auto found = course.at.find(s);
+    return found == course.at.end() ? Expectation{nan, nan} : found->second;
+  };
   for (std::size_t s = 0; s < trial.unused.steps.size(); ++s) {
     if (!loaded(trial.unused.steps[s])) continue;
-    const auto paper = by_paper(s, out.paper.young_modulus_pa, out.paper.poisson_ratio);
-    const auto ours = by_ours(s, out.palpate.young_modulus_pa, out.palpate.poisson_ratio, by_region);
-    if (!paper.converged || !ours.converged) continue;
-    UnusedStep step;
-    step.force_n = trial.unused_force_n[s];
-    step.travel_m = step.surface_paper_m = step.surface_palpate_m = step.surface_still_m = nan;
-    for (const auto& observation : trial.unused.steps[s].observations)
-      if (const auto* travel = std::get_if<ToolTravel>(&observation)) step.travel_m = travel->travel_m;
-    // The scenes' law is linear: force goes with travel.
-    const Load& load = trial.unused.steps[s].loads[0];
-    const double measured_n = load.force_n->dot(load.direction);
-    step.force_paper_n = measured_n * step.travel_m / paper.travel_m(0);
-    step.force_palpate_n = measured_n * step.travel_m / ours.travel_m(0);
-    for (auto& input : inputs[s]) {
-      auto* seen = std::get_if<estimation::RayObservation>(&input);
-      if (seen == nullptr) continue;
-      seen->rays = thinned(seen->rays, rest_tree);
-      step.surface_paper_m = rms_to({paper.surface_m, rest.triangles}, input);
-      step.surface_palpate_m = rms_to({ours.surface_m, rest.triangles}, input);
-      step.surface_still_m = rms_to(rest, input);
-    }
-    out.unused.push_back(step);
+    out.unused.push_back({trial.unused_force_n[s], travel_of(trial.unused.steps[s]), expectation(paper, s), expectation(ours, s),
+                          expectation(by_other, s), rms_to(rest, seen[s], recording.free)});
   }
 }
 
@@ -106,7 +140,8 @@ void add_pictures(const Prepared& given, const estimation::FitOptions& options, 
     if (const auto* seen = std::get_if<estimation::RayObservation>(&input))
       cloud.points_m = seen->rays.origins_m + (seen->rays.directions.array().colwise() * seen->rays.range_m.array()).matrix();
   if (cloud.points_m.rows() < 6) return;
-  Expected expected(given.recording, given.object, options);
+  estimation::FitMemory memory;
+  Expected expected(given.recording, given.object, options, memory);
   for (const double factor : {3.0, 2.0, 1.3, 1.0}) {
     RegistrationPicture picture;
     picture.young_modulus_pa = factor * out.young_modulus_pa;

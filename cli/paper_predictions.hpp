@@ -7,9 +7,11 @@
 
 namespace palpate::cli {
 
-/// The push at the unused place, by both answers. @param by_region  ours' E of every region, empty = one E
-void predict_unused(const Prepared& given, const lab::PaperTrial& trial, const std::vector<double>& by_region,
-                    const estimation::FitOptions& options, TrialAnswer& out);
+/// The unused push, by all answers.
+/// @param other      with the other law; nullptr: none was fitted
+/// @param by_region  ours' E of every region, empty = one E
+void predict_unused(const Prepared& given, const Prepared* other, const lab::PaperTrial& trial, const std::vector<double>& by_region,
+                    const estimation::FitOptions& options, SharedModels& shared, TrialAnswer& out);
 
 /// Fig. 3: what registration makes of the hardest step at 3, 2, 1.3 and 1 times the true E.
 void add_pictures(const Prepared& given, const estimation::FitOptions& options, TrialAnswer& out);

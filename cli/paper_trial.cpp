@@ -1,53 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_trial.hpp"
 
-#include <chrono>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "cli/paper_predictions.hpp"
-#include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/paper_method.hpp"
-#include "palpate/identify.hpp"
 
 namespace palpate::cli {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-MethodAnswer summary(const Identification& answer, double seconds) {
-  MethodAnswer out;
-  if (answer.parameters.size() < 2) {  // stopped before there was an answer
-    out.young_modulus_pa = out.poisson_ratio = out.lower_95_pa = out.upper_95_pa = nan;
-    return out;
-  }
-  const Parameter &young = answer.parameters[0], &poisson = answer.parameters[1];
-  out.young_modulus_pa = young.value;
-  out.poisson_ratio = poisson.value;
-  out.lower_95_pa = young.lower_95;
-  out.upper_95_pa = young.upper_95;
-  out.solves = answer.fit.solves;
-  out.iterations = answer.fit.iterations;
-  out.seconds = seconds;
-  out.converged = answer.termination == Termination::converged;
-  out.path = answer.trace;
-  for (const Verdict& verdict : answer.verdicts) out.verdicts.push_back(verdict.code);
-  return out;
-}
-
-MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& options, const OnProgress& progress) {
-  const auto start = Clock::now();
-  const Identification answer = estimation::fit_as_in_paper(given.recording, given.object, given.inputs, options, progress);
-  return summary(answer, std::chrono::duration<double>(Clock::now() - start).count());
-}
-
-MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, const OnProgress& progress,
-                        const estimation::FinerModel* finer = nullptr) {
-  const auto start = Clock::now();
-  const Identification answer = estimation::fit(given.recording, given.object, given.inputs, options, progress, finer);
-  return summary(answer, std::chrono::duration<double>(Clock::now() - start).count());
-}
 
 ErrorSurface error_surface(const Prepared& given, const MethodAnswer& found, double true_young_pa, int side,
                            const estimation::FitOptions& options, const OnProgress& progress) {
@@ -57,10 +19,11 @@ ErrorSurface error_surface(const Prepared& given, const MethodAnswer& found, dou
   const double low = std::log(std::min(true_young_pa, found.young_modulus_pa) / 1.8),
                high = std::log(std::max(true_young_pa, found.young_modulus_pa) * 1.8);
   out.young_modulus_pa = VectorX::LinSpaced(side, low, high).array().exp();
-  out.poisson_ratio = VectorX::LinSpaced(side, 0.02, 0.49);
-  out.error_m2.resize(side, side);
+  const bool dear = given.object.material != "linear";  // then every point is as many searches for equilibrium as there are samples
+  out.poisson_ratio = dear ? VectorX::Constant(1, found.poisson_ratio) : VectorX(VectorX::LinSpaced(side, 0.02, 0.49));
+  out.error_m2.resize(side, out.poisson_ratio.size());
   for (int i = 0; i < side; ++i) {
-    for (int k = 0; k < side; ++k) out.error_m2(i, k) = error(out.young_modulus_pa(i), out.poisson_ratio(k));
+    for (Index k = 0; k < static_cast<Index>(out.poisson_ratio.size()); ++k) out.error_m2(i, k) = error(out.young_modulus_pa(i), out.poisson_ratio(k));
     if (progress && !progress("error surface", (i + 1.0) / side)) break;
   }
   out.at_found_m2 = error(found.young_modulus_pa, found.poisson_ratio);
@@ -81,13 +44,12 @@ void answer_samples(const Prepared& given, int every, const estimation::FitOptio
       SampleAnswer sample;
       sample.push = push.name;
       sample.force_n = load.force_n->dot(load.direction.normalized());
-      sample.travel_m = nan;
-      for (const auto& observation : push.steps[s].observations)
-        if (const auto* travel = std::get_if<ToolTravel>(&observation)) sample.travel_m = travel->travel_m;
+      sample.travel_m = std::numeric_limits<double>::quiet_NaN();
+      sample.travel_m = travel_of(push.steps[s]);
       // Ours may use the unloaded frame of the push as well; the paper's method has no use for it.
-      sample.paper = by_paper(part_of(given, [&](std::size_t q, std::size_t t) { return q == p && t == s; }), alone, {});
+      sample.paper = by_paper(part_of(given, [&](std::size_t q, std::size_t t) { return q == p && t == s; }), alone, nullptr, {});
       sample.palpate = by_palpate(
-          part_of(given, [&](std::size_t q, std::size_t t) { return q == p && (t == s || !loaded(push.steps[t])); }), alone, {});
+          part_of(given, [&](std::size_t q, std::size_t t) { return q == p && (t == s || !loaded(push.steps[t])); }), alone, nullptr, {});
       out.samples.push_back(std::move(sample));
     }
   }
@@ -106,7 +68,7 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
     SiteAnswer site;
     site.site = given.recording.pushes[p].site;
     site.young_modulus_pa = trial.site_young_pa[p];
-    site.paper = by_paper(part_of(one, [&](std::size_t q, std::size_t) { return q == p; }), options, progress);
+    site.paper = by_paper(part_of(one, [&](std::size_t q, std::size_t) { return q == p; }), options, nullptr, progress);
     site.palpate = out.palpate;
     for (const Parameter& young : ours.parameters) {
       if (young.name != "young_modulus" || young.region != site.site) continue;
@@ -121,37 +83,60 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
 
 }  // namespace
 
-TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, const OnProgress& progress) {
+TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
+                      const OnProgress& progress) {
   const lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress);
+  SharedModels of_this_seed;
+  if (shared == nullptr) shared = &of_this_seed;
   TrialAnswer out;
   out.seed = seed;
   out.young_modulus_pa = trial.young_modulus_pa;
   out.poisson_ratio = trial.poisson_ratio;
+  for (const Push& push : trial.recording.pushes)
+    for (const Step& step : push.steps)
+      if (loaded(step)) out.readings.push_back({push.name, step.loads[0].force_n->norm(), travel_of(step)});
   estimation::FitOptions fit;
   fit.threads = options.threads;
+  fit.cross_checks = fit.stresses = false;  // the paper's method has none: neither side's solves count them
 
-  const Prepared given = prepare(trial.recording, progress);
+  ModelChoice choice = choice_of(scene);
+  const Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
   out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
-  const auto finer = estimation::finer_model(given.recording, given.object);
-  const auto start = Clock::now();
-  const Identification ours = estimation::fit(given.recording, given.object, given.inputs, fit, progress, finer ? &*finer : nullptr);
-  out.palpate = summary(ours, std::chrono::duration<double>(Clock::now() - start).count());
-
+  Identification ours;
+  out.palpate = by_palpate(given, fit, &shared->fine.palpate, progress, &ours);
   const Prepared one = as_one(given);
-  out.paper = by_paper(one, fit, progress);
+  out.paper = by_paper(one, fit, &shared->fine.paper, progress);
   Recording coarse = trial.recording;
   coarse.regions.clear();
-  coarse.model.element = "tet4";
-  coarse.model.refine = "none";
-  out.paper_coarse = by_paper(prepare(std::move(coarse), progress), fit, progress);
+  choice.linear = true;
+  out.paper_coarse = by_paper(prepare(std::move(coarse), choice, &shared->linear, progress), fit, &shared->linear.paper, progress);
+  std::optional<Prepared> other;
+  if (!scene.other_law.empty()) {
+    other = with_law(given, scene.other_law);
+    out.other_law = scene.other_law;
+    out.other = by_palpate(*other, fit, &shared->other.palpate, progress);
+  }
 
   std::vector<double> by_region;
   if (!given.object.region_names.empty() && ours.parameters.size() > 2)
     by_region = answer_sites(given, trial, ours, fit, out, progress);
-  predict_unused(given, trial, by_region, fit, out);
+  predict_unused(given, other ? &*other : nullptr, trial, by_region, fit, *shared, out);
   if (options.every_sample > 0) answer_samples(one, options.every_sample, fit, out, progress);
   if (options.pictures && by_region.empty()) add_pictures(given, fit, out);
-  if (options.pictures && !by_region.empty()) out.as_one_verdicts = by_palpate(one, fit, progress).verdicts;
+  if (options.pictures) {
+    estimation::FitOptions checked = fit;
+    checked.cross_checks = true;
+    const auto judged = [&](const Prepared& what, MethodAnswer& answer, estimation::FitMemory& memory) {
+      if (!answer.converged) return;
+      estimation::FitOptions from_there = checked;
+      from_there.young_start_pa = answer.young_modulus_pa;
+      from_there.poisson_start = answer.poisson_ratio;
+      answer.verdicts = by_palpate(what, from_there, &memory, progress).verdicts;
+    };
+    judged(given, out.palpate, shared->fine.palpate);
+    if (other) judged(*other, out.other, shared->other.palpate);
+    if (!by_region.empty()) out.as_one_verdicts = by_palpate(one, checked, nullptr, progress).verdicts;
+  }
   if (options.surface_points > 1 && by_region.empty() && std::isfinite(out.paper.young_modulus_pa))
     out.surface = error_surface(given, out.paper, out.young_modulus_pa, options.surface_points, fit, progress);
   return out;

@@ -6,25 +6,16 @@
 #include <string>
 #include <vector>
 
+#include "cli/paper_methods.hpp"
 #include "palpate/core/identification.hpp"
 #include "palpate/core/progress.hpp"
 #include "palpate/lab/paper_scenes.hpp"
 
 namespace palpate::cli {
 
-struct MethodAnswer {
-  double young_modulus_pa = 0, poisson_ratio = 0;
-  double lower_95_pa = 0, upper_95_pa = 0;  ///< NaN: the method has none
-  int solves = 0, iterations = 0;
-  double seconds = 0;
-  bool converged = false;
-  std::vector<FitIteration> path;
-  std::vector<std::string> verdicts;  ///< codes
-};
-
 struct SampleAnswer {
   std::string push;
-  double force_n = 0, travel_m = 0, travel_predicted_m = 0;
+  double force_n = 0, travel_m = 0;
   MethodAnswer paper, palpate;
 };
 
@@ -35,11 +26,23 @@ struct SiteAnswer {
   MethodAnswer paper, palpate;
 };
 
-/// A push at a place that no method has seen, at one of its forces.
+/// What an answer expects at the travel of a step: NaN where it expects nothing.
+struct Expectation {
+  double force_n = 0;
+  double surface_m = 0;  ///< rms of the seen points to the expected surface, under the step's force
+};
+
+/// A push that no method has seen, at one of its forces.
 struct UnusedStep {
-  double force_n = 0, travel_m = 0;                         ///< true force, measured travel
-  double force_paper_n = 0, force_palpate_n = 0;            ///< that each answer expects at this travel
-  double surface_paper_m = 0, surface_palpate_m = 0, surface_still_m = 0;  ///< rms of the seen points to the expected surface
+  double force_n = 0, travel_m = 0;  ///< true force, measured travel (NaN: it says nothing)
+  Expectation paper, palpate, other;
+  double surface_still_m = 0;  ///< rms of the seen points to the surface at rest
+};
+
+/// What the sensors of a loaded step read.
+struct ForceReading {
+  std::string push;
+  double force_n = 0, travel_m = 0;
 };
 
 /// The seen points of the hardest step laid on the surface that an E gives.
@@ -48,7 +51,7 @@ struct RegistrationPicture {
   Points simulated_m, registered_m;  ///< thinned
 };
 
-/// The paper's error function over (E, nu), m2; rows = E.
+/// The paper's error function over (E, nu), m2; rows = E. One column, of the nu that was found, where a solve is dear.
 struct ErrorSurface {
   VectorX young_modulus_pa, poisson_ratio;
   MatrixX error_m2;
@@ -61,7 +64,10 @@ struct TrialAnswer {
   double young_modulus_pa = 0, poisson_ratio = 0;  ///< the truth
   Index tetrahedra = 0;
   MethodAnswer paper, palpate;
-  MethodAnswer paper_coarse;                  ///< the paper's method on linear tetrahedra of the same mesh
+  MethodAnswer paper_coarse;                  ///< the paper's method on linear tetrahedra of the same mesh; may be left out
+  std::string other_law;                      ///< that palpate fitted as well; empty: none
+  MethodAnswer other;
+  std::vector<ForceReading> readings;
   std::vector<SiteAnswer> sites;              ///< only of an object with regions
   std::vector<std::string> as_one_verdicts;   ///< of ours when it takes such an object for homogeneous; only where asked for
   std::vector<UnusedStep> unused;
@@ -73,10 +79,17 @@ struct TrialAnswer {
 struct TrialOptions {
   int every_sample = 0;    ///< alone: 1 = each, 2 = every second, ...; 0 = none
   int surface_points = 0;  ///< a side of the error surface; 0 = none
-  bool pictures = false;   ///< registrations, and what ours says of an object with regions that it is not told of
+  bool pictures = false;   ///< registrations, verdicts, and what ours says of an object with regions that it is not told of
   int threads = 1;
 };
 
-TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, const OnProgress& progress);
+/// What all seeds of a scene share.
+struct SharedModels {
+  SharedModel fine, linear, other;
+};
+
+/// @param shared  used and filled; nullptr: nothing is kept
+TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
+                      const OnProgress& progress);
 
 }  // namespace palpate::cli

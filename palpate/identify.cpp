@@ -11,7 +11,6 @@
 #include "palpate/core/version.hpp"
 #include "palpate/estimation/fit_on_fine_mesh.hpp"
 #include "palpate/estimation/paper_method.hpp"
-#include "palpate/estimation/shape_error.hpp"
 #include "palpate/estimation/unseen_side.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/regions.hpp"
@@ -172,21 +171,6 @@ void fill_with_tetrahedra(Recording& recording, reconstruction::Completion compl
   recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
 }
 
-/// What else may stand where nobody looked: all that was hidden, and less than what is fitted.
-estimation::ShapeDoubt shape_doubt(const Recording& given, double unseen) {
-  estimation::ShapeDoubt doubt;
-  doubt.unseen_share = unseen;
-  for (const auto completion : {reconstruction::Completion::tapered, reconstruction::Completion::planar, reconstruction::Completion::hidden}) {
-    Recording recording = given;
-    try {
-      auto object = build_simulated_object(recording, {}, completion);
-      doubt.shapes.push_back({std::move(recording), std::move(object)});
-    } catch (const Error&) {  // such a shape falls apart or encloses nothing: it is none that may stand there
-    }
-  }
-  return doubt;
-}
-
 std::map<std::string, std::string> provenance(const Recording& recording, const IdentifyOptions& options) {
   std::map<std::string, std::string> said{{"version", version},
                                           {"recording", recording.name},
@@ -312,6 +296,28 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
   return object;
 }
 
+double drop_unseen_side(const Recording& built, const std::vector<char>& seen, estimation::Inputs& observed) {
+  if (seen.empty()) return 0;
+  const double unseen = estimation::unseen_share(*built.rest.surface, seen, hiding_plane(built));
+  if (unseen <= most_unseen) return 0;
+  estimation::drop_unseen(*built.rest.surface, seen, observed);
+  return unseen;
+}
+
+estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share) {
+  estimation::ShapeDoubt doubt;
+  doubt.unseen_share = unseen_share;
+  for (const auto completion : {reconstruction::Completion::tapered, reconstruction::Completion::planar, reconstruction::Completion::hidden}) {
+    Recording recording = given;
+    try {
+      auto object = build_simulated_object(recording, {}, completion);
+      doubt.shapes.push_back({std::move(recording), std::move(object)});
+    } catch (const Error&) {  // such a shape falls apart or encloses nothing: it is none that may stand there
+    }
+  }
+  return doubt;
+}
+
 Identified identify(const Recording& given, const IdentifyOptions& options, const OnProgress& progress) {
   Recording recording = with_overrides(given, options);
   if (options.method == "paper") recording.regions.clear();  // the paper fits one stiffness
@@ -322,13 +328,8 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   estimation::SimulatedObject object =
       build_simulated_object(recording, progress, reconstruction::Completion::mirrored, &seen);  // sec. IV-C: tetrahedral model
   std::optional<estimation::ShapeDoubt> doubt;
-  if (!seen.empty()) {
-    const double unseen = estimation::unseen_share(*recording.rest.surface, seen, hiding_plane(recording));
-    if (unseen > most_unseen) {
-      estimation::drop_unseen(*recording.rest.surface, seen, observed);
-      if (options.method != "paper") doubt = shape_doubt(as_given, unseen);
-    }
-  }
+  const double unseen = drop_unseen_side(recording, seen, observed);
+  if (unseen > 0 && options.method != "paper") doubt = other_shapes(as_given, unseen);
   Identified out;
   out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
                    ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)

@@ -5,11 +5,13 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "palpate/core/identification.hpp"
 #include "palpate/core/progress.hpp"
 #include "palpate/core/recording.hpp"
 #include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/shape_error.hpp"
 #include "palpate/reconstruction/fuse_views.hpp"
 
 namespace palpate {
@@ -52,5 +54,14 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
 estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress = {},
                                                    reconstruction::Completion completion = reconstruction::Completion::mirrored,
                                                    std::vector<char>* seen = nullptr);
+
+/// Stage 3, of an object that views leave partly unseen: takes out the rays that show what no view of it at rest showed, for a
+/// guess is nothing to compare with. Returns the share of its surface that was not seen; 0 where that is too little to matter.
+/// @param built  the recording as build_simulated_object left it, with `seen`
+double drop_unseen_side(const Recording& built, const std::vector<char>& seen, estimation::Inputs& observed);
+
+/// What else may stand where nobody looked: all that was hidden, and less than what is fitted.
+/// @param given  the recording before its object was built
+estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share);
 
 }  // namespace palpate

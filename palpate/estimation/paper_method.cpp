@@ -74,10 +74,22 @@ struct PaperError::Impl {
 };
 
 PaperError::PaperError(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
-                       const FitOptions& options)
+                       const FitOptions& options, FitMemory* memory)
     : impl_(std::make_unique<Impl>()) {
   const fem::StaticsOptions statics = statics_options(recording, object, options);
-  impl_->model = std::make_unique<ForwardModel>(recording, object, impl_->unknowns, statics);
+  FitMemory here;
+  if (memory == nullptr) memory = &here;
+  if (options.young_start_pa) {
+    impl_->start_pa = *options.young_start_pa;
+  } else {  // the same start as the other method's, so that only the methods differ
+    Unknowns list;
+    ForwardModel model(recording, object, list, statics, memory->model);
+    memory->model = model.solved();
+    Objective objective(model, inputs, list);
+    impl_->start_pa = std::exp(find_start(objective, options.poisson_start)(log_young));
+  }
+  impl_->model = std::make_unique<ForwardModel>(recording, object, impl_->unknowns, statics, memory->model);
+  memory->model = impl_->model->solved();
   std::vector<std::size_t> with_points;
   for (std::size_t s = 0; s < inputs.size(); ++s) {
     if (points_of(inputs[s]).rows() > 0) with_points.push_back(s);
@@ -94,14 +106,6 @@ PaperError::PaperError(const Recording& recording, const SimulatedObject& object
     impl_->count += static_cast<std::size_t>(impl_->points.back().rows());
   }
   impl_->tree = std::make_unique<geometry::TriangleTree>(vertices_only(object.surface.rest().vertices_m));
-  if (options.young_start_pa) {
-    impl_->start_pa = *options.young_start_pa;
-  } else {  // the same start as the other method's, so that only the methods differ
-    Unknowns list;
-    ForwardModel model(recording, object, list, statics);
-    Objective objective(model, inputs, list);
-    impl_->start_pa = std::exp(find_start(objective, options.poisson_start)(log_young));
-  }
 }
 
 PaperError::~PaperError() = default;
@@ -125,9 +129,9 @@ double PaperError::operator()(double young_modulus_pa, double poisson_ratio) {
 }
 
 Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
-                               const FitOptions& options, const OnProgress& progress) {
+                               const FitOptions& options, const OnProgress& progress, FitMemory* memory) {
   check(options);
-  PaperError error(recording, object, inputs, options);
+  PaperError error(recording, object, inputs, options, memory);
   const double nu_low = recording.model.poisson_lower, nu_high = recording.model.poisson_upper;
   const bool nu_moves = !recording.model.poisson_fixed;
   constexpr double difference = 1e-3;  // of log E and nu in the numerical derivatives

@@ -11,14 +11,16 @@ namespace palpate::estimation {
 /// Most samples (steps) that the baseline uses jointly, evenly spread: it re-simulates every one several times an iteration.
 inline constexpr std::size_t paper_samples = 10;
 
+/// @param memory  used and filled, as by `fit`; nullptr: nothing is kept
 /// @throws Error when no step has a point cloud or a depth image: the paper's method knows no other observation.
 Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
-                               const FitOptions& options, const OnProgress& progress = {});
+                               const FitOptions& options, const OnProgress& progress = {}, FitMemory* memory = nullptr);
 
 /// Its error function (m^2, mean over points) at given parameters: for grid searches.
 class PaperError {
  public:
-  PaperError(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options);
+  PaperError(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
+             FitMemory* memory = nullptr);
   ~PaperError();
   /// Infinity where a sample has no equilibrium.
   double operator()(double young_modulus_pa, double poisson_ratio);

@@ -1,27 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/lab/paper_scenes.hpp"
 
-#include <array>
+#include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "palpate/acquisition/push_protocol.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/lab/object.hpp"
 #include "palpate/lab/robot.hpp"
 
 namespace palpate::lab {
 namespace {
 
-constexpr int samples = 7;  // a site, as with the balloon and the teddy bear (section VII)
+/// How deep a push goes, and in which steps of force.
+struct Depth {
+  double travel_m = 0, force_step_n = 0;
+  int samples = 0;  ///< at most
+};
 
-// One push of `samples` rising forces. False: the user has had enough.
-bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, double force_step_n, Push& push, std::vector<double>* true_force_n,
+Depth depth_of(const PaperScene& scene, const LabObject& object, const PushSite& site) {
+  if (scene.travel_m == 0)  // a step of the object is a quarter of the way to its limit
+    return {object.travel_limit_m, object.force_step_at(site) * 4 / scene.samples, scene.samples + 1};
+  // Deep in a block, the curve of a soft pad is nearly straight, at about half the slope of its start on a half space.
+  const double start_n_m = 2 * object.pad_radius_m * object.young_modulus_pa / (1 - object.poisson_ratio * object.poisson_ratio);
+  return {scene.travel_m, 0.5 * start_n_m * scene.travel_m / scene.samples, scene.samples};
+}
+
+// One push of rising forces. False: the user has had enough.
+bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& depth, Push& push, std::vector<double>* true_force_n,
              const OnProgress& progress, double done, double share) {
   acquisition::PushOptions protocol;
-  protocol.travel_limit_m = robot.object().travel_limit_m;
+  protocol.travel_limit_m = depth.travel_m;
   protocol.unloading_steps = 0;
-  // A step of the object is a quarter of the way to its limit.
-  protocol.force_step_n = force_step_n * 4 / samples;
+  protocol.force_step_n = depth.force_step_n;
+  protocol.force_limit_n = std::max(protocol.force_limit_n, 2 * depth.samples * depth.force_step_n);  // travel is what ends it
   // A soft animal pushes back with less than the usual threshold; noise still counts for more.
   protocol.contact.threshold_n = std::min(protocol.contact.threshold_n, 0.2 * protocol.force_step_n);
   std::vector<Step> steps;
@@ -34,12 +45,32 @@ bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, double force_st
         if (true_force_n != nullptr) true_force_n->push_back(robot.true_force_n());
       },
       [&] {
-        const double part = std::min(1.0, static_cast<double>(steps.size()) / (samples + 1));
+        const double part = std::min(1.0, static_cast<double>(steps.size()) / (depth.samples + 1));
         wanted = !progress || progress("pushing", done + share * part);
-        return wanted;
+        return wanted && static_cast<int>(steps.size()) <= depth.samples;
       });
   push.steps = std::move(steps);
+  // Sideways the tip is where the plan puts it; one place then serves all seeds.
+  for (Step& step : push.steps)
+    for (Load& load : step.loads) load.contact_m = plan.contact_m;
   return wanted;
+}
+
+bool presses(const Step& step) { return !step.loads.empty(); }
+
+// From the sample `first` on (the unloaded step is number 0) the tip was elsewhere, and what the arm's encoders read has come
+// deeper by what it lost; the recording goes on saying the first place.
+void slip(Push& push, const Push& aside, std::size_t first, double deeper_m) {
+  push.steps.resize(std::min(push.steps.size(), first));
+  const Vec3 contact_m = push.steps.back().loads.empty() ? Vec3::Zero() : push.steps.back().loads[0].contact_m;
+  for (std::size_t s = first; s < aside.steps.size(); ++s) {
+    Step step = aside.steps[s];
+    for (Load& load : step.loads) load.contact_m = contact_m;
+    if (presses(step))
+      for (Observation& observation : step.observations)
+        if (auto* travel = std::get_if<ToolTravel>(&observation)) travel->travel_m += deeper_m;
+    push.steps.push_back(std::move(step));
+  }
 }
 
 double young_at(const LabObject& object, const PushSite& site) {
@@ -48,78 +79,103 @@ double young_at(const LabObject& object, const PushSite& site) {
   return object.young_modulus_pa;
 }
 
-// clang-format off
-constexpr std::array<PaperScene, 4> table{{
-    {"cow", "Simulated test on a four-legged animal", "3, 4",
-     "E = 1000 N/m2 and nu = 0.3 are found again; the error over (E, nu) is convex around them.",
-     "The animal is the lab's own; the pad is soft and 15 mm in radius, the paper pushed at a point.",
-     "animal", "realsense_l515", "ideal", 1000, 0.3, 1, 0, 0, {0.03, 0, 0.1}, {0, -0.5, -0.866}},
-    {"cube", "Foam cube of 15 cm, time-of-flight camera", "5, 6",
-     "Force over travel is nearly straight; E varies little over the samples. No true E is known.",
-     "The pad goes 12 mm deep in seven samples, not 9 cm in nine; no slip at the start.",
-     "cube", "time_of_flight", "schunk_ftcl_050", 0, 0, 1, 1, 0, {0.03, 0, 0.15}, {0, 0, -1}},
-    {"balloon", "Balloon seen once by a stereo camera, back side completed", "1, 7, 8",
-     "Seven forces, 815 tetrahedra, 192.5 s and 7 iterations for a force-displacement sample.",
-     "A solid ball stands in for the balloon: a pressurised shell has no Young's modulus to compare with.",
-     "ball", "bumblebee", "schunk_ftcl_050", 0, 0, 1, 1, 1, {0, 0, 0.052}, {0.5, 0, -0.866}},
-    {"teddy", "Teddy bear at head, belly and back, stereo camera", "9, 10",
-     "E differs more between the sites than within them: the bear is not homogeneous.",
-     "Here its head is 1.4 times as stiff as its belly and its back 1.4 times as soft, and that is known.",
-     "bear", "bumblebee", "schunk_ftcl_050", 0, 0, 1.4, 0, 0, {0.03, 0, 0.09}, {-0.4, 0.6, -0.69}},
-}};
-// clang-format on
-
-}  // namespace
-
-PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const OnProgress& progress) {
+LabObject object_of(const PaperScene& scene, std::uint64_t seed) {
   ObjectOptions truth;
   truth.seed = seed;
-  truth.material = "linear";  // the paper's law at small strains
+  truth.material = scene.true_law;
   if (scene.young_modulus_pa > 0) truth.young_modulus_pa = scene.young_modulus_pa;
   if (scene.poisson_ratio > 0) truth.poisson_ratio = scene.poisson_ratio;
   truth.region_ratio = scene.region_ratio;
+  LabObject object = scene.make != nullptr ? scene.make(truth) : make_object(scene.object, truth);
+  if (scene.sites > 0) object.sites.resize(static_cast<std::size_t>(scene.sites));
+  return object;
+}
+
+// A second pad presses back from below, as hard. The ball between them moves with half of the travel, against the camera: every
+// image's pose holds that, and the encoders' travel says nothing of it.
+void say_free(Recording& recording, double foot_z_m, double travel_m) {
+  recording.free = true;
+  recording.supports.clear();
+  Tool post = recording.tools.front();
+  post.name = "post";
+  recording.tools.push_back(post);
+  for (Push& push : recording.pushes)
+    for (Step& step : push.steps) {
+      std::erase_if(step.observations, [](const Observation& one) { return std::holds_alternative<ToolTravel>(one); });
+      for (Observation& one : step.observations)
+        if (auto* image = std::get_if<DepthFrame>(&one)) image->pose_std_m = std::max(image->pose_std_m, 0.5 * travel_m);
+      if (!presses(step)) continue;
+      Load back = step.loads.front();
+      back.tool = post.name;
+      back.force_n = -*back.force_n;
+      back.direction *= -1;
+      back.contact_m.z() = foot_z_m;
+      step.loads.push_back(back);
+    }
+}
+
+void tilt_cameras(Recording& recording, double tilt_rad) {
+  for (Push& push : recording.pushes)
+    for (Step& step : push.steps)
+      for (Observation& one : step.observations)
+        if (auto* image = std::get_if<DepthFrame>(&one)) image->T_base_camera.rotate(Eigen::AngleAxisd(tilt_rad, Vec3::UnitX()));
+}
+
+}  // namespace
+
+PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const OnProgress& progress, const PaperFault& fault) {
   LabOptions options;
   options.seed = seed;
   options.depth = depth_sensor(scene.depth_sensor);
   options.force = force_sensor(scene.force_sensor);
   if (scene.force_sensor == "ideal") options.relaxation = 0;
-  LabObject object = make_object(scene.object, truth);
-  if (scene.sites > 0) object.sites.resize(static_cast<std::size_t>(scene.sites));
-  const PushSite unused = place_on(object, "unused", Vec3(scene.unused_aim_m.data()), Vec3(scene.unused_direction.data()));
+  LabObject object = object_of(scene, seed);
+  const PushSite again = object.sites.back();
+  const PushSite unused = scene.unused ? place_on(object, "unused", Vec3(scene.unused->aim_m.data()), Vec3(scene.unused->direction.data()))
+                                       : again;
   LabRobot robot(options, std::move(object));
-  const std::size_t sites = robot.object().sites.size();
+  const std::vector<PushSite> sites = robot.object().sites;
   PaperTrial trial;
   trial.recording = robot.scene();
-  trial.young_modulus_pa = young_at(robot.object(), robot.object().sites.front());
+  trial.recording.model.material = scene.law;
+  trial.young_modulus_pa = young_at(robot.object(), sites.front());
   trial.poisson_ratio = robot.object().poisson_ratio;
-  if (scene.views > 0) {
+  if (scene.shape != PaperShape::given) {
     trial.recording.rest.surface.reset();
-    trial.recording.rest.views = robot.look_around(scene.views);
+    trial.recording.rest.views = robot.look_from({{scene.view_azimuth_rad, scene.view_elevation_rad}});
   }
-  const double share = 1 / static_cast<double>(sites + 1);
-  for (std::size_t s = 0; s < sites; ++s) {
-    const PushSite site = robot.object().sites[s];
+  const double slip_m = scene.slip_m + fault.slip_m, deeper_m = scene.slip_deeper_m + fault.slip_deeper_m;
+  const double share = 1 / static_cast<double>(sites.size() + 1);
+  for (std::size_t s = 0; s < sites.size(); ++s) {
     Push push;
-    if (!push_at(robot, robot.plan(s), robot.object().force_step_at(site), push, nullptr, progress, share * static_cast<double>(s), share))
-      return trial;
+    Depth depth = depth_of(scene, robot.object(), sites[s]);
+    const int before_slip = scene.slip_m > 0 ? 1 : (depth.samples + 1) / 2;
+    const int all = depth.samples;
+    if (slip_m > 0) depth.samples = before_slip;
+    if (!push_at(robot, robot.plan(s), depth, push, nullptr, progress, share * static_cast<double>(s), share)) return trial;
+    if (slip_m > 0) {
+      Push aside;
+      depth.samples = all;
+      const Vec3 place_m = sites[s].contact_m + slip_m * acquisition::tip_along(sites[s].direction).col(0);
+      if (!push_at(robot, robot.plan_at(place_m, sites[s].direction), depth, aside, nullptr, progress, share * static_cast<double>(s), share))
+        return trial;
+      slip(push, aside, static_cast<std::size_t>(before_slip) + 1, deeper_m);
+    }
     trial.recording.pushes.push_back(std::move(push));
-    trial.site_young_pa.push_back(young_at(robot.object(), site));
+    trial.site_young_pa.push_back(young_at(robot.object(), sites[s]));
   }
-  const double step_n = robot.object().force_step_at(robot.object().sites.front());
-  push_at(robot, robot.plan_at(unused.contact_m, unused.direction), 0.8 * step_n, trial.unused, &trial.unused_force_n, progress,
-          1 - share, share);
+  Depth depth = depth_of(scene, robot.object(), sites.front());
+  depth.force_step_n *= scene.unused ? 0.8 : 0.93;  // other forces than those of the fit
+  push_at(robot, robot.plan_at(unused.contact_m, unused.direction), depth, trial.unused, &trial.unused_force_n, progress, 1 - share, share);
+  if (trial.recording.supports.empty()) {
+    trial.recording.pushes.push_back(std::move(trial.unused));  // for as long as both are made free
+    say_free(trial.recording, robot.object().foot_m.z(), depth.travel_m);
+    trial.unused = std::move(trial.recording.pushes.back());
+    trial.recording.pushes.pop_back();
+  }
+  if (fault.camera_tilt_rad != 0) tilt_cameras(trial.recording, fault.camera_tilt_rad);
+  trial.recording.tools.front().radius_m *= fault.said_radius;
   return trial;
-}
-
-std::span<const PaperScene> paper_scenes() { return table; }
-
-const PaperScene& paper_scene(std::string_view name) {
-  std::string names;
-  for (const PaperScene& scene : table) {
-    if (scene.name == name) return scene;
-    names += (names.empty() ? "" : ", ") + std::string(scene.name);
-  }
-  throw Error("is no scene of the paper; there are: " + names, "--scene " + std::string(name));
 }
 
 }  // namespace palpate::lab

@@ -122,13 +122,15 @@ bool holds(const Support& support, const TetMesh& mesh, const Tetrahedra& faces,
 struct PressedObject::Impl {
   explicit Impl(const PressedObjectOptions& given) : options(given) {
     if (std::abs(options.direction.norm() - 1) > 1e-6) throw Error("must have unit length", "PressedObjectOptions.direction");
-    if (options.supports.empty()) throw Error("the object must be held", "PressedObjectOptions.supports");
+    if (options.supports.empty() != options.opposed_m.has_value())
+      throw Error("the object must be held, by supports or by an opposed pad", "PressedObjectOptions.supports");
     if (!(options.pad_radius_m > 0)) throw Error("must be positive", "PressedObjectOptions.pad_radius_m");
     if (options.cells_in_radius < 1) throw Error("must be at least 1", "PressedObjectOptions.cells_in_radius");
     geometry::TetrahedraliseOptions filling;
     filling.tetrahedra = options.tetrahedra;
     filling.finer.push_back(
         {options.contact_m, 1.5 * options.pad_radius_m, options.pad_radius_m / options.cells_in_radius});
+    if (options.opposed_m) filling.finer.push_back({*options.opposed_m, filling.finer[0].radius_m, filling.finer[0].edge_m});
     const auto flat = [](const Support& one) { return one.kind == SupportKind::plane; };
     for (const Support& support : options.supports)
       if (flat(support))
@@ -150,15 +152,18 @@ struct PressedObject::Impl {
           for (int k = 0; k < 6; ++k) held[std::size_t(faces(f, k))] = 1;
     for (Index n = 0; n < Index(held.size()); ++n)
       if (held[std::size_t(n)]) boundary.constraints.push_back({n, Mat3::Identity(), 3});
-    if (boundary.constraints.empty()) throw Error("no support touches the object", "PressedObjectOptions.supports");
+    boundary.inertia_relief = options.opposed_m.has_value();
+    if (boundary.constraints.empty() && !options.opposed_m) throw Error("no support touches the object", "PressedObjectOptions.supports");
     curve_boundary(mesh, options.surface, held);
 
     const Eigen::SparseMatrix<double> columns = fem::spread_over_patch(mesh, options.contact_m, options.pad_radius_m);
-    const VectorX along = columns * options.direction;  // per newton
-    share = VectorX::Zero(mesh.nodes_m.rows());
-    for (int k = 0; k < columns.outerSize(); ++k)
-      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, k); it; ++it)
-        if (k == 0 && it.row() % 3 == 0) share(it.row() / 3) = it.value();
+    VectorX along = columns * options.direction;  // per newton
+    share = shares_of(columns);
+    if (options.opposed_m) {
+      const Eigen::SparseMatrix<double> back = fem::spread_over_patch(mesh, *options.opposed_m, options.pad_radius_m);
+      along -= back * options.direction;
+      opposed_share = shares_of(back);
+    }
     boundary.forces = MatrixX(along).sparseView();
 
     fem::StaticsOptions statics_options;
@@ -178,6 +183,14 @@ struct PressedObject::Impl {
     embedding = geometry::embed(options.surface.vertices_m, corners);
   }
 
+  // Of a patch's force, a node.
+  static VectorX shares_of(const Eigen::SparseMatrix<double>& columns) {
+    VectorX shares = VectorX::Zero(columns.rows() / 3);
+    for (Eigen::SparseMatrix<double>::InnerIterator it(columns, 0); it; ++it)
+      if (it.row() % 3 == 0) shares(it.row() / 3) = it.value();
+    return shares;
+  }
+
   void press(double force_n) {
     const VectorX coefficient = VectorX::Constant(1, force_n), none(0);
     const VectorX extra = Eigen::Map<const VectorX>(options.extra.data(), Eigen::Index(options.extra.size()));
@@ -192,12 +205,13 @@ struct PressedObject::Impl {
     at_n = force_n;
   }
 
-  double travel_m() const {
-    double travel = 0;
-    for (Eigen::Index n = 0; n < share.size(); ++n)
-      if (share(n) != 0) travel += share(n) * displacement_m.segment<3>(3 * n).dot(options.direction);
-    return travel;
+  double moved_m(const VectorX& shares) const {
+    double moved = 0;
+    for (Eigen::Index n = 0; n < shares.size(); ++n)
+      if (shares(n) != 0) moved += shares(n) * displacement_m.segment<3>(3 * n).dot(options.direction);
+    return moved;
   }
+  double travel_m() const { return moved_m(share) - moved_m(opposed_share); }
 
   TriMesh surface() const {
     TriMesh moved = options.surface;
@@ -211,12 +225,13 @@ struct PressedObject::Impl {
       for (int m = 0; m < 6; ++m) add(4 + m, 4 * l(edges[std::size_t(m)][0]) * l(edges[std::size_t(m)][1]));
       moved.vertices_m.row(v) += u;
     }
+    moved.vertices_m.rowwise() -= moved_m(opposed_share) * options.direction.transpose();  // that pad stands still
     return moved;
   }
 
   PressedObjectOptions options;
   TetMesh mesh;
-  VectorX share;           // of the pad's force, a node
+  VectorX share, opposed_share;  // of the pads' forces, a node; the second one empty: none
   VectorX displacement_m;  // empty = at rest
   double at_n = 0;
   SurfaceEmbedding embedding;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,13 +29,16 @@ struct PressedObjectOptions {
   double young_modulus_pa = 15e3, poisson_ratio = 0.3;
   std::vector<double> extra;                         ///< further parameters of the material, in its table's order
   std::vector<TrueRegion> regions;                   ///< empty = young_modulus_pa everywhere
+  /// A second pad that stands still at this place of the surface and presses back: nothing else holds the object then, and
+  /// travel is by how much the pads come nearer. Supports must be empty.
+  std::optional<Vec3> opposed_m;
   Index tetrahedra = 5000;                           ///< before refinement under the pad
   int cells_in_radius = 4;                           ///< edges across the pad's radius
 };
 
 class PressedObject : public Pressed {
  public:
-  /// @throws Error when the surface cannot be filled, or no support holds it.
+  /// @throws Error when the surface cannot be filled, or nothing holds it, or more than the opposed pad.
   explicit PressedObject(const PressedObjectOptions& options);
   ~PressedObject() override;
   void press(double force_n) override;

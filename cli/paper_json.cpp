@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/paper_json.hpp"
+
+namespace palpate::cli {
+namespace {
+
+nlohmann::json json_of(const MethodAnswer& answer) {
+  return {{"young_modulus_pa", answer.young_modulus_pa}, {"lower_95_pa", answer.lower_95_pa}, {"upper_95_pa", answer.upper_95_pa},
+          {"poisson_ratio", answer.poisson_ratio},       {"solves", answer.solves},           {"iterations", answer.iterations},
+          {"seconds", answer.seconds},                   {"converged", answer.converged},     {"verdicts", answer.verdicts}};
+}
+
+nlohmann::json json_of(const TrialAnswer& trial) {
+  nlohmann::json out = {{"seed", trial.seed},
+                        {"true_young_modulus_pa", trial.young_modulus_pa},
+                        {"true_poisson_ratio", trial.poisson_ratio},
+                        {"tetrahedra", trial.tetrahedra},
+                        {"paper", json_of(trial.paper)},
+                        {"paper_linear_tetrahedra", json_of(trial.paper_coarse)},
+                        {"palpate", json_of(trial.palpate)}};
+  if (!trial.other_law.empty()) out["palpate_" + trial.other_law] = json_of(trial.other);
+  for (const ForceReading& reading : trial.readings)
+    out["readings"].push_back({{"push", reading.push}, {"force_n", reading.force_n}, {"travel_m", reading.travel_m}});
+  for (const SiteAnswer& site : trial.sites)
+    out["sites"].push_back({{"site", site.site},
+                            {"true_young_modulus_pa", site.young_modulus_pa},
+                            {"paper", json_of(site.paper)},
+                            {"palpate", json_of(site.palpate)}});
+  if (!trial.as_one_verdicts.empty()) out["verdicts_without_regions"] = trial.as_one_verdicts;
+  for (const UnusedStep& step : trial.unused)
+    out["unused_place"].push_back({{"force_n", step.force_n},
+                                   {"travel_m", step.travel_m},
+                                   {"force_paper_n", step.paper.force_n},
+                                   {"force_palpate_n", step.palpate.force_n},
+                                   {"force_other_law_n", step.other.force_n},
+                                   {"surface_rms_m",
+                                    {{"paper", step.paper.surface_m},
+                                     {"palpate", step.palpate.surface_m},
+                                     {"other_law", step.other.surface_m},
+                                     {"still", step.surface_still_m}}}});
+  for (const RegistrationPicture& picture : trial.pictures)
+    out["registrations"].push_back({{"young_modulus_pa", picture.young_modulus_pa}, {"rms_m", picture.rms_m}});
+  for (const SampleAnswer& sample : trial.samples)
+    out["samples"].push_back({{"push", sample.push},
+                              {"force_n", sample.force_n},
+                              {"travel_m", sample.travel_m},
+                              {"paper", json_of(sample.paper)},
+                              {"palpate", json_of(sample.palpate)}});
+  if (trial.surface.error_m2.size() > 0)
+    out["grid_search"] = {{"smallest_m2", trial.surface.smallest_m2()}, {"at_found_m2", trial.surface.at_found_m2}};
+  return out;
+}
+
+nlohmann::json json_of(const Score& score) {
+  return {{"bias_percent", score.bias_percent}, {"rms_percent", score.rms_percent}, {"poisson_bias", score.poisson_bias},
+          {"poisson_rms", score.poisson_rms},   {"inside_95", score.inside_95},     {"with_interval", score.with_interval},
+          {"without_answer", score.without},
+          {"solves", score.solves},             {"seconds", score.seconds}};
+}
+
+}  // namespace
+
+nlohmann::json json_of(const SceneAnswers& answers) {
+  nlohmann::json out = {{"scene", answers.scene->name}, {"apparent_modulus", answers.scene->apparent}, {"trials", nlohmann::json::array()}};
+  for (const TrialAnswer& trial : answers.trials) {
+    out["trials"].push_back(json_of(trial));
+    if (!answers.scene->apparent) continue;
+    out["trials"].back().erase("true_young_modulus_pa");
+    out["trials"].back().erase("true_poisson_ratio");
+  }
+  if (answers.scene->apparent) return out;
+  const SceneScores scores = scores_of(answers.trials);
+  out["scores"] = {{"paper", json_of(scores.paper)},
+                   {"paper_linear_tetrahedra", json_of(scores.paper_coarse)},
+                   {"palpate", json_of(scores.palpate)}};
+  return out;
+}
+
+nlohmann::json json_of(const StudyAnswer& answer) {
+  nlohmann::json out = {{"study", answer.study->name}, {"seed", answer.seed}, {"rows", nlohmann::json::array()}};
+  for (const StudyRow& row : answer.rows)
+    out["rows"].push_back({{"what", row.what},
+                           {"true_young_modulus_pa", row.young_modulus_pa},
+                           {"true_poisson_ratio", row.poisson_ratio},
+                           {"paper", json_of(row.paper)},
+                           {"palpate", json_of(row.palpate)}});
+  return out;
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/paper_methods.hpp"
+
+#include <chrono>
+#include <limits>
+
+#include "palpate/estimation/paper_method.hpp"
+
+namespace palpate::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+}  // namespace
+
+MethodAnswer no_answer() {
+  MethodAnswer out;
+  out.young_modulus_pa = out.poisson_ratio = out.lower_95_pa = out.upper_95_pa = std::numeric_limits<double>::quiet_NaN();
+  return out;
+}
+
+MethodAnswer summary(const Identification& answer, double seconds) {
+  MethodAnswer out = no_answer();
+  out.solves = answer.fit.solves;
+  out.iterations = answer.fit.iterations;
+  out.seconds = seconds;
+  for (const Verdict& verdict : answer.verdicts) out.verdicts.push_back(verdict.code);
+  // Stopped, or without an equilibrium at its start: where it stood then is no answer.
+  if (answer.parameters.size() < 2 || answer.termination == Termination::failed) return out;
+  const Parameter &young = answer.parameters[0], &poisson = answer.parameters[1];
+  out.young_modulus_pa = young.value;
+  out.poisson_ratio = poisson.value;
+  out.lower_95_pa = young.lower_95;
+  out.upper_95_pa = young.upper_95;
+  out.converged = answer.termination == Termination::converged;
+  out.path = answer.trace;
+  return out;
+}
+
+MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
+                      const OnProgress& progress) {
+  const auto start = Clock::now();
+  const Identification answer = estimation::fit_as_in_paper(given.recording, given.object, given.inputs, options, progress, memory);
+  return summary(answer, seconds_since(start));
+}
+
+MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
+                        const OnProgress& progress, Identification* whole) {
+  const auto start = Clock::now();
+  Identification answer = estimation::fit(given.recording, given.object, given.inputs, options, progress, given.finer.get(), memory,
+                                          given.doubt.get());
+  const MethodAnswer out = summary(answer, seconds_since(start));
+  if (whole != nullptr) *whole = std::move(answer);
+  return out;
+}
+
+}  // namespace palpate::cli

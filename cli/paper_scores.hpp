@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Errors of both methods over the seeds of a scene, and what the evaluation has to show.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/paper_trial.hpp"
+
+namespace palpate::cli {
+
+struct SceneAnswers {
+  const lab::PaperScene* scene = nullptr;
+  std::vector<TrialAnswer> trials;  ///< the first one has samples and error surface
+};
+
+/// Of a method over the trials of a scene. Trials without an answer count as such and are in no mean.
+struct Score {
+  int answers = 0, without = 0, with_interval = 0, inside_95 = 0;
+  double bias_percent = 0, rms_percent = 0;  ///< of log E; NaN: no answer at all
+  double poisson_bias = 0, poisson_rms = 0;
+  double solves = 0, seconds = 0;            ///< means
+};
+struct SceneScores {
+  Score paper, paper_coarse, palpate, other;
+};
+/// Of an object with regions, every site's E counts.
+SceneScores scores_of(const std::vector<TrialAnswer>& trials);
+
+/// A line of what the evaluation has to show.
+struct Claim {
+  std::string what;
+  bool holds = false;
+  std::string found;
+};
+/// Scenes whose object has no E to compare with are left out. Empty: there is no other.
+std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes);
+
+}  // namespace palpate::cli

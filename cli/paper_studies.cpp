@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/paper_studies.hpp"
+
+#include <array>
+
+#include "palpate/lab/paper_scenes.hpp"
+
+namespace palpate::cli {
+namespace {
+
+estimation::FitOptions options_of(const StudyOptions& study) {
+  estimation::FitOptions fit;
+  fit.threads = study.threads;
+  fit.cross_checks = fit.stresses = false;
+  return fit;
+}
+
+bool wanted(const OnProgress& progress, std::string_view what) { return !progress || progress(what, 0); }
+
+/// One recording on meshes and under loads as the paper had them, up to the program's own.
+std::vector<StudyRow> meshes(const StudyOptions& study, const OnProgress& progress) {
+  constexpr Index paper_tetrahedra = 815;
+  const lab::PaperScene& scene = lab::paper_scene("cube");
+  const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress);
+  struct Model {
+    const char* what;
+    ModelChoice choice;
+  };
+  const std::array<Model, 5> models{{{"815 linear tetrahedra, the force at a point (as in the paper)", {paper_tetrahedra, 0, true, false, true}},
+                                     {"815 linear tetrahedra, the pad's patch", {paper_tetrahedra, 0, true, false, false}},
+                                     {"815 quadratic tetrahedra, the pad's patch", {paper_tetrahedra, 0, false, false, false}},
+                                     {"palpate's mesh with linear tetrahedra, the pad's patch", {0, 0, true, false, false}},
+                                     {"palpate's mesh and the pad's patch", {}}}};
+  std::vector<StudyRow> rows;
+  for (const Model& model : models) {
+    if (!wanted(progress, model.what)) break;
+    const Prepared given = prepare(trial.recording, model.choice, nullptr, progress);
+    rows.push_back({model.what, trial.young_modulus_pa, trial.poisson_ratio, by_paper(given, options_of(study), nullptr, progress),
+                    by_palpate(given, options_of(study), nullptr, progress)});
+  }
+  return rows;
+}
+
+/// What goes wrong without being recorded. Cross-checks are on: it is they who should notice.
+std::vector<StudyRow> faults(const StudyOptions& study, const OnProgress& progress) {
+  const lab::PaperScene& scene = lab::paper_scene("cube");
+  estimation::FitOptions checked = options_of(study);
+  checked.cross_checks = true;
+  std::vector<lab::PaperFault> all{{.name = "none", .title = "nothing"}};
+  all.insert(all.end(), lab::paper_faults().begin(), lab::paper_faults().end());
+  std::vector<StudyRow> rows;
+  for (const lab::PaperFault& fault : all) {
+    if (!wanted(progress, fault.title)) break;
+    const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress, fault);
+    const Prepared given = prepare(trial.recording, choice_of(scene), nullptr, progress);
+    rows.push_back({std::string(fault.title), trial.young_modulus_pa, trial.poisson_ratio,
+                    by_paper(given, options_of(study), nullptr, progress), by_palpate(given, checked, nullptr, progress)});
+  }
+  return rows;
+}
+
+/// Cube and bear, pressed at one site each: their whole shape, and what one image from the front shows of it.
+std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progress) {
+  std::vector<StudyRow> rows;
+  for (const char* name : {"cube", "teddy"}) {
+    lab::PaperScene scene = lab::paper_scene(name);
+    scene.region_ratio = 1;
+    scene.sites = 1;
+    scene.view_azimuth_rad = -2;  // from where the camera watches the push
+    scene.view_elevation_rad = 0.6;
+    for (const auto shape : {lab::PaperShape::given, lab::PaperShape::planar_back, lab::PaperShape::one_view}) {
+      const std::string object(scene.object);
+      const std::string what = object + (shape == lab::PaperShape::given         ? ", its whole shape"
+                                         : shape == lab::PaperShape::planar_back ? ", one view and a planar back side (as in the paper)"
+                                                                                 : ", one view, completed by palpate");
+      if (!wanted(progress, what)) return rows;
+      scene.shape = shape;
+      const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress);
+      const Prepared given = prepare(trial.recording, choice_of(scene), nullptr, progress);
+      // Palpate does not take a planar back side for true.
+      const bool planar = shape == lab::PaperShape::planar_back;
+      rows.push_back({what, trial.young_modulus_pa, trial.poisson_ratio, by_paper(given, options_of(study), nullptr, progress),
+                      planar ? no_answer() : by_palpate(given, options_of(study), nullptr, progress)});
+    }
+  }
+  return rows;
+}
+
+constexpr std::array<Study, 3> table{{
+    {"meshes", "What the paper could not know: mesh and point load",
+     "One recording of the foam cube, fitted on coarse linear tetrahedra with the force at a point, as the paper did, up to palpate's "
+     "own model. Down the rows the method stays and the model changes; across a row the model stays and the method changes.",
+     meshes},
+    {"faults", "What the paper could not know: what goes wrong unnoticed",
+     "The foam cube with one thing wrong at a time, of which the recording says nothing. A verdict that names it is worth more than an "
+     "interval that happens to hold.",
+     faults},
+    {"partial", "A partial model against the whole one",
+     "The paper says that a model of what one view shows, with a planar back side, suffices.", partial},
+}};
+
+}  // namespace
+
+std::span<const Study> studies() { return table; }
+
+const Study* study_of(std::string_view name) {
+  for (const Study& study : table)
+    if (study.name == name) return &study;
+  return nullptr;
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/paper_tables.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "palpate/report/words.hpp"
+
+namespace palpate::cli {
+namespace {
+
+std::string of_truth(double found, double truth) {
+  return std::isfinite(found) ? fmt::format("{} ({:+.0f} %)", pascal(found), 100 * (found / truth - 1)) : "none";
+}
+
+std::string interval(const MethodAnswer& answer) {
+  return std::isfinite(answer.lower_95_pa) ? report::interval(answer.lower_95_pa, answer.upper_95_pa, "Pa") : "none";
+}
+
+std::string number(double value, const char* format) { return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "none"; }
+
+std::string score_row(const std::string& method, const Score& score, bool with_intervals) {
+  const std::string held = with_intervals ? fmt::format("{} of {}", score.inside_95, score.with_interval) : "none";
+  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                     method, number(score.bias_percent, "{:+.1f} %"), number(score.rms_percent, "{:.1f} %"),
+                     number(score.poisson_bias, "{:+.3f}"), number(score.poisson_rms, "{:.3f}"), held, score.without,
+                     number(score.solves, "{:.0f}"), number(score.seconds, "{:.1f}"));
+}
+
+/// Of one method over the samples alone.
+struct Spread {
+  int answers = 0;
+  double mean_pa = 0, std_pa = 0, iterations = 0, solves = 0, seconds = 0;
+};
+Spread spread_of(const TrialAnswer& trial, MethodAnswer SampleAnswer::* method) {
+  Spread spread;
+  double square = 0;
+  for (const SampleAnswer& sample : trial.samples) {
+    const MethodAnswer& answer = sample.*method;
+    if (!std::isfinite(answer.young_modulus_pa)) continue;
+    ++spread.answers;
+    spread.mean_pa += answer.young_modulus_pa;
+    square += answer.young_modulus_pa * answer.young_modulus_pa;
+    spread.iterations += answer.iterations;
+    spread.solves += answer.solves;
+    spread.seconds += answer.seconds;
+  }
+  const double count = spread.answers;
+  spread.mean_pa /= count;
+  spread.std_pa = std::sqrt(std::max(0.0, square / count - spread.mean_pa * spread.mean_pa));
+  spread.iterations /= count;
+  spread.solves /= count;
+  spread.seconds /= count;
+  return spread;
+}
+
+}  // namespace
+
+std::string pascal(double young_modulus_pa) {
+  return std::isfinite(young_modulus_pa) ? report::quantity(young_modulus_pa, "Pa") : "none";
+}
+
+std::string listed(const std::vector<std::string>& codes) {
+  std::string all;
+  for (const std::string& code : codes) all += (all.empty() ? "" : ", ") + code;
+  return all.empty() ? "none" : all;
+}
+
+std::string site_table(const TrialAnswer& trial) {
+  if (trial.sites.empty()) return {};
+  std::string html = "<table><tr><th>site</th><th>true E</th><th>the paper's method, this push alone</th><th>palpate, all regions at "
+                     "once</th><th>95 %</th></tr>\n";
+  for (const SiteAnswer& site : trial.sites)
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", site.site, pascal(site.young_modulus_pa),
+                        of_truth(site.paper.young_modulus_pa, site.young_modulus_pa),
+                        of_truth(site.palpate.young_modulus_pa, site.young_modulus_pa), interval(site.palpate));
+  return html + "</table>\n<p class=\"small\">Told of no regions, palpate's verdicts are: " + listed(trial.as_one_verdicts) + ".</p>\n";
+}
+
+std::string sample_table(const TrialAnswer& trial, bool truth_known) {
+  if (trial.samples.empty()) return {};
+  std::string html = "<table><tr><th>a sample alone</th><th>samples</th><th>mean E</th><th>standard deviation</th><th>iterations</th>"
+                     "<th>solves</th><th>s</th></tr>\n";
+  const auto line = [&](const char* name, const Spread& spread) {
+    if (spread.answers == 0) return fmt::format("<tr><td>{}</td><td>0</td></tr>\n", name);
+    return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.1f} %</td><td>{:.1f}</td><td>{:.0f}</td><td>{:.1f}</td></tr>\n", name,
+                       spread.answers, truth_known ? of_truth(spread.mean_pa, trial.young_modulus_pa) : pascal(spread.mean_pa),
+                       100 * spread.std_pa / spread.mean_pa, spread.iterations, spread.solves, spread.seconds);
+  };
+  html += line("the paper's method, this machine", spread_of(trial, &SampleAnswer::paper));
+  html += line("palpate, this machine", spread_of(trial, &SampleAnswer::palpate));
+  return html + "<tr><td>the paper (2010), its balloon</td><td>7</td><td></td><td></td><td>7</td><td></td><td>192.5</td></tr></table>\n";
+}
+
+std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial) {
+  if (trial.unused.empty()) return {};
+  const bool other = !trial.other_law.empty();
+  std::string html = fmt::format("<p>A push that was not used, {}: force expected at the measured travel, and rms distance of what the "
+                                 "camera saw to the surface that is expected under the measured force.</p>\n<table><tr><th>true "
+                                 "force</th><th>travel</th><th>force: the paper's method</th><th>palpate</th>{}<th>surface: the paper's "
+                                 "method</th><th>palpate</th>{}<th>if nothing moved</th></tr>\n",
+                                 scene.unused ? "at another place" : "at the same place with other forces", other ? "<th>" + trial.other_law + " law</th>" : "",
+                                 other ? "<th>" + trial.other_law + " law</th>" : "");
+  for (const UnusedStep& step : trial.unused) {
+    const auto force = [&](const Expectation& expected) {
+      return std::isfinite(expected.force_n)
+                 ? fmt::format("<td>{:.2f} N ({:+.0f} %)</td>", expected.force_n, 100 * (expected.force_n / step.force_n - 1))
+                 : "<td>none</td>";
+    };
+    const auto surface = [&](double rms_m) { return "<td>" + number(1000 * rms_m, "{:.2f} mm") + "</td>"; };
+    html += fmt::format("<tr><td>{:.2f} N</td><td>{}</td>", step.force_n, number(1000 * step.travel_m, "{:.1f} mm")) + force(step.paper) +
+            force(step.palpate) + (other ? force(step.other) : "") + surface(step.paper.surface_m) + surface(step.palpate.surface_m) +
+            (other ? surface(step.other.surface_m) : "") + surface(step.surface_still_m) + "</tr>\n";
+  }
+  return html + "</table>\n";
+}
+
+std::string score_table(const lab::PaperScene& scene, const std::vector<TrialAnswer>& trials) {
+  if (scene.apparent)
+    return "<p class=\"small\">An apparent modulus has no truth: no errors are given, and the claims on top leave this scene out.</p>\n";
+  const bool by_site = !trials.front().sites.empty();
+  std::string html = "<table><tr><th>method</th><th>bias of E</th><th>rms of E</th><th>bias of &nu;</th><th>rms of &nu;</th><th>truth in "
+                     "95 %</th><th>no answer</th><th>solves</th><th>s</th></tr>\n";
+  const SceneScores scores = scores_of(trials);
+  if (!by_site) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
+  html += score_row(by_site ? "the paper's method on palpate's mesh, by site" : "the paper's method on palpate's mesh", scores.paper, false);
+  html += score_row("palpate", scores.palpate, true);
+  if (!trials.front().other_law.empty()) html += score_row("palpate with the " + trials.front().other_law + " law", scores.other, true);
+  return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm. Seeds share what was "
+                            "solved for where the object is the same: seconds are of what was left to do.</p>\n",
+                            trials.size(), trials.size() == 1 ? "" : "s");
+}
+
+std::string study_table(const StudyAnswer& answer) {
+  std::string html = "<table><tr><th>model or fault</th><th>true E</th><th>the paper's method</th><th>its &nu;</th><th>palpate</th><th>95 "
+                     "%</th><th>its &nu;</th><th>truth inside</th><th>palpate's verdicts</th></tr>\n";
+  for (const StudyRow& row : answer.rows) {
+    const bool interval_there = std::isfinite(row.palpate.lower_95_pa);
+    const bool inside = row.palpate.lower_95_pa <= row.young_modulus_pa && row.young_modulus_pa <= row.palpate.upper_95_pa;
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                        row.what, pascal(row.young_modulus_pa), of_truth(row.paper.young_modulus_pa, row.young_modulus_pa),
+                        number(row.paper.poisson_ratio, "{:.3f}"), of_truth(row.palpate.young_modulus_pa, row.young_modulus_pa),
+                        interval(row.palpate), number(row.palpate.poisson_ratio, "{:.3f}"),
+                        !interval_there ? "" : inside ? "yes" : "<b>no</b>",
+                        std::isfinite(row.palpate.young_modulus_pa) || !row.palpate.verdicts.empty() ? listed(row.palpate.verdicts) : "");
+  }
+  return html + fmt::format("</table>\n<p class=\"small\">Seed {}; true &nu; {:.3f}.</p>\n", answer.seed,
+                            answer.rows.empty() ? 0 : answer.rows.front().poisson_ratio);
+}
+
+}  // namespace palpate::cli

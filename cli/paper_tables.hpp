@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tables of the page of `palpate paper`, as HTML; empty where a trial has nothing for one.
+#pragma once
+
+#include <string>
+
+#include "cli/paper_scores.hpp"
+#include "cli/paper_studies.hpp"
+
+namespace palpate::cli {
+
+/// "none" where there is none.
+std::string pascal(double young_modulus_pa);
+/// "a, b", or "none".
+std::string listed(const std::vector<std::string>& codes);
+
+std::string site_table(const TrialAnswer& trial);
+/// E of the samples alone: mean and spread, and what one took.
+std::string sample_table(const TrialAnswer& trial, bool truth_known);
+std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial);
+std::string score_table(const lab::PaperScene& scene, const std::vector<TrialAnswer>& trials);
+std::string study_table(const StudyAnswer& answer);
+
+}  // namespace palpate::cli

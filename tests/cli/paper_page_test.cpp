@@ -1,0 +1,104 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// What the page of `palpate paper` says of answers that were made up: right, wrong, missing, and without a truth.
+#include "cli/paper_page.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "cli/paper_json.hpp"
+#include "cli/paper_tables.hpp"
+
+namespace palpate::cli {
+namespace {
+
+MethodAnswer answer(double young_pa, double lower_pa, double upper_pa, int solves) {
+  MethodAnswer out = no_answer();
+  out.young_modulus_pa = young_pa;
+  out.poisson_ratio = 0.3;
+  out.lower_95_pa = lower_pa;
+  out.upper_95_pa = upper_pa;
+  out.solves = solves;
+  out.converged = true;
+  return out;
+}
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+TrialAnswer trial(double paper_pa, const MethodAnswer& palpate) {
+  TrialAnswer out;
+  out.seed = 1;
+  out.young_modulus_pa = 10e3;
+  out.poisson_ratio = 0.3;
+  out.paper = out.paper_coarse = answer(paper_pa, nan, nan, 500);
+  out.palpate = palpate;
+  return out;
+}
+
+SceneAnswers scene(const char* name, std::vector<TrialAnswer> trials) { return {&lab::paper_scene(name), std::move(trials)}; }
+
+TEST(PaperClaims, HoldWhereBothSidesSayWhatTheyShould) {
+  const auto claims = claims_of({scene("cube", {trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90))})});
+  ASSERT_EQ(claims.size(), 4u);
+  for (const Claim& claim : claims) EXPECT_TRUE(claim.holds) << claim.what;
+}
+
+TEST(PaperClaims, FailOneByOneAndNameTheScene) {
+  const TrialAnswer good = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90));
+  const auto failing = [&](const TrialAnswer& bad) {
+    std::string failed;
+    int at = 0;
+    for (const Claim& claim : claims_of({scene("cow", {good}), scene("cube", {good}), scene("teddy", {bad})})) {
+      if (!claim.holds) failed += std::to_string(at) + (claim.found.find("teddy") != std::string::npos ? "named " : " ");
+      ++at;
+    }
+    return failed;
+  };
+  EXPECT_EQ(failing(good), "");
+  EXPECT_EQ(failing(trial(10.1e3, answer(10.4e3, 9.8e3, 11e3, 90))), "0named ") << "worse than the paper's method";
+  EXPECT_EQ(failing(trial(13e3, answer(10.4e3, 10.2e3, 11e3, 90))), "2 ") << "two of three intervals hold the truth";
+  EXPECT_EQ(failing(trial(13e3, answer(10.4e3, 9.8e3, 11e3, 101))), "3named ") << "more than a fifth of the solves";
+  // No answer is no good answer, and neither bias nor interval.
+  TrialAnswer none = trial(13e3, no_answer());
+  EXPECT_EQ(failing(none).substr(0, 7), "0named ");
+  EXPECT_EQ(scores_of({none, good}).palpate.without, 1);
+  EXPECT_NEAR(scores_of({none, good}).palpate.bias_percent, 100 * std::log(1.04), 1e-9);
+}
+
+TEST(PaperClaims, LeaveOutWhatHasNoTruth) {
+  const SceneAnswers balloon = scene("balloon", {trial(13e3, answer(99e3, 98e3, 100e3, 5000))});
+  EXPECT_TRUE(claims_of({balloon}).empty());
+  for (const Claim& claim : claims_of({balloon, scene("cube", {trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90))})})) EXPECT_TRUE(claim.holds);
+  const std::string page = paper_page({balloon}, {}, "command", 1);
+  EXPECT_EQ(page.find("true E"), std::string::npos);
+  EXPECT_NE(page.find("An apparent modulus has no truth"), std::string::npos);
+  const auto json = json_of(balloon);
+  EXPECT_FALSE(json.contains("scores"));
+  EXPECT_FALSE(json.at("trials").at(0).contains("true_young_modulus_pa"));
+}
+
+TEST(PaperPage, SaysWhereAStudysIntervalMisses) {
+  const Study& study = studies().front();
+  const MethodAnswer right = answer(10.4e3, 9.8e3, 11e3, 90), wrong = answer(12e3, 11e3, 13e3, 90);
+  const auto cells = [&](const MethodAnswer& palpate) { return study_table({&study, 1, {{"row", 10e3, 0.3, answer(13e3, nan, nan, 9), palpate}}}); };
+  EXPECT_NE(cells(right).find(">yes<"), std::string::npos);
+  EXPECT_EQ(cells(right).find("<b>no</b>"), std::string::npos);
+  EXPECT_NE(cells(wrong).find("<b>no</b>"), std::string::npos);
+  EXPECT_NE(cells(wrong).find("(+20 %)"), std::string::npos);
+  EXPECT_EQ(cells(no_answer()).find(">yes<"), std::string::npos);
+  EXPECT_NE(cells(right).find("<td>none</td></tr>"), std::string::npos) << "no verdicts is said";
+}
+
+TEST(PaperPage, WithoutAnAnswerItSaysSo) {
+  TrialAnswer none = trial(13e3, no_answer());
+  none.unused.push_back({2.0, 0.004, {2.2, 1e-4}, {nan, nan}, {nan, nan}, 2e-3});
+  const std::string page = paper_page({scene("cube", {none})}, {}, "command", 1);
+  EXPECT_NE(page.find("palpate found no answer"), std::string::npos);
+  EXPECT_NE(page.find("<td>2.20 N (+10 %)</td><td>none</td>"), std::string::npos);
+  EXPECT_EQ(page.find("nan"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate::cli

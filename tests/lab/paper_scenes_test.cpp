@@ -1,0 +1,98 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// The paper's scenes as recordings: what a fault changes and what it leaves alone, and the ball that nothing holds.
+#include "palpate/lab/paper_scenes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "palpate/core/error.hpp"
+#include "palpate/lab/opposed_ball.hpp"
+
+namespace palpate::lab {
+namespace {
+
+double travel_of(const Step& step) {
+  for (const auto& observation : step.observations)
+    if (const auto* travel = std::get_if<ToolTravel>(&observation)) return travel->travel_m;
+  return -1;
+}
+const DepthFrame& image_of(const Step& step) {
+  for (const auto& observation : step.observations)
+    if (const auto* image = std::get_if<DepthFrame>(&observation)) return *image;
+  throw Error("has no image", "step");
+}
+
+TEST(PaperScenes, HaveNamesOfTheirOwn) {
+  std::set<std::string> names;
+  for (const PaperScene& scene : paper_scenes()) EXPECT_TRUE(names.insert(std::string(scene.name)).second) << scene.name;
+  for (const PaperFault& fault : paper_faults()) EXPECT_TRUE(names.insert(std::string(fault.name)).second) << fault.name;
+  EXPECT_THROW(paper_scene("penguin"), Error);
+}
+
+// A slip after the first of nine samples: before it the two recordings are one; after it the tip presses elsewhere, the encoders
+// have come deeper by what was lost, and the recording goes on naming the first place.
+TEST(PaperScenes, AFaultChangesWhatItSaysAndNothingElse) {
+  const PaperScene& scene = paper_scene("cube");
+  const PaperTrial right = make_paper_trial(scene, 3);
+  const auto fault = [&](double slip_m, double deeper_m, double tilt_rad, double radius) {
+    return make_paper_trial(scene, 3, {}, {"test", "test", slip_m, deeper_m, tilt_rad, radius});
+  };
+  const Push& push = right.recording.pushes.at(0);
+  ASSERT_GE(push.steps.size(), 6u);
+  const PaperTrial slipped = fault(0.005, 0.001, 0, 1), tilted = fault(0, 0, 0.01, 0.5);
+  const Push& aside = slipped.recording.pushes.at(0);
+  ASSERT_GE(aside.steps.size(), 6u);
+  for (std::size_t s = 0; s < 6; ++s) {
+    const bool before = s <= 4;
+    EXPECT_EQ(before, aside.steps[s].time_s == push.steps[s].time_s) << s;
+    if (s == 0) continue;
+    EXPECT_EQ(aside.steps[s].loads.at(0).contact_m, push.steps[1].loads.at(0).contact_m);
+    EXPECT_EQ(before, travel_of(aside.steps[s]) == travel_of(push.steps[s])) << s;
+  }
+  EXPECT_EQ(slipped.young_modulus_pa, right.young_modulus_pa);
+  const Step &tilted_step = tilted.recording.pushes.at(0).steps.at(2), &right_step = push.steps.at(2);
+  EXPECT_NEAR(Eigen::AngleAxisd(image_of(right_step).T_base_camera.rotation().transpose() * image_of(tilted_step).T_base_camera.rotation()).angle(),
+              0.01, 1e-9);
+  EXPECT_TRUE(image_of(right_step).depth_m == image_of(tilted_step).depth_m);
+  EXPECT_EQ(*right_step.loads.at(0).force_n, *tilted_step.loads.at(0).force_n);
+  EXPECT_NEAR(tilted.recording.tools.at(0).radius_m, 0.5 * right.recording.tools.at(0).radius_m, 1e-12);
+}
+
+// The mirror image of the upper half is the lower one: the middle goes down by half of what the upper pad does. And near a pad
+// that is small against the ball, the ball gives way as a half space does: 16 p a (1 - nu^2) / (3 pi E) on the mean of the patch
+// (Johnson, Contact Mechanics, 3.4); seen from the other pad, twice that, less what the half space gives beyond the ball.
+TEST(OpposedBall, IsSqueezedFromBothSidesAlike) {
+  ObjectOptions truth;
+  truth.young_modulus_pa = 20e3;
+  truth.poisson_ratio = 0.3;
+  truth.material = "linear";
+  truth.tetrahedra = 4000;
+  const LabObject ball = opposed_ball(truth);
+  EXPECT_TRUE(ball.supports.empty());
+  const auto pressed = ball.press(ball.sites.at(0));
+  const double force_n = 1;
+  pressed->press(force_n);
+  const TriMesh after = pressed->surface();
+  double middle_m = 0, lowest_m = 0, highest_m = 0;
+  int count = 0;
+  for (Index v = 0; v < static_cast<Index>(after.vertices_m.rows()); ++v) {
+    const double height_m = ball.surface.vertices_m(v, 2) - ball.foot_m.z(), down_m = ball.surface.vertices_m(v, 2) - after.vertices_m(v, 2);
+    if (std::abs(height_m - opposed_ball_radius_m) < 0.002) middle_m += down_m, ++count;
+    if (height_m < 1e-4) lowest_m = down_m;
+    if (height_m > 2 * opposed_ball_radius_m - 1e-4) highest_m = down_m;
+  }
+  ASSERT_GT(count, 20);
+  EXPECT_NEAR(middle_m / count / pressed->travel_m(), 0.5, 0.01);
+  EXPECT_LT(lowest_m, 0) << "the middle of the lower pad's patch dents inwards, its mean stands still";
+  EXPECT_GT(highest_m, pressed->travel_m());
+  const double a_m = ball.pad_radius_m, pi = 3.14159265358979323846;
+  const double half_space_m = 2 * 16 * force_n / (pi * a_m * a_m) * a_m * (1 - 0.3 * 0.3) / (3 * pi * 20e3);
+  EXPECT_LT(pressed->travel_m(), half_space_m);
+  EXPECT_GT(pressed->travel_m(), 0.6 * half_space_m);
+}
+
+}  // namespace
+}  // namespace palpate::lab
