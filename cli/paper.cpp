@@ -69,9 +69,10 @@ int remake(Session& session, const PaperArguments& arguments) {
     for (int k = 0; k < seeds && !Session::interrupted(); ++k) {
       TrialOptions options;
       options.threads = session.thread_count();
-      options.every_sample = k > 0 ? 0 : arguments.quick ? 2 : 1;
+      const bool dear = scene->law != "linear";
+      options.every_sample = k > 0 ? 0 : !arguments.quick ? 1 : dear ? 4 : 2;
       options.pictures = k == 0;
-      options.surface_points = k > 0 ? 0 : arguments.quick ? 9 : 25;
+      options.surface_points = k > 0 ? 0 : !arguments.quick ? 25 : dear ? 5 : 9;
       const TrialAnswer trial = run_trial(*scene, session.seed + static_cast<std::uint64_t>(k), options, &shared, session.progress());
       if (Session::interrupted()) break;
       session.say(line_of(*scene, trial));

@@ -20,8 +20,14 @@ using report::Spot;
 constexpr double width_pt = 420, height_pt = 260;
 const report::Colour truth_colour{22, 32, 44}, paper_colour = report::category(1), own_colour = report::category(0);
 
-void legend(report::Canvas& canvas, std::initializer_list<std::pair<const char*, report::Colour>> entries) {
-  double x = 60;
+bool truth_known(const TrialAnswer& trial) { return std::isfinite(trial.young_modulus_pa); }
+
+void legend(report::Canvas& canvas, const TrialAnswer& trial, const char* palpate) {
+  std::vector<std::pair<const char*, report::Colour>> entries{{"paper's method", paper_colour}, {palpate, own_colour}};
+  if (truth_known(trial)) entries.insert(entries.begin(), {"truth", truth_colour});
+  double x = 60, wide = 0;
+  for (const auto& [words, colour] : entries) wide += 16 + 5.4 * static_cast<double>(std::string_view(words).size());
+  canvas.box({x - 6, 4}, wide, 15, {255, 255, 255});
   for (const auto& [words, colour] : entries) {
     canvas.dot({x, 12}, 3, colour);
     canvas.text({x + 7, 15}, words, 9, report::Align::left, report::ink);
@@ -72,8 +78,8 @@ std::string surface_figure(const TrialAnswer& trial) {
   };
   path(trial.paper, paper_colour);
   path(trial.palpate, own_colour);
-  axes.dot(std::log10(trial.young_modulus_pa), trial.poisson_ratio, 3, truth_colour);
-  legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate", own_colour}});
+  if (truth_known(trial)) axes.dot(std::log10(trial.young_modulus_pa), trial.poisson_ratio, 3, truth_colour);
+  legend(*canvas, trial, "palpate");
   return canvas->bytes();
 }
 
@@ -100,10 +106,10 @@ std::string error_figure(const TrialAnswer& trial) {
     const double x = young_pa / 1000;
     if (x >= spots.front().x && x <= spots.back().x) axes.line(std::vector<Spot>{{x, range.from}, {x, range.to}}, colour, 1, dashed);
   };
-  upright(trial.young_modulus_pa, truth_colour, true);
+  if (truth_known(trial)) upright(trial.young_modulus_pa, truth_colour, true);
   upright(trial.paper.young_modulus_pa, paper_colour, false);
   upright(trial.palpate.young_modulus_pa, own_colour, false);
-  legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate", own_colour}});
+  legend(*canvas, trial, "palpate");
   return canvas->bytes();
 }
 
@@ -133,7 +139,7 @@ std::string force_figure(const TrialAnswer& trial) {
   return canvas->bytes();
 }
 
-std::string samples_figure(const TrialAnswer& trial, bool truth_known) {
+std::string samples_figure(const TrialAnswer& trial) {
   if (trial.samples.empty()) return {};
   std::vector<double> values;
   const auto joint = [&](const MethodAnswer& answer) {
@@ -141,7 +147,7 @@ std::string samples_figure(const TrialAnswer& trial, bool truth_known) {
   };
   joint(trial.paper);
   joint(trial.palpate);
-  if (truth_known) values.push_back(trial.young_modulus_pa / 1000);
+  if (truth_known(trial)) values.push_back(trial.young_modulus_pa / 1000);
   if (values.empty()) return {};
   const double most_kpa = 4 * *std::max_element(values.begin(), values.end());  // a sample that says nothing must not hide the others
   for (const SampleAnswer& sample : trial.samples)
@@ -154,7 +160,7 @@ std::string samples_figure(const TrialAnswer& trial, bool truth_known) {
   const auto level = [&](double young_pa, report::Colour colour, bool dashed) {
     if (std::isfinite(young_pa)) axes.line(std::vector<Spot>{{0.0, young_pa / 1000}, {count + 1, young_pa / 1000}}, colour, 1, dashed);
   };
-  if (truth_known) level(trial.young_modulus_pa, truth_colour, true);
+  if (truth_known(trial)) level(trial.young_modulus_pa, truth_colour, true);
   if (trial.sites.empty()) {
     level(trial.paper.young_modulus_pa, paper_colour, false);
     level(trial.palpate.young_modulus_pa, own_colour, false);
@@ -169,11 +175,7 @@ std::string samples_figure(const TrialAnswer& trial, bool truth_known) {
     if (sample.palpate.young_modulus_pa / 1000 < range.to) axes.dot(x + 0.12, sample.palpate.young_modulus_pa / 1000, 2.5, own_colour);
     if (sample.paper.young_modulus_pa / 1000 < range.to) axes.dot(x - 0.12, sample.paper.young_modulus_pa / 1000, 2.5, paper_colour);
   }
-  if (truth_known) {
-    legend(*canvas, {{"truth", truth_colour}, {"paper's method", paper_colour}, {"palpate, 95 %", own_colour}});
-  } else {
-    legend(*canvas, {{"paper's method", paper_colour}, {"palpate, 95 %", own_colour}});
-  }
+  legend(*canvas, trial, "palpate, 95 %");
   return canvas->bytes();
 }
 

@@ -17,6 +17,6 @@ std::string error_figure(const TrialAnswer& trial);
 /// Fig. 5: measured force over travel.
 std::string force_figure(const TrialAnswer& trial);
 /// Fig. 6, 8 and 9: E of every sample alone, by both methods, with ours' interval; lines: all samples jointly.
-std::string samples_figure(const TrialAnswer& trial, bool truth_known);
+std::string samples_figure(const TrialAnswer& trial);
 
 }  // namespace palpate::cli

@@ -59,9 +59,10 @@ std::string section(const SceneAnswers& answers) {
   html += figure(surface_figure(first), "The paper's error function over (E, &nu;), dark = small, with the paths of both methods.");
   html += figure(error_figure(first), "The paper's error function over E alone, at the &nu; where its method ended.");
   html += figure(registration_figure(first),
-                 "What the camera saw of the hardest push, registered with the surface that each E gives; the last is the true one.");
+                 std::string("What the camera saw of the hardest push, registered with the surface that each E gives; the last is ") +
+                     (scene.apparent ? "the one that palpate found." : "the true one."));
   html += figure(force_figure(first), "Measured force over travel.");
-  html += figure(samples_figure(first, !scene.apparent),
+  html += figure(samples_figure(first),
                  first.sites.empty() ? "E from every sample alone; the lines are E from all samples jointly." : "E from every sample alone.");
   return html;
 }

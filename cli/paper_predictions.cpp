@@ -117,7 +117,9 @@ void predict_unused(const Prepared& given, const Prepared* other, const lab::Pap
   }
 }
 
-void add_pictures(const Prepared& given, const estimation::FitOptions& options, TrialAnswer& out) {
+void add_pictures(const Prepared& given, double young_modulus_pa, double poisson_ratio, const estimation::FitOptions& options,
+                  TrialAnswer& out) {
+  if (!std::isfinite(young_modulus_pa)) return;
   constexpr Index most_dots = 900;
   std::size_t flat = 0, hardest = 0;
   double most_n = 0;
@@ -144,8 +146,8 @@ void add_pictures(const Prepared& given, const estimation::FitOptions& options, 
   Expected expected(given.recording, given.object, options, memory);
   for (const double factor : {3.0, 2.0, 1.3, 1.0}) {
     RegistrationPicture picture;
-    picture.young_modulus_pa = factor * out.young_modulus_pa;
-    const auto at = expected(hardest, picture.young_modulus_pa, out.poisson_ratio);
+    picture.young_modulus_pa = factor * young_modulus_pa;
+    const auto at = expected(hardest, picture.young_modulus_pa, poisson_ratio);
     if (!at.converged) continue;
     const geometry::TriangleTree tree(TriMesh{at.surface_m, given.object.surface.rest().triangles});
     const auto icp = registration::align(cloud, tree, Pose::Identity());

@@ -13,7 +13,7 @@ namespace palpate::cli {
 void predict_unused(const Prepared& given, const Prepared* other, const lab::PaperTrial& trial, const std::vector<double>& by_region,
                     const estimation::FitOptions& options, SharedModels& shared, TrialAnswer& out);
 
-/// Fig. 3: what registration makes of the hardest step at 3, 2, 1.3 and 1 times the true E.
-void add_pictures(const Prepared& given, const estimation::FitOptions& options, TrialAnswer& out);
+/// Fig. 3: what registration makes of the hardest step at 3, 2, 1.3 and 1 times an E.
+void add_pictures(const Prepared& given, double young_modulus_pa, double poisson_ratio, const estimation::FitOptions& options, TrialAnswer& out);
 
 }  // namespace palpate::cli

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "palpate/report/words.hpp"
@@ -95,23 +97,27 @@ std::string sample_table(const TrialAnswer& trial, bool truth_known) {
 
 std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial) {
   if (trial.unused.empty()) return {};
-  const bool other = !trial.other_law.empty();
-  std::string html = fmt::format("<p>A push that was not used, {}: force expected at the measured travel, and rms distance of what the "
-                                 "camera saw to the surface that is expected under the measured force.</p>\n<table><tr><th>true "
-                                 "force</th><th>travel</th><th>force: the paper's method</th><th>palpate</th>{}<th>surface: the paper's "
-                                 "method</th><th>palpate</th>{}<th>if nothing moved</th></tr>\n",
-                                 scene.unused ? "at another place" : "at the same place with other forces", other ? "<th>" + trial.other_law + " law</th>" : "",
-                                 other ? "<th>" + trial.other_law + " law</th>" : "");
+  std::vector<std::string> names{"the paper's method", "palpate"};
+  if (!trial.other_law.empty()) names.push_back("palpate, " + trial.other_law + " law");
+  const bool travels = std::any_of(trial.unused.begin(), trial.unused.end(), [](const auto& step) { return std::isfinite(step.travel_m); });
+  std::string html = fmt::format("<p>A push that was not used, {}: {}rms distance of what the camera saw to the surface that is expected "
+                                 "under the measured force.</p>\n<table><tr><th>true force</th>{}",
+                                 scene.unused ? "at another place" : "at the same place with other forces",
+                                 travels ? "force expected at the measured travel, and " : "", travels ? "<th>travel</th>" : "");
+  if (travels)
+    for (const std::string& name : names) html += "<th>force: " + name + "</th>";
+  for (const std::string& name : names) html += "<th>surface: " + name + "</th>";
+  html += "<th>surface if nothing moved</th></tr>\n";
   for (const UnusedStep& step : trial.unused) {
-    const auto force = [&](const Expectation& expected) {
-      return std::isfinite(expected.force_n)
-                 ? fmt::format("<td>{:.2f} N ({:+.0f} %)</td>", expected.force_n, 100 * (expected.force_n / step.force_n - 1))
-                 : "<td>none</td>";
-    };
-    const auto surface = [&](double rms_m) { return "<td>" + number(1000 * rms_m, "{:.2f} mm") + "</td>"; };
-    html += fmt::format("<tr><td>{:.2f} N</td><td>{}</td>", step.force_n, number(1000 * step.travel_m, "{:.1f} mm")) + force(step.paper) +
-            force(step.palpate) + (other ? force(step.other) : "") + surface(step.paper.surface_m) + surface(step.palpate.surface_m) +
-            (other ? surface(step.other.surface_m) : "") + surface(step.surface_still_m) + "</tr>\n";
+    const std::array<const Expectation*, 3> all{&step.paper, &step.palpate, &step.other};
+    html += fmt::format("<tr><td>{:.2f} N</td>", step.force_n);
+    if (travels) html += "<td>" + number(1000 * step.travel_m, "{:.1f} mm") + "</td>";
+    for (std::size_t k = 0; travels && k < names.size(); ++k)
+      html += std::isfinite(all[k]->force_n)
+                  ? fmt::format("<td>{:.2f} N ({:+.0f} %)</td>", all[k]->force_n, 100 * (all[k]->force_n / step.force_n - 1))
+                  : "<td>none</td>";
+    for (std::size_t k = 0; k < names.size(); ++k) html += "<td>" + number(1000 * all[k]->surface_m, "{:.2f} mm") + "</td>";
+    html += "<td>" + number(1000 * step.surface_still_m, "{:.2f} mm") + "</td></tr>\n";
   }
   return html + "</table>\n";
 }
@@ -123,12 +129,13 @@ std::string score_table(const lab::PaperScene& scene, const std::vector<TrialAns
   std::string html = "<table><tr><th>method</th><th>bias of E</th><th>rms of E</th><th>bias of &nu;</th><th>rms of &nu;</th><th>truth in "
                      "95 %</th><th>no answer</th><th>solves</th><th>s</th></tr>\n";
   const SceneScores scores = scores_of(trials);
-  if (!by_site) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
+  if (!by_site && scores.paper_coarse.answers > 0) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
   html += score_row(by_site ? "the paper's method on palpate's mesh, by site" : "the paper's method on palpate's mesh", scores.paper, false);
   html += score_row("palpate", scores.palpate, true);
   if (!trials.front().other_law.empty()) html += score_row("palpate with the " + trials.front().other_law + " law", scores.other, true);
   return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm. Seeds share what was "
-                            "solved for where the object is the same: seconds are of what was left to do.</p>\n",
+                            "solved for where the object is the same: seconds are of what was left to do. A solve is one sample simulated "
+                            "at one (E, &nu;); in small strains both methods make it up of unit responses.</p>\n",
                             trials.size(), trials.size() == 1 ? "" : "s");
 }
 

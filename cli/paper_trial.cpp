@@ -11,16 +11,19 @@
 namespace palpate::cli {
 namespace {
 
-ErrorSurface error_surface(const Prepared& given, const MethodAnswer& found, double true_young_pa, int side,
+/// Every (E, nu) takes as many searches for equilibrium as there are samples.
+bool dear(const Prepared& given) { return given.object.material != "linear"; }
+
+ErrorSurface error_surface(const Prepared& given, const MethodAnswer& found, double other_young_pa, int side,
                            const estimation::FitOptions& options, const OnProgress& progress) {
   estimation::PaperError error(given.recording, given.object, given.inputs, options);
   ErrorSurface out;
-  // Wide enough for the truth and for where the method ended.
-  const double low = std::log(std::min(true_young_pa, found.young_modulus_pa) / 1.8),
-               high = std::log(std::max(true_young_pa, found.young_modulus_pa) * 1.8);
+  // Wide enough for the truth (or the other method's answer) and for where the method ended.
+  if (!std::isfinite(other_young_pa)) other_young_pa = found.young_modulus_pa;
+  const double low = std::log(std::min(other_young_pa, found.young_modulus_pa) / 1.8),
+               high = std::log(std::max(other_young_pa, found.young_modulus_pa) * 1.8);
   out.young_modulus_pa = VectorX::LinSpaced(side, low, high).array().exp();
-  const bool dear = given.object.material != "linear";  // then every point is as many searches for equilibrium as there are samples
-  out.poisson_ratio = dear ? VectorX::Constant(1, found.poisson_ratio) : VectorX(VectorX::LinSpaced(side, 0.02, 0.49));
+  out.poisson_ratio = dear(given) ? VectorX::Constant(1, found.poisson_ratio) : VectorX(VectorX::LinSpaced(side, 0.02, 0.49));
   out.error_m2.resize(side, out.poisson_ratio.size());
   for (int i = 0; i < side; ++i) {
     for (Index k = 0; k < static_cast<Index>(out.poisson_ratio.size()); ++k) out.error_m2(i, k) = error(out.young_modulus_pa(i), out.poisson_ratio(k));
@@ -44,7 +47,6 @@ void answer_samples(const Prepared& given, int every, const estimation::FitOptio
       SampleAnswer sample;
       sample.push = push.name;
       sample.force_n = load.force_n->dot(load.direction.normalized());
-      sample.travel_m = std::numeric_limits<double>::quiet_NaN();
       sample.travel_m = travel_of(push.steps[s]);
       // Ours may use the unloaded frame of the push as well; the paper's method has no use for it.
       sample.paper = by_paper(part_of(given, [&](std::size_t q, std::size_t t) { return q == p && t == s; }), alone, nullptr, {});
@@ -90,8 +92,8 @@ TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const Tr
   if (shared == nullptr) shared = &of_this_seed;
   TrialAnswer out;
   out.seed = seed;
-  out.young_modulus_pa = trial.young_modulus_pa;
-  out.poisson_ratio = trial.poisson_ratio;
+  out.young_modulus_pa = scene.apparent ? std::numeric_limits<double>::quiet_NaN() : trial.young_modulus_pa;
+  out.poisson_ratio = scene.apparent ? std::numeric_limits<double>::quiet_NaN() : trial.poisson_ratio;
   for (const Push& push : trial.recording.pushes)
     for (const Step& step : push.steps)
       if (loaded(step)) out.readings.push_back({push.name, step.loads[0].force_n->norm(), travel_of(step)});
@@ -106,10 +108,13 @@ TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const Tr
   out.palpate = by_palpate(given, fit, &shared->fine.palpate, progress, &ours);
   const Prepared one = as_one(given);
   out.paper = by_paper(one, fit, &shared->fine.paper, progress);
-  Recording coarse = trial.recording;
-  coarse.regions.clear();
-  choice.linear = true;
-  out.paper_coarse = by_paper(prepare(std::move(coarse), choice, &shared->linear, progress), fit, &shared->linear.paper, progress);
+  out.paper_coarse = no_answer();
+  if (!dear(given)) {
+    Recording coarse = trial.recording;
+    coarse.regions.clear();
+    choice.linear = true;
+    out.paper_coarse = by_paper(prepare(std::move(coarse), choice, &shared->linear, progress), fit, &shared->linear.paper, progress);
+  }
   std::optional<Prepared> other;
   if (!scene.other_law.empty()) {
     other = with_law(given, scene.other_law);
@@ -122,7 +127,11 @@ TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const Tr
     by_region = answer_sites(given, trial, ours, fit, out, progress);
   predict_unused(given, other ? &*other : nullptr, trial, by_region, fit, *shared, out);
   if (options.every_sample > 0) answer_samples(one, options.every_sample, fit, out, progress);
-  if (options.pictures && by_region.empty()) add_pictures(given, fit, out);
+  if (options.pictures && by_region.empty()) {
+    const bool known = !scene.apparent;  // else around what was found
+    add_pictures(given, known ? out.young_modulus_pa : out.palpate.young_modulus_pa,
+                 known ? out.poisson_ratio : out.palpate.poisson_ratio, fit, out);
+  }
   if (options.pictures) {
     estimation::FitOptions checked = fit;
     checked.cross_checks = true;
@@ -138,7 +147,7 @@ TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const Tr
     if (!by_region.empty()) out.as_one_verdicts = by_palpate(one, checked, nullptr, progress).verdicts;
   }
   if (options.surface_points > 1 && by_region.empty() && std::isfinite(out.paper.young_modulus_pa))
-    out.surface = error_surface(given, out.paper, out.young_modulus_pa, options.surface_points, fit, progress);
+    out.surface = error_surface(given, out.paper, scene.apparent ? out.palpate.young_modulus_pa : out.young_modulus_pa, options.surface_points, fit, progress);
   return out;
 }
 

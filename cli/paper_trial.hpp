@@ -61,7 +61,7 @@ struct ErrorSurface {
 
 struct TrialAnswer {
   std::uint64_t seed = 0;
-  double young_modulus_pa = 0, poisson_ratio = 0;  ///< the truth
+  double young_modulus_pa = 0, poisson_ratio = 0;  ///< the truth; NaN: there is none
   Index tetrahedra = 0;
   MethodAnswer paper, palpate;
   MethodAnswer paper_coarse;                  ///< the paper's method on linear tetrahedra of the same mesh; may be left out

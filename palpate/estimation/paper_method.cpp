@@ -3,6 +3,7 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -134,7 +135,10 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
   PaperError error(recording, object, inputs, options, memory);
   const double nu_low = recording.model.poisson_lower, nu_high = recording.model.poisson_upper;
   const bool nu_moves = !recording.model.poisson_fixed;
-  constexpr double difference = 1e-3;  // of log E and nu in the numerical derivatives
+  // Of log E and nu in the numerical derivatives. Points that change their nearest vertex make the error rough: where a narrow
+  // difference shows no way down, a wider one may.
+  constexpr std::array<double, 3> differences{1e-3, 1e-2, 1e-1};
+  std::size_t width = 0;
 
   // Algorithm 1, in (log E, nu): gradient step, re-simulation, acceptance if the error falls.
   Eigen::Vector2d x(std::log(error.start_young_modulus_pa()),
@@ -172,8 +176,8 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
     Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
     for (int k = 0; k < (nu_moves ? 2 : 1); ++k) {
       Eigen::Vector2d ahead = x, behind = x;
-      ahead(k) += difference;
-      behind(k) -= difference;
+      ahead(k) += differences[width];
+      behind(k) -= differences[width];
       ahead = inside(ahead);
       behind = inside(behind);
       gradient(k) = (value(ahead) - value(behind)) / (ahead(k) - behind(k));
@@ -192,6 +196,7 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
     for (int attempt = 0; attempt < 14; ++attempt, rate /= 3) {
       Eigen::Vector2d move = -rate * gradient;
       if (move.norm() > 1) move *= 1 / move.norm();
+      if (move.norm() < 1e-4) break;  // a hundredth of a per cent of E
       const Eigen::Vector2d next = inside(x + move);
       const double there = value(next);
       if (there < here) {
@@ -203,6 +208,10 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
         if (gain < 1e-6 && length < 1e-4) improved = false;
         break;
       }
+    }
+    if (!improved && ++width < differences.size()) {
+      rate = -1;
+      continue;
     }
     if (!improved) {
       answer.termination = Termination::converged;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The algorithm of Frank et al. (IROS 2010, section VI and algorithm 1) as a baseline: iterative closest point of every observed
 // surface to the simulated one, squared distances to the nearest vertices (eq. 5 and 6), gradient descent on (E, nu) with numerical
-// derivatives. Mesh, solver and loads are those of `fit`, so what differs is the method.
+// derivatives, taken over wider differences where narrow ones show no way down. Mesh, solver and loads are those of `fit`, so what differs is the method.
 #pragma once
 
 #include "palpate/estimation/fit.hpp"
