@@ -14,6 +14,12 @@ find_package(SQLite3 REQUIRED)
 find_package(fmt REQUIRED)
 find_path(METIS_INCLUDE_DIR metis.h REQUIRED)
 find_library(METIS_LIBRARY metis REQUIRED)
+if(PALPATE_WITH_CHOLMOD)
+  find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+  find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+  message(NOTICE "PALPATE_WITH_CHOLMOD: CHOLMOD's supernodal factorisation is under the GPL (version 2 or later). palpate's own code "
+                 "stays Apache-2.0, but library and program of this build may be passed on under the GPL's terms only.")
+endif()
 # The program's live view; headers only.
 if(PALPATE_BUILD_CLI)
   find_package(Boost 1.74 REQUIRED)

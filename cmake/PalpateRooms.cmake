@@ -19,6 +19,12 @@ target_include_directories(palpate PRIVATE ${METIS_INCLUDE_DIR} ${ZSTD_INCLUDE_D
 target_link_libraries(palpate PUBLIC Eigen3::Eigen Threads::Threads nlohmann_json::nlohmann_json
                               PRIVATE yaml-cpp PNG::PNG ZLIB::ZLIB BZip2::BZip2 SQLite::SQLite3 fmt::fmt ${ZSTD_LIBRARY} ${LZ4_LIBRARY} ${METIS_LIBRARY})
 
+if(PALPATE_WITH_CHOLMOD)
+  set_source_files_properties(palpate/fem/sparse_factor.cpp palpate/fem/linear_solver/cholmod_factor.cpp PROPERTIES
+                              COMPILE_DEFINITIONS PALPATE_WITH_CHOLMOD INCLUDE_DIRECTORIES ${CHOLMOD_INCLUDE_DIR})
+  target_link_libraries(palpate PRIVATE ${CHOLMOD_LIBRARY})
+endif()
+
 # Flags of our own code only, never exported to guests.
 add_library(palpate_flags INTERFACE)
 target_compile_options(palpate_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor

@@ -129,11 +129,6 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   followed_.assign(steps_.size(), 0);
   contact_ = has_contacts(recording);
   path_ = depends_on_path(recording);
-  if (contact_ && parameters_ > first_ratio) {
-    throw Error("parts with a stiffness of their own cannot lie on a table or wall that only pushes: give one stiffness "
-                "(--regions none), or hold the support bonded or as a plane",
-                "regions");
-  }
   workers_ = path_ ? 1 : std::clamp<std::size_t>(static_cast<std::size_t>(std::max(options_.threads, 1)), 1, steps_.size());
   // Unit responses are for one set of ratios; with regions a linear body is solved for at every step.
   linear_ = fem::material_law(object_.material).is_linear() && parameters_ == first_ratio && !contact_;
@@ -192,6 +187,12 @@ const Tool& ForwardModel::tool(const std::string& name) const {
 
 void ForwardModel::forget() {
   for (auto& memory : memory_) memory = Memory{};
+  for (auto& bodies : solved_->bodies) {
+    for (auto& [tools, body] : bodies) {
+      if (body->contact) body->contact->forget();
+      body->lying = nullptr;
+    }
+  }
 }
 
 ForwardModel::Watched ForwardModel::superpose(const Body& body, const Coefficients& c, const VectorX& unknowns,
@@ -263,7 +264,11 @@ void ForwardModel::set_ratios(Body& body, const VectorX& unknowns) const {
   if (parameters_ == first_ratio) return;
   VectorX stiffness = VectorX::Ones(1 + parameters_ - first_ratio);
   stiffness.tail(stiffness.size() - 1) = unknowns.segment(first_ratio, parameters_ - first_ratio).array().exp();
-  body.statics->set_region_stiffness(stiffness);
+  if (body.contact) {
+    body.contact->set_region_stiffness(stiffness);
+  } else {
+    body.statics->set_region_stiffness(stiffness);
+  }
 }
 
 int ForwardModel::inverted_elements(std::size_t s, const VectorX& unknowns) {
@@ -351,15 +356,6 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
   Body& body = body_of(push(s), worker);
   Coefficients c = coefficients(s, body, unknowns);
   if (body.contact && path_) add_path_columns(s, body, unknowns, c);
-  if (body.free_motions.cols() > 0 && c.force.size() > 0) {
-    const VectorX load = body.forces * c.force;
-    if ((body.free_motions.transpose() * load).cwiseAbs().maxCoeff() > 1e-6 * (load.lpNorm<1>() + 1e-12)) {
-      throw Error(
-          "the supports leave the object free to slide where a load acts on it; add the support that holds it, or give "
-          "the load's normal component alone",
-          step(s).source.empty() ? "supports" : step(s).source);
-    }
-  }
 
   StepPrediction out;
   Watched at;

@@ -121,7 +121,8 @@ class ForwardModel {
                           Watched& watched, StepPrediction& out);
   ContactStatePtr contact_state(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);
   ContactStatePtr solve_contact(Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
-                                const ContactStatePtr& start, const ContactStatePtr& before, std::size_t worker);
+                                const ContactStatePtr& start, const ContactStatePtr& before, const ContactStatePtr& known,
+                                std::size_t worker);
   ContactStatePtr lying(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);
   void add_contacts(Body& body, const Push& push, fem::Boundary boundary, std::vector<fem::RigidContact> supports);
   void add_path_columns(std::size_t s, const Body& body, const VectorX& unknowns, Coefficients& c) const;
@@ -138,6 +139,8 @@ class ForwardModel {
   void drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies, const Push& push) const;
   Body& body_of(const Push& push, std::size_t worker);
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
+  void drop_what_nothing_holds(std::size_t s, const Body& body, const VectorX& unknowns, Coefficients& c) const;
+  std::string why_unheld(double sideways_n, double std_n) const;
   struct LoadPart;  // of one load: columns that work together
   std::vector<LoadPart> load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const;
   RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;

@@ -2,6 +2,7 @@
 // Steps of an object that touches tables, walls and rigid tools: contact is solved for, and where there is friction every
 // step starts from the one before.
 #include <algorithm>
+#include <optional>
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
@@ -32,13 +33,13 @@ void for_each_driven(const Recording& recording, const Push& push, Visit&& visit
   }
 }
 
-/// Columns of `from` (log E, nu, then the unknowns of `columns`) in the order of log E, nu and `wanted`.
-MatrixX in_order(const MatrixX& from, const std::vector<int>& columns, const std::vector<int>& wanted) {
-  MatrixX out = MatrixX::Zero(from.rows(), first_ratio + static_cast<Index>(wanted.size()));
-  out.leftCols(first_ratio) = from.leftCols(first_ratio);
+/// Columns of `from` (the parameters, then the unknowns of `columns`) in the order of the parameters and `wanted`.
+MatrixX in_order(const MatrixX& from, Index parameters, const std::vector<int>& columns, const std::vector<int>& wanted) {
+  MatrixX out = MatrixX::Zero(from.rows(), parameters + static_cast<Index>(wanted.size()));
+  out.leftCols(parameters) = from.leftCols(parameters);
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const auto at = std::find(wanted.begin(), wanted.end(), columns[k]);
-    if (at != wanted.end()) out.col(first_ratio + (at - wanted.begin())) = from.col(first_ratio + static_cast<Index>(k));
+    if (at != wanted.end()) out.col(parameters + (at - wanted.begin())) = from.col(parameters + static_cast<Index>(k));
   }
   return out;
 }
@@ -94,9 +95,25 @@ void ForwardModel::add_path_columns(std::size_t s, const Body& body, const Vecto
   widen(c.d_motion);
 }
 
+/// The same state at other unknowns, moved along its derivatives where it has them; a straight line is no guess for a far
+/// step.
+fem::ContactEquilibrium ForwardModel::ContactState::moved_to(const VectorX& there) const {
+  fem::ContactEquilibrium guess = at;
+  if (!differentiated) return guess;
+  VectorX change(d.displacement.cols());
+  for (Index k = 0; k < change.size(); ++k) {
+    const Index unknown = k < parameters ? k : columns[static_cast<std::size_t>(k - parameters)];
+    change(k) = there(unknown) - unknowns(unknown);
+  }
+  const VectorX moved_m = d.displacement * change;
+  if (moved_m.lpNorm<Eigen::Infinity>() < 0.2 * at.displacement_m.lpNorm<Eigen::Infinity>()) guess.displacement_m += moved_m;
+  return guess;
+}
+
 ForwardModel::ContactStatePtr ForwardModel::solve_contact(Body& body, const Coefficients& c, const VectorX& unknowns,
                                                           bool derivatives, const ContactStatePtr& start,
-                                                          const ContactStatePtr& before, std::size_t worker) {
+                                                          const ContactStatePtr& before, const ContactStatePtr& known,
+                                                          std::size_t worker) {
   const fem::ContactStatics& statics = *body.contact;
   fem::ContactLoads loads = statics.no_loads();
   loads.force_coefficients = c.force;
@@ -104,9 +121,13 @@ ForwardModel::ContactStatePtr ForwardModel::solve_contact(Body& body, const Coef
   for (const auto& tool : body.driven) loads.motion[tool.contact].head<3>() = c.motion(tool.motion_column) * tool.direction;
   auto state = std::make_shared<ContactState>();
   state->unknowns = unknowns;
+  state->parameters = parameters_;
+  set_ratios(body, unknowns);
+  std::optional<fem::ContactEquilibrium> guess;
+  if (path_ && known && known->at.converged) guess = known->moved_to(unknowns);
   const auto solve = [&](const fem::ContactEquilibrium* from) {
     ++solves_[worker];
-    return statics.solve(std::exp(unknowns(log_young)), unknowns(poisson), loads, from);
+    return statics.solve(std::exp(unknowns(log_young)), unknowns(poisson), loads, from, {}, guess ? &*guess : nullptr);
   };
   state->at = solve(start ? &start->at : nullptr);
   // Without memory the way does not matter: a start that led nowhere is left.
@@ -118,13 +139,15 @@ ForwardModel::ContactStatePtr ForwardModel::solve_contact(Body& body, const Coef
     if (std::find(state->columns.begin(), state->columns.end(), column) == state->columns.end())
       state->columns.push_back(column);
   }
-  const Index parameters = first_ratio + static_cast<Index>(state->columns.size());
+  const Index parameters = parameters_ + static_cast<Index>(state->columns.size());
   fem::ContactLoadsAlong along = statics.no_loads_along(parameters);
   along.log_young(log_young) = along.poisson(poisson) = 1;
+  // The first region's stiffness is E itself.
+  for (Index r = 1; r < along.log_stiffness.rows(); ++r) along.log_stiffness(r, first_ratio + r - 1) = 1;
   for (std::size_t k = 0; k < c.columns.size(); ++k) {
     const Index from = static_cast<Index>(k);
     const auto found = std::find(state->columns.begin(), state->columns.end(), c.columns[k]);
-    const Index to = first_ratio + (found - state->columns.begin());
+    const Index to = parameters_ + (found - state->columns.begin());
     along.force_coefficients.col(to) = c.d_force.col(from);
     along.motion_coefficients.col(to) = c.d_motion.col(from).head(body.node_motions);
     for (const auto& tool : body.driven)
@@ -154,7 +177,8 @@ ForwardModel::ContactStatePtr ForwardModel::lying(std::size_t s, Body& body, con
     c.d_force.rightCols<1>().segment<3>(body.gravity_column) = d;
   }
   c.d_motion = MatrixX::Zero(c.motion.size(), static_cast<Index>(c.columns.size()));
-  body.lying = solve_contact(body, c, unknowns, derivatives, path_ ? nullptr : body.lying, nullptr, worker_of(s));
+  body.lying =
+      solve_contact(body, c, unknowns, derivatives, path_ ? nullptr : body.lying, nullptr, body.lying, worker_of(s));
   return body.lying;
 }
 
@@ -166,7 +190,7 @@ ForwardModel::ContactStatePtr ForwardModel::contact_state(std::size_t s, Body& b
   if (path_ && steps_[s].step > 0) before = contact_state(s - 1, body, unknowns, derivatives);
   if (before && !before->at.converged) return before;
   const ContactStatePtr start = path_ ? before : known ? known : before;
-  known = solve_contact(body, coefficients(s, body, unknowns), unknowns, derivatives, start, path_ ? before : nullptr,
+  known = solve_contact(body, coefficients(s, body, unknowns), unknowns, derivatives, start, path_ ? before : nullptr, known,
                         worker_of(s));
   return known;
 }
@@ -193,7 +217,9 @@ bool ForwardModel::solve_contact_step(std::size_t s, Body& body, const Coefficie
   watched.moved_m = object_.surface.restrict(moved_m);
   if (!derivatives) return true;
 
-  const auto derivative = [&](const ContactState& state, const MatrixX& d) { return in_order(d, state.columns, c.columns); };
+  const auto derivative = [&](const ContactState& state, const MatrixX& d) {
+    return in_order(d, parameters_, state.columns, c.columns);
+  };
   MatrixX field = derivative(*now, now->d.displacement);
   if (rest) field -= derivative(*rest, rest->d.displacement);
   watched.d_moved = object_.surface.restrict(field);

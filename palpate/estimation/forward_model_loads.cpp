@@ -275,6 +275,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
   if (clamp_[s] >= 0) {
     for (int k = 0; k < 6; ++k) column(clamp_[s] + k);
   }
+  drop_what_nothing_holds(s, body, unknowns, c);
   return c;
 }
 

@@ -36,8 +36,11 @@ struct ForwardModel::ContactState {
   fem::ContactEquilibrium at;
   VectorX unknowns;
   bool differentiated = false;
-  std::vector<int> columns;         // unknowns beside log E and nu, in the order of d's columns
+  Index parameters = first_ratio;   // log E, nu and the regions' ratios
+  std::vector<int> columns;         // unknowns beside the parameters, in the order of d's columns
   fem::ContactPathSensitivity d;
+
+  fem::ContactEquilibrium moved_to(const VectorX& there) const;
 };
 
 /// True for a load that acts by columns of force.

@@ -40,7 +40,7 @@ std::map<std::pair<Index, Index>, Index> midpoints(const TetMesh& mesh) {
 
 }  // namespace
 
-Tetrahedra boundary_faces(const TetMesh& mesh) {
+Tetrahedra boundary_faces(const TetMesh& mesh, std::vector<Index>* elements) {
   const bool quadratic = mesh.tetrahedra.cols() == 10;
   struct Seen {
     Index element = 0;
@@ -64,6 +64,7 @@ Tetrahedra boundary_faces(const TetMesh& mesh) {
   Tetrahedra faces(outer.size(), quadratic ? 6 : 3);
   for (std::size_t i = 0; i < outer.size(); ++i) {
     const auto [e, f] = outer[i];
+    if (elements != nullptr) elements->push_back(e);
     const int* c = kTetFaces[f];
     for (int k = 0; k < 3; ++k) {
       faces(i, k) = mesh.tetrahedra(e, c[k]);

@@ -11,8 +11,8 @@
 namespace palpate::fem {
 
 /// Boundary faces of a tetrahedral mesh, oriented outwards: F x 3 (linear) or F x 6 (quadratic: corners, then midpoints of
-/// 01, 12, 20).
-Tetrahedra boundary_faces(const TetMesh& mesh);
+/// 01, 12, 20). @param elements  filled with the element of each
+Tetrahedra boundary_faces(const TetMesh& mesh, std::vector<Index>* elements = nullptr);
 
 /// Splits every quadratic boundary face into four flat triangles (linear faces pass through).
 Triangles boundary_triangles(const TetMesh& mesh);

@@ -72,11 +72,10 @@ struct ContactStatics::Impl {
       if (now.residual > 0.5 * best && ++worse > 2) return false;
       best = std::min(best, now.residual);
       system.tangent(p, now_memory, now, false, t);
-      ++out.factorisations;
-      if (!system.factorise(t, 0, 1e-9)) return false;
       MatrixX du, dz;
-      SlidingLimits(system, p, now_memory, now)
-          .solve(system, t, -now.unbalanced, -now.unbalanced_tool, du, dz, krylov_tolerance);
+      if (!SlidingLimits(system, p, now_memory, now)
+               .solve(system, t, -now.unbalanced, -now.unbalanced_tool, du, dz, krylov_tolerance, &out.factorisations))
+        return false;
       if (!du.allFinite() || !dz.allFinite()) return false;
       ++out.newton_steps;
       now.u += du.col(0);
@@ -86,8 +85,10 @@ struct ContactStatics::Impl {
   }
 
   // One increment from an equilibrium; `s` and `memory` are changed only when it converges.
+  // @param guess  of its end; nullptr: none
   std::string increment(const ContactProblem& p, const ContactLoads& from, const ContactLoads& to, ContactState& s,
-                        std::vector<TouchMemory>& memory, ContactEquilibrium& out, std::vector<ContactIncrement>& path) {
+                        std::vector<TouchMemory>& memory, ContactEquilibrium& out, std::vector<ContactIncrement>& path,
+                        const ContactIncrement* guess) {
     const auto count = system.contacts.size();
     ContactState next = s;
     std::vector<TouchMemory> next_memory = memory;
@@ -97,12 +98,29 @@ struct ContactStatics::Impl {
       system.terms.begin_increment(system.body(c, p.m, s.poses[c], memory), s.u, next_memory[c]);
       next.poses[c] = carried(s.poses[c], from.motion[c], to.motion[c]);
     }
-    if (!system.approach(p, next_memory, next)) return "a tool never meets the object along its wrench";
-    if (!system.evaluate(p, next_memory, next)) return "the law does not exist at the start of the increment";
-    system.soften_start(p, next_memory, next, out);
-    std::string reason = system.newton(p, next_memory, next, out);
-    bool remembers_open = remembers;
-    if (reason.empty() && remembers && settle(p, next_memory, next, out)) remembers_open = false;
+    std::string reason;
+    bool remembers_open = remembers, found = false;
+    if (guess != nullptr && remembers) {
+      ContactState near = next;
+      near.u = guess->displacement_m + p.prescribed - system.system.prescribed_part(guess->displacement_m);
+      for (std::size_t c = 0; c < count; ++c)
+        if (system.contacts[c].free_axes.cols() > 0 && guess->loads.motion[c] == to.motion[c])
+          near.poses[c] = guess->poses[c];
+      std::vector<TouchMemory> near_memory = next_memory;
+      if (settle(p, near_memory, near, out)) {
+        next = std::move(near);
+        next_memory = std::move(near_memory);
+        remembers_open = false;
+        found = true;
+      }
+    }
+    if (!found) {
+      if (!system.approach(p, next_memory, next)) return "a tool never meets the object along its wrench";
+      if (!system.evaluate(p, next_memory, next)) return "the law does not exist at the start of the increment";
+      system.soften_start(p, next_memory, next, out);
+      reason = system.newton(p, next_memory, next, out);
+      if (reason.empty() && remembers && settle(p, next_memory, next, out)) remembers_open = false;
+    }
     // Friction limits follow the pressures: a fixed point around problems that each have an energy.
     for (int round = 0; reason.empty() && remembers_open; ++round) {
       const double change = update_limits(p, next_memory, next);
@@ -137,6 +155,7 @@ ContactStatics& ContactStatics::operator=(ContactStatics&&) noexcept = default;
 
 const std::vector<RigidContact>& ContactStatics::contacts() const { return impl_->system.contacts; }
 const TetMesh& ContactStatics::mesh() const { return impl_->system.mesh; }
+void ContactStatics::set_region_stiffness(const VectorX& stiffness) { impl_->system.set_region_stiffness(stiffness); }
 
 ContactLoads ContactStatics::no_loads() const {
   ContactLoads loads;
@@ -148,7 +167,8 @@ ContactLoads ContactStatics::no_loads() const {
 }
 
 ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson_ratio, const ContactLoads& loads,
-                                         const ContactEquilibrium* from, const VectorX& extra) const {
+                                         const ContactEquilibrium* from, const VectorX& extra,
+                                         const ContactEquilibrium* guess) const {
   ContactSystem& system = impl_->system;
   const ContactProblem target = system.problem(young_modulus_pa, poisson_ratio, loads, extra);
   ContactEquilibrium out;
@@ -184,11 +204,23 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
   double done = 0, step = 1.0 / system.options.increments;
   const double smallest = step * std::pow(0.5, system.options.max_halvings);
   ContactLoads last = start;
+  // The guess's own increments are taken, so that the path is the same.
+  std::vector<ContactIncrement> way;
+  if (guess != nullptr && guess->converged) {
+    if (guess->displacement_m.size() != s.u.size() || guess->touches.size() != count || !guess->path)
+      throw Error("is not a state of this mesh and these contacts", "guess");
+    way.assign(guess->path->begin() + 1, guess->path->end());
+    way.back().displacement_m = guess->displacement_m;
+    for (std::size_t c = 0; c < count; ++c) way.back().poses[c] = guess->touches[c].T_base_tool;
+  }
+  std::size_t at_way = 0;
   while (done < 1 && out.reason.empty()) {
+    const ContactIncrement* near = at_way < way.size() ? &way[at_way++] : nullptr;
+    if (near != nullptr) step = near->share - done;
     const double next = done + step > 1 - 1e-9 ? 1 : done + step;
     const ContactLoads part = between(start, loads, next);
     const ContactProblem p = system.problem(young_modulus_pa, poisson_ratio, part, extra);
-    const std::string reason = impl_->increment(p, last, part, s, memory, out, path);
+    const std::string reason = impl_->increment(p, last, part, s, memory, out, path, near);
     if (reason.empty()) {
       ++out.increments;
       path.back().share = next;
@@ -196,6 +228,7 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
       last = part;
       step = std::min(2 * step, 1.0 / system.options.increments);
     } else {
+      way.clear();
       step *= 0.5;
       if (step < smallest)
         out.reason =
@@ -205,7 +238,8 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
   out.converged = out.reason.empty();
   // What was reached, also when it is not the whole load.
   const ContactProblem reached = system.problem(young_modulus_pa, poisson_ratio, last, extra);
-  system.evaluate(reached, memory, s);
+  // Anchors have moved on since the last increment; its forces are those of its own.
+  if (out.increments == 0) system.evaluate(reached, memory, s);
   out.loads = last;
   out.displacement_m = s.u;
   out.residual = s.residual;
@@ -235,14 +269,21 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
   return out;
 }
 
+void ContactStatics::forget() { impl_->system.forget_factor(); }
+
 ContactSensitivity ContactStatics::sensitivity(const ContactEquilibrium& at) const {
   return sensitivity_of(impl_->system, *this, at);
+}
+
+VectorX ContactStatics::layer_travel_m(const ContactEquilibrium& at) const {
+  return layer_travel_of(impl_->system, *this, at);
 }
 
 ContactLoadsAlong ContactStatics::no_loads_along(Index parameters) const {
   const ContactSystem& system = impl_->system;
   ContactLoadsAlong along;
-  along.log_young = along.poisson = VectorX::Zero(parameters);
+  along.log_young = along.poisson = along.log_layer = VectorX::Zero(parameters);
+  along.log_stiffness = MatrixX::Zero(system.assembly.region_count(), parameters);
   along.force_coefficients = MatrixX::Zero(static_cast<Index>(system.boundary.forces.cols()), parameters);
   along.motion_coefficients = MatrixX::Zero(static_cast<Index>(system.motions.cols()), parameters);
   along.motion.assign(system.contacts.size(), MatrixX::Zero(6, parameters));

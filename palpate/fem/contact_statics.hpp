@@ -65,8 +65,7 @@ struct TouchResult {
   Vec6 wrench = Vec6::Zero();  ///< of the tool on the object: force, torque about the tip; base axes
   double area_m2 = 0;          ///< of the deformed surface in contact
   double penetration_m = 0;    ///< largest
-  double layer_m =
-      0;  ///< share of the travel that is the layer's compression: subtract it for a rigid surface (first order)
+  double layer_m = 0;  ///< mean compression of the layer, weighted with the pressure (see layer_travel_m)
   int active_points = 0, slipping_points = 0;
   Points patch_m;  ///< active points, present positions
   VectorX patch_pressure_pa;
@@ -100,9 +99,10 @@ struct ContactEquilibrium {
   std::shared_ptr<const std::vector<ContactIncrement>> path;
 };
 
-/// Derivatives of one load step's loads, and of E, nu and radii, to q parameters.
+/// Derivatives of one load step's loads, and of E, nu, radii and the layers' stiffness, to q parameters.
 struct ContactLoadsAlong {
-  VectorX log_young, poisson;                       ///< q
+  VectorX log_young, poisson, log_layer;            ///< q; log_layer: of all contacts together
+  MatrixX log_stiffness;                            ///< a region x q; no rows where there is one region
   MatrixX force_coefficients, motion_coefficients;  ///< rows as in ContactLoads, q columns
   std::vector<MatrixX> motion, wrench;              ///< 6 x q, one a contact
   std::vector<VectorX> radius;                      ///< q, one a contact
@@ -126,7 +126,7 @@ struct ContactPathSensitivity {
 
 /// Exact derivatives away from changes of what touches and slides. One column a parameter: log E, nu, force coefficients,
 /// motion coefficients, then for every contact 6 of its pose (a shift of the tip, a rotation about it), 6 of its wrench, 1 of
-/// its radius.
+/// its radius; then log of every region's stiffness.
 struct ContactSensitivity {
   MatrixX displacement;         ///< 3n x p
   std::vector<MatrixX> wrench;  ///< 6 x p, one a contact
@@ -134,6 +134,7 @@ struct ContactSensitivity {
   MatrixX motion_reaction;      ///< m x p
   Index log_young = 0, poisson = 1, first_force = 2, first_motion = 2;
   std::vector<Index> first_pose, first_wrench, radius;  ///< one a contact; radius -1 where the shape has none
+  Index first_stiffness = 2;
 };
 
 class ContactStatics {
@@ -146,16 +147,31 @@ class ContactStatics {
   ContactStatics(ContactStatics&&) noexcept;
   ContactStatics& operator=(ContactStatics&&) noexcept;
 
+  /// Solves from here on are with these (ContactOptions::statics.region). The layers are as much stiffer as what lies behind
+  /// them. @throws Error unless there is one positive number a region
+  void set_region_stiffness(const VectorX& stiffness);
+
   /// All zeros, of the right sizes.
   ContactLoads no_loads() const;
 
-  /// @param from  the equilibrium that this load step starts from (friction and sticking remember it); nullptr: rest
+  /// @param from   the equilibrium that this load step starts from (friction and sticking remember it); nullptr: rest
+  /// @param guess  where friction or sticking remember: the same load step's end at parameters nearby (its displacement_m may
+  ///               have been moved along its derivatives). Saves work; the path starts at `from` all the same.
   ContactEquilibrium solve(double young_modulus_pa, double poisson_ratio, const ContactLoads& loads,
-                           const ContactEquilibrium* from = nullptr, const VectorX& extra = {}) const;
+                           const ContactEquilibrium* from = nullptr, const VectorX& extra = {},
+                           const ContactEquilibrium* guess = nullptr) const;
+  /// Forgets the factor that the next solution begins with, so that its digits do not depend on what was solved before.
+  void forget();
 
   /// Of one load step from rest; of the end of any sequence where no contact remembers (frictionless, bonded).
   /// @throws Error for contacts with friction or sticking ones in a state that another one led to: use sensitivity_along
   ContactSensitivity sensitivity(const ContactEquilibrium& at) const;
+
+  /// What the layers add to every tool's travel along its force, to first order in their compliance: subtract it for rigid
+  /// surfaces. A tool that is free to move: as it moves; one with a prescribed pose: at the same force. One factorisation. (A
+  /// patch that grows with the force, as a sphere's, takes less of the travel than layer_m; a punch's takes all of it.)
+  /// @throws Error as `sensitivity`
+  VectorX layer_travel_m(const ContactEquilibrium& at) const;
 
   /// All zeros, of the right sizes: loads that do not depend on q parameters, and the derivatives of the state of rest.
   ContactLoadsAlong no_loads_along(Index parameters) const;

@@ -25,6 +25,24 @@ double longest_edge_near(const TetMesh& mesh, const ContactPatch& patch) {
   return longest;
 }
 
+// The error left after two changes, where it falls as C h^p: (h0^p - h1^p) / (h1^p - h2^p) is the changes' ratio. Orders
+// beyond 2 are not believed: then the second change is small by chance (or the first is a coarse mesh's), and the first one
+// says what is left.
+double error_left(double first_change, double change, double h0, double h1, double h2) {
+  const auto left = [&](double p) { return change / (std::pow(h1 / h2, p) - 1); };
+  const auto excess = [&](double p) {
+    return (std::pow(h0, p) - std::pow(h1, p)) * change - (std::pow(h1, p) - std::pow(h2, p)) * first_change;
+  };
+  double low = 0.6, high = 2;
+  if (excess(low) >= 0) return left(low);  // slower still
+  if (excess(high) <= 0) return first_change * std::pow(h2, high) / (std::pow(h0, high) - std::pow(h1, high));
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (excess(middle) < 0 ? low : high) = middle;
+  }
+  return left(low);
+}
+
 }  // namespace
 
 Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double radius_m, const BoundaryOn& boundary_on,
@@ -67,7 +85,8 @@ Discretisation discretise(const TetMesh& base, const ContactPatch& given, const 
     const ContactAnswer answer = solve(quadratic, linear);
     for (std::size_t i = 0; i < seen.size(); ++i)
       surface.segment<3>(3 * static_cast<Index>(i)) = answer.displacement_m.segment<3>(3 * seen[i]);
-    if (answer.patch_radius_m > 0) patch.radius_m = answer.patch_radius_m;
+    // A mesh that is much coarser than the patch finds a few points of it, and no radius.
+    if (longest_edge_near(linear.mesh, patch) <= 2 * answer.patch_radius_m) patch.radius_m = answer.patch_radius_m;
     return answer.depth_m;
   };
 
@@ -77,7 +96,8 @@ Discretisation discretise(const TetMesh& base, const ContactPatch& given, const 
   double last = work(out.linear, out.mesh);
   if (!(std::abs(last) > 0)) throw Error("does no work: is the force zero or held by the supports?", "force");
   // The first level already resolves the disc: quadratic tetrahedra need about two edges a radius.
-  double edge = std::min(longest_edge_near(base, patch) / 2, patch.radius_m);
+  const double base_edge = longest_edge_near(base, patch);
+  double edge = std::min(base_edge / 2, patch.radius_m);
   double change = 0;
   const double base_work = last;
   double growth = 0.5;
@@ -92,8 +112,8 @@ Discretisation discretise(const TetMesh& base, const ContactPatch& given, const 
     out.surface_change = surface.norm() > 0 ? (surface - last_surface).norm() / surface.norm() : 0;
     const double previous_change = change;
     change = std::abs(now - last) / std::abs(now);
-    const double ratio = level == 1 ? 1.0 / 3 : std::clamp(change / std::max(previous_change, 1e-12), 0.2, 0.67);
-    out.young_error = change * ratio / (1 - ratio);
+    out.young_error =
+        level == 1 ? change / 2 : error_left(previous_change, change, level == 2 ? base_edge : 4 * edge, 2 * edge, edge);
     out.base_young_error = std::abs(base_work - now) / std::abs(now);
     out.linear = std::move(finer);
     out.mesh = std::move(quadratic);

@@ -68,8 +68,8 @@ using SolveOn = std::function<ContactAnswer(const TetMesh& quadratic, const Refi
 
 /// Refines under the tool until the depth of the load, work-conjugate (W = a' F' u), which is what a force-controlled probe sees
 /// (E_hat / E = u_h / u), changes by so little from level to level that the error left is below the tolerance. The error left is
-/// the geometric continuation of the last two changes: the rim of the load keeps convergence between first and second order. One
-/// change alone is no estimate, so there are two levels at least (within the limit of nodes; then half of the first change).
+/// what the last two changes and edges say when it falls as C h^p (0.6 <= p <= 2; the rim of the load keeps p between 1 and 2).
+/// One change alone is no estimate, so there are two levels at least (within the limit of nodes; then half of the first change).
 /// Each level also refines farther away from the tool, for the surface that cameras see.
 /// @param solve  any solution of the same load on a mesh, contact search included (contact_statics.hpp)
 Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const SolveOn& solve,

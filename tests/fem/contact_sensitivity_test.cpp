@@ -113,7 +113,7 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
     EXPECT_LT((dw - s.wrench[0].col(column)).norm(), 1e-3 * dw.norm() + 1e-4 * base.touches[0].wrench.norm()) << what;
     EXPECT_LT((tip - s.motion[0].col(column).head<3>()).norm(), 1e-3 * tip.norm() + 1e-7) << what;
   };
-  EXPECT_EQ(s.displacement.cols(), s.radius[0] < 0 ? 17 : 18);
+  EXPECT_EQ(s.displacement.cols(), s.radius[0] < 0 ? 17 : 18);  // one region: no columns for it
   check("log E", 1e-6, s.log_young, [](Point& p, double h) { p.log_young += h; });
   check("nu", 1e-6, s.poisson, [](Point& p, double h) { p.poisson += h; });
   check("weight", 1e-2, s.first_force + 2, [](Point& p, double h) { p.weight(2) += h; });
@@ -128,6 +128,101 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, ContactSensitivityContract, testing::ValuesIn(scenes()),
                          [](const auto& each) { return std::string(each.param.name); });
+
+// Two regions, one four times as stiff, under a rubbing ball: against differences, and all of them together are E.
+TEST(ContactRegions, DerivativesToTheirStiffnessAreThoseOfDifferences) {
+  const TetMesh mesh = to_quadratic(distorted(block_mesh(4, 4, 3, {0.1, 0.1, 0.075}), 0.003, 7));
+  for (const char* material : {"linear", "neo_hookean"})
+    for (const Dilatation dilatation : {Dilatation::pointwise, Dilatation::averaged})
+      for (const bool by_force : {true, false}) {
+        RigidContact ball;
+        ball.shape = sphere_shape(0.03);
+        ball.law = Touch::friction;
+        ball.friction_coefficient = 0.15;
+        ball.T_base_tool = tool_pose(Vec3(0.047, 0.052, 0.075), Vec3(0.05, -0.08, -1));
+        if (by_force) ball.free_axes = along(Vec3(0, 0, -1));
+        Boundary boundary;
+        boundary.constraints = clamp(nodes_where(mesh, [](const Vec3& x) { return x.z() < 1e-9; }));
+        ContactOptions options;
+        options.statics.dilatation = dilatation;
+        options.statics.residual_tolerance = 1e-12;
+        options.friction_tolerance = 1e-12;
+        for (Index e = 0; e < mesh.tetrahedra.rows(); ++e)
+          options.statics.region.push_back(mesh.nodes_m.row(mesh.tetrahedra(e, 0)).x() < 0.051 ? 0 : 1);
+        ContactStatics body(mesh, material, boundary, {ball}, options);
+        ContactLoads loads = body.no_loads();
+        if (by_force) loads.wrench[0].head<3>() = Vec3(0.2, 0.1, -1.5);
+        if (!by_force) loads.motion[0].head<3>() = Vec3(0.001, 0, -0.004);
+        const auto solve = [&](double log_second, double log_first = 0) {
+          body.set_region_stiffness(Eigen::Vector2d(std::exp(log_first), 4 * std::exp(log_second)));
+          ContactEquilibrium e = body.solve(2e4, 0.35, loads);
+          EXPECT_TRUE(e.converged) << e.reason;
+          return e;
+        };
+        constexpr double h = 1e-6;
+        for (int region = 0; region < 2; ++region) {
+          const ContactEquilibrium ahead = region == 0 ? solve(0, h) : solve(h), behind = region == 0 ? solve(0, -h) : solve(-h);
+          const ContactEquilibrium at = solve(0);
+          EXPECT_GT(at.touches[0].slipping_points, 4);
+          const ContactSensitivity s = body.sensitivity(at);
+          const VectorX du = (ahead.displacement_m - behind.displacement_m) / (2 * h);
+          const Vec6 dw = (ahead.touches[0].wrench - behind.touches[0].wrench) / (2 * h);
+          const Index column = s.first_stiffness + region;
+          EXPECT_LT((du - s.displacement.col(column)).norm(), 1e-3 * du.norm()) << material << region;
+          EXPECT_LT((dw - s.wrench[0].col(column)).norm(), 1e-3 * dw.norm() + 1e-4 * at.touches[0].wrench.norm());
+          const VectorX all = s.displacement.col(s.first_stiffness) + s.displacement.col(s.first_stiffness + 1);
+          EXPECT_LT((all - s.displacement.col(s.log_young)).norm(), 1e-6 * du.norm() + 1e-6 * all.norm());
+        }
+      }
+}
+
+// A guess saves work and leaves the answer and its derivatives as they are.
+TEST(ContactGuess, SavesWorkAndNotDigits) {
+  const TetMesh mesh = to_quadratic(distorted(block_mesh(4, 3, 2, {0.08, 0.06, 0.04}), 0.002, 5));
+  Boundary boundary;
+  const auto top = nodes_where(mesh, [](const Vec3& x) { return x.z() > 0.039; });
+  boundary.forces = hstack({body_force(mesh), spread_over_nodes(static_cast<Index>(mesh.nodes_m.rows()), top)});
+  RigidContact table;
+  table.shape = plane_shape();
+  table.law = Touch::friction;
+  table.friction_coefficient = 0.4;
+  table.T_base_tool = tool_pose(Vec3(0.04, 0.03, 0), Vec3::UnitZ());
+  const auto run = [&](ContactStatics& body, double young, const std::vector<ContactEquilibrium>* guesses) {
+    std::vector<ContactEquilibrium> steps;
+    ContactLoads loads = body.no_loads();
+    loads.force_coefficients.resize(6);
+    for (const Vec3& force : {Vec3(0, 0, -1), Vec3(0.4, 0.1, -1.5), Vec3(0.7, 0, -2)}) {
+      loads.force_coefficients << 0, 0, -9810, force;
+      const ContactEquilibrium* from = steps.empty() ? nullptr : &steps.back();
+      ContactEquilibrium e = body.solve(young, 0.3, loads, from, {}, guesses ? &(*guesses)[steps.size()] : nullptr);
+      EXPECT_TRUE(e.converged) << e.reason;
+      steps.push_back(e);
+    }
+    return steps;
+  };
+  ContactOptions options;
+  options.statics.residual_tolerance = 1e-10;
+  options.friction_tolerance = 1e-10;
+  ContactStatics body(mesh, "neo_hookean", boundary, {table}, options), fresh(mesh, "neo_hookean", boundary, {table}, options);
+  const auto before = run(body, 2e4, nullptr), guessed = run(body, 2.02e4, &before), plain = run(fresh, 2.02e4, nullptr);
+  for (std::size_t s = 0; s < plain.size(); ++s) {
+    EXPECT_LT((guessed[s].displacement_m - plain[s].displacement_m).norm(), 1e-7 * plain[s].displacement_m.norm()) << s;
+    EXPECT_LT((guessed[s].touches[0].wrench - plain[s].touches[0].wrench).norm(), 1e-7 * plain[s].touches[0].wrench.norm()) << s;
+    EXPECT_EQ(guessed[s].increments, plain[s].increments) << s;
+    EXPECT_LE(2 * guessed[s].factorisations, plain[s].factorisations) << s;
+  }
+  const auto derivative = [&](const std::vector<ContactEquilibrium>& steps, const ContactStatics& of) {
+    ContactPathSensitivity d = of.rest_along(2);
+    for (const ContactEquilibrium& e : steps) {
+      ContactLoadsAlong along = of.no_loads_along(2);
+      along.log_young(0) = along.poisson(1) = 1;
+      d = of.sensitivity_along(e, along, d);
+    }
+    return d.displacement;
+  };
+  const MatrixX a = derivative(guessed, body), b = derivative(plain, fresh);
+  EXPECT_LT((a - b).norm(), 1e-6 * b.norm());
+}
 
 // A block on a table with friction: its weight, then a push aside and down in two steps, the second one back a little. What it
 // does at the end depends on every step before.

@@ -132,6 +132,7 @@ TEST(Table, BlockLiftsOffAsOnWinklersFoundation) {
 TEST(Platen, ByForceAndByPoseIsTheBar) {
   const TetMesh mesh = to_quadratic(distorted(block_mesh(3, 3, 2, {0.06, 0.06, 0.04}), 0.002, 3));
   const double area = 0.06 * 0.06, force = 1.5;
+  VectorX layers;
   const auto solve = [&](bool by_force, double value) {
     const ContactStatics body(
         mesh, "linear", Boundary(),
@@ -140,12 +141,15 @@ TEST(Platen, ByForceAndByPoseIsTheBar) {
     (by_force ? loads.wrench[1] : loads.motion[1])(2) = -value;
     ContactEquilibrium e = body.solve(kYoung, 0.3, loads);
     EXPECT_TRUE(e.converged) << e.reason;
+    layers = body.layer_travel_m(e);
     return e;
   };
   const ContactEquilibrium pushed = solve(true, force);
   const double travel = 0.04 - pushed.touches[1].T_base_tool.translation().z();
   EXPECT_NEAR(travel - pushed.touches[0].layer_m - pushed.touches[1].layer_m, force * 0.04 / (kYoung * area), 1e-7 * travel);
+  EXPECT_NEAR(layers(1), pushed.touches[0].layer_m + pushed.touches[1].layer_m, 1e-6 * layers(1));
   const ContactEquilibrium moved = solve(false, travel);
+  EXPECT_NEAR(layers(1), pushed.touches[0].layer_m + pushed.touches[1].layer_m, 1e-6 * layers(1));
   EXPECT_NEAR(-moved.touches[1].wrench(2), force, 1e-6 * force);
   EXPECT_NEAR(moved.touches[0].wrench(2), force, 1e-6 * force);
 }

@@ -1,9 +1,9 @@
 // label: oracle
 // SPDX-License-Identifier: Apache-2.0
 // The error that the solver knows, in contact: spheres and bars of 10, 15 and 25 mm radius as rigid tools pressed into the
-// cube (0.15 m, bottom held, E = 20 kPa, nu = 0.3) by a quarter of their radius, at automatic settings, against a mesh twice
-// as fine around the patch that was found. PALPATE_ALL_TOOLS=1 runs more than the first of them. Both planes of symmetry are
-// used: a quarter of the cube is solved.
+// cube (0.15 m, bottom held, E = 20 kPa, nu = 0.3) by a quarter of their radius, at automatic settings, against an
+// extrapolated pair of meshes. Spheres of 8 and 20 mm stand by, lest anything is made for the others. PALPATE_ALL_TOOLS=1
+// runs more than the sphere of 25 mm. Both planes of symmetry are used: a quarter of the cube is solved.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -62,7 +62,7 @@ class KnownContactError : public testing::TestWithParam<Tool> {
     EXPECT_TRUE(e.converged) << e.reason;
     const TouchResult& touch = e.touches[0];
     ContactAnswer answer;
-    answer.depth_m = kHeight - touch.T_base_tool.translation().z() - touch.layer_m;
+    answer.depth_m = kHeight - touch.T_base_tool.translation().z() - body.layer_travel_m(e)(0);
     answer.displacement_m = e.displacement_m;
     for (Index i = 0; i < touch.patch_m.rows(); ++i)
       answer.patch_radius_m = std::max(answer.patch_radius_m, std::abs(touch.patch_m(i, 1)));
@@ -78,34 +78,41 @@ TEST_P(KnownContactError, DepthAndSurfaceAreRightAndTheEstimateIsTrue) {
   const Discretisation d = discretise(base, patch, [&](const TetMesh& mesh, const RefinedMesh&) { return solve(mesh); });
   EXPECT_TRUE(d.tolerance_met);
   const ContactAnswer automatic = solve(d.mesh);
+  // The reference: a mesh of the same edges under the tool, graded twice as fast, and the same with every edge halved; an
+  // error that falls with the edge squared is taken off. What is taken off is how well the reference is known.
   ContactPatch found = patch;
   found.radius_m = automatic.patch_radius_m;
-  const RefinedMesh fine = refine_near(
-      base, [&](const Vec3& x) { return found.distance_m(x) - 1.2 * found.radius_m; }, 0.5 * d.edge_m, 0.45, 9000);
-  const ContactAnswer reference = solve(to_quadratic(fine.mesh));
-  const double error = std::abs(automatic.depth_m / reference.depth_m - 1);
-  EXPECT_LT(error, 0.01);
-  EXPECT_GT(d.young_error, 0.5 * error);
-  EXPECT_LT(d.young_error, 4 * error);
+  const TetMesh coarse = refine_near(
+                             base, [&](const Vec3& x) { return found.distance_m(x) - 1.2 * found.radius_m; }, d.edge_m,
+                             GetParam().length_m > 0 ? 1.0 : 0.7, 9000)
+                             .mesh;
+  const TetMesh fine = refine_uniform(coarse);
+  const ContactAnswer coarser = solve(to_quadratic(coarse)), finer = solve(to_quadratic(fine));
+  const double correction = (finer.depth_m - coarser.depth_m) / 3, depth_m = finer.depth_m + correction;
+  const double error = std::abs(automatic.depth_m / depth_m - 1), unknown = std::abs(correction) / depth_m;
   double difference = 0, size = 0;
   for (Index i : nodes_where(base, [&](const Vec3& x) {
          return ((x.head<2>().array() > kEdge - 1e-9).any() || x.z() > kHeight - 1e-9) &&
                 patch.distance_m(x) > GetParam().radius_m;
        })) {
-    const Vec3 u = reference.displacement_m.segment<3>(3 * i);
+    const Vec3 u = finer.displacement_m.segment<3>(3 * i);
     difference += (automatic.displacement_m.segment<3>(3 * i) - u).squaredNorm();
     size += u.squaredNorm();
   }
   const double surface_error = std::sqrt(difference / size);
+  std::printf("| %s | %.2f mm | %.1f mm | %ld, %ld | %.1f %% | %.2f ± %.2f %% | %.2f %% | %.1f | %.2f %% |\n",
+              GetParam().name, 1e3 * depth_m, 1e3 * finer.patch_radius_m, static_cast<long>(d.linear.mesh.nodes_m.rows()),
+              static_cast<long>(fine.nodes_m.rows()), 100 * d.base_young_error, 100 * error, 100 * unknown,
+              100 * d.young_error, d.young_error / error, 100 * surface_error);
+  EXPECT_LT(error + unknown, 0.01);
+  EXPECT_GT(d.young_error, 0.5 * error);
+  EXPECT_LT(d.young_error, 4 * error);
   EXPECT_LT(surface_error, 0.003);
-  std::printf("| %s | %.2f mm | %.1f mm | %ld, %ld | %.2f %% | %.2f %% | %.2f %% | %.2f | %.2f %% |\n", GetParam().name,
-              1e3 * reference.depth_m, 1e3 * reference.patch_radius_m, static_cast<long>(d.linear.mesh.nodes_m.rows()),
-              static_cast<long>(fine.mesh.nodes_m.rows()), 100 * d.base_young_error, 100 * error, 100 * d.young_error,
-              d.young_error / error, 100 * surface_error);
 }
 
 INSTANTIATE_TEST_SUITE_P(Tools, KnownContactError,
-                         testing::Values(Tool{"sphere_10", 0.010, 0, 0.40}, Tool{"sphere_15", 0.015, 0, 0.90},
+                         testing::Values(Tool{"sphere_8", 0.008, 0, 0.26}, Tool{"sphere_20", 0.020, 0, 1.60},
+                                         Tool{"sphere_10", 0.010, 0, 0.40}, Tool{"sphere_15", 0.015, 0, 0.90},
                                          Tool{"sphere_25", 0.025, 0, 2.50}, Tool{"bar_10", 0.010, 0.06, 2},
                                          Tool{"bar_15", 0.015, 0.06, 3}, Tool{"bar_25", 0.025, 0.06, 5}),
                          [](const auto& each) { return std::string(each.param.name); });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/fem/contact/contact_path.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "palpate/core/error.hpp"
@@ -76,10 +77,22 @@ void SlidingLimits::add(const MatrixX& du, const std::vector<MatrixX>& twist, Ma
   }
 }
 
-void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, MatrixX& du,
-                          MatrixX& dz, double tolerance) const {
-  system.solve(t, ru, rz, false, du, dz);
-  if (empty()) return;
+bool SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, MatrixX& du,
+                          MatrixX& dz, double tolerance, int* factorisations) const {
+  // A factorisation costs as much as some tens of back-substitutions and products.
+  const int few = static_cast<int>(std::min<Eigen::Index>(14, 40 / std::max<Eigen::Index>(1, ru.cols())));
+  if (system.has_factor() && few > 4 && solve_by_krylov(system, t, ru, rz, du, dz, tolerance, false, few)) return true;
+  if (factorisations != nullptr) ++*factorisations;
+  if (!system.factorise(t, 0, 1e-9)) return false;
+  solve_by_krylov(system, t, ru, rz, du, dz, tolerance, true, 80);
+  return true;
+}
+
+// @param fresh  the factor is that of S itself; else it is of a state nearby, and products with S are needed
+bool SlidingLimits::solve_by_krylov(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz,
+                                    MatrixX& du, MatrixX& dz, double tolerance, bool fresh, int most) const {
+  system.solve(t, ru, rz, !fresh, du, dz);
+  if (fresh && empty()) return true;
   const Index n = static_cast<Index>(du.rows()), z = static_cast<Index>(dz.rows()), q = static_cast<Index>(du.cols());
   const auto count = system.contacts.size();
   const auto stacked = [&](const MatrixX& u, const MatrixX& tools) {
@@ -87,7 +100,7 @@ void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const 
     all << u, tools;
     return all;
   };
-  const auto apply = [&](const MatrixX& v) {  // (I + S^-1 B) v
+  const auto apply = [&](const MatrixX& v) {  // P^-1 (S + B) v, with P the factor's matrix
     MatrixX forces = MatrixX::Zero(n, q), tool_forces = MatrixX::Zero(z, q), u, tools;
     std::vector<MatrixX> twist, gradients(count, MatrixX::Zero(6, q));
     for (std::size_t c = 0; c < count; ++c) {
@@ -99,18 +112,26 @@ void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const 
       const MatrixX& axes = system.contacts[c].free_axes;
       tool_forces.middleRows(system.first_axis[c], axes.cols()) = axes.transpose() * gradients[c];
     }
-    system.solve(t, forces, tool_forces, false, u, tools);
-    return MatrixX(v + stacked(u, tools));
+    if (!fresh) {
+      for (Index k = 0; k < q; ++k) forces.col(k) += system.assembly.multiply(t.blocks, v.col(k).head(n));
+      if (z > 0) {
+        forces += t.coupling * v.bottomRows(z);
+        tool_forces += t.coupling.transpose() * v.topRows(n) + t.tool * v.bottomRows(z);
+      }
+    }
+    system.solve(t, forces, tool_forces, !fresh, u, tools);
+    return fresh ? MatrixX(v + stacked(u, tools)) : stacked(u, tools);
   };
   // One Krylov space a column; products of all columns share the back-substitutions.
-  constexpr int most = 80;
   const MatrixX right = stacked(du, dz);
   const VectorX size = right.colwise().norm();
   std::vector<MatrixX> basis{right * size.unaryExpr([](double s) { return s > 0 ? 1 / s : 0.0; }).asDiagonal()};
   std::vector<MatrixX> hessenberg(static_cast<std::size_t>(q), MatrixX::Zero(most + 1, most));
   std::vector<VectorX> weights(static_cast<std::size_t>(q));
+  double first_left = 1;
   for (int k = 0; k < most; ++k) {
     MatrixX next = apply(basis.back());
+    if (!next.allFinite()) return false;
     VectorX length(q);
     for (Index c = 0; c < q; ++c) {
       MatrixX& h = hessenberg[static_cast<std::size_t>(c)];
@@ -134,7 +155,12 @@ void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const 
       weights[static_cast<std::size_t>(c)] = h.colPivHouseholderQr().solve(first);
       left = std::max(left, (h * weights[static_cast<std::size_t>(c)] - first).norm() / size(c));
     }
-    if (left < tolerance || k + 1 == most) {
+    if (k == 2) first_left = left;
+    // Too slow to get there in time: a new factor is cheaper.
+    const bool hopeless = !fresh && k >= 4 && left > tolerance &&
+                          std::log(left / tolerance) > (most - k - 1) * std::log(std::max(first_left / left, 1.0)) / (k - 2);
+    if (hopeless) return false;
+    if (left < tolerance || (k + 1 == most && fresh)) {
       MatrixX x = MatrixX::Zero(n + z, q);
       for (Index c = 0; c < q; ++c) {
         if (!(size(c) > 0)) continue;
@@ -143,10 +169,11 @@ void SlidingLimits::solve(ContactSystem& system, const ContactTangent& t, const 
       }
       du = x.topRows(n);
       dz = x.bottomRows(z);
-      return;
+      return true;
     }
     basis.push_back(std::move(next));
   }
+  return false;
 }
 
 void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactIncrement& before,
@@ -162,18 +189,23 @@ void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactI
   if (!system.evaluate(p, after.memory, s)) throw Error("holds inverted elements", "sensitivity.at");
   ContactTangent t;
   system.tangent(p, after.memory, s, false, t);
-  if (!system.factorise(t, 0, 1e-9)) throw Error("the equilibrium is not stable: it has no derivative", "sensitivity.at");
   const SlidingLimits limits(system, p, after.memory, s);
   const SurfacePoints& points = system.terms.points();
 
   // Change of every force at fixed u and z: on nodes, and on the tools along all axes.
   const MatrixX imposed = system.motions * to.motion_coefficients;
   MatrixX change = (s.internal + s.touching) * to.log_young.transpose();  // all of it is proportional to E
+  change += s.touching * to.log_layer.transpose();  // and this to the layers' stiffness, friction limits included
   change += system.assembly.forces_d_poisson(system.law, p.m, s.u) * to.poisson.transpose();
   change -= system.boundary.forces * to.force_coefficients;
   if (system.motions.cols() > 0)
     for (Index k = 0; k < q; ++k)
       if (imposed.col(k).cwiseAbs().maxCoeff() > 0) change.col(k) += system.assembly.multiply(t.blocks, imposed.col(k));
+  const Index regions = static_cast<Index>(to.log_stiffness.rows());
+  const bool by_region = regions > 0 && !to.log_stiffness.isZero(0);
+  if (by_region)
+    for (Index k = 0; k < regions; ++k)
+      change += system.assembly.forces_d_log_stiffness(system.law, p.m, s.u, static_cast<int>(k)) * to.log_stiffness.row(k);
   std::vector<MatrixX> gradient, twist;
   std::vector<std::vector<ContactTerms::Held>> held;
   std::vector<AnchorSensitivity> anchors(count);
@@ -188,9 +220,15 @@ void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactI
     carried.bottomRows<3>() = turn * d.motion[c].bottomRows<3>() +
                               rotation_slope(after.loads.motion[c].tail<3>()) * to.motion[c].bottomRows<3>() -
                               turn * rotation_slope(before.loads.motion[c].tail<3>()) * from.motion[c].bottomRows<3>();
-    gradient.push_back(s.gradients[c] * to.log_young.transpose() + t.tools[c].coupling.transpose() * imposed +
-                       t.tools[c].hessian * carried);
+    gradient.push_back(s.gradients[c] * (to.log_young + to.log_layer).transpose() +
+                       t.tools[c].coupling.transpose() * imposed + t.tools[c].hessian * carried);
     change += t.tools[c].coupling * carried;
+    if (by_region) {
+      MatrixX touching = MatrixX::Zero(s.u.size(), regions), on_tool = MatrixX::Zero(6, regions);
+      system.terms.forces_by_region(body, s.u, touching, on_tool);
+      change += touching * to.log_stiffness;
+      gradient[c] += on_tool * to.log_stiffness;
+    }
     if (to.radius[c].cwiseAbs().maxCoeff() > 0 && system.contacts[c].shape->has_radius()) {
       VectorX by_radius = VectorX::Zero(s.u.size());
       Vec6 gradient_by_radius = Vec6::Zero();
@@ -245,7 +283,8 @@ void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactI
     const MatrixX& axes = system.contacts[c].free_axes;
     tool_rhs.middleRows(system.first_axis[c], axes.cols()) = axes.transpose() * (to.wrench[c] - gradient[c]);
   }
-  limits.solve(system, t, -change, tool_rhs, du, dz);
+  if (!limits.solve(system, t, -change, tool_rhs, du, dz, 1e-11))
+    throw Error("the equilibrium is not stable: it has no derivative", "sensitivity.at");
   if (!du.allFinite() || !dz.allFinite()) throw Error("a tool touches nothing: it has no derivative", "sensitivity.at");
 
   std::vector<MatrixX> moves;

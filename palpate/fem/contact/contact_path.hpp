@@ -5,7 +5,7 @@
 //   R(u, z; a, theta) = 0,   friction limits mu p(u, z) inside R     =>   (S + B) d(u, z) = -dR/dtheta - dR/da da/dtheta
 //
 // S is the symmetric tangent at fixed limits, B what the limits of sliding points add, which is not symmetric: B is brought
-// in by GMRES, preconditioned with the factor of S (Saad & Schultz 1986).
+// in by GMRES, preconditioned with the factor of S (Saad & Schultz 1986). The factor of a state nearby will do as well.
 #pragma once
 
 #include "palpate/fem/contact/contact_problem.hpp"
@@ -20,11 +20,15 @@ class SlidingLimits {
   bool empty() const { return points_.empty(); }
   /// Adds B (du, twists) to forces on nodes (3n x q) and to the tools' gradients (6 x q, one a contact).
   void add(const MatrixX& du, const std::vector<MatrixX>& twist, MatrixX& forces, std::vector<MatrixX>& gradients) const;
-  /// Solves (S + B) x = r along free axes with the last factor of S. @param tolerance  of what is left, relative
-  void solve(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, MatrixX& du, MatrixX& dz,
-             double tolerance = 1e-11) const;
+  /// Solves (S + B) x = r along free axes; with the factor that is there (of this state or one nearby) where that takes few
+  /// steps, else with a new one. @param tolerance  of what is left, relative
+  /// @param factorisations  counted up @returns false where S has no factor
+  bool solve(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, MatrixX& du, MatrixX& dz,
+             double tolerance, int* factorisations = nullptr) const;
 
  private:
+  bool solve_by_krylov(ContactSystem& system, const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, MatrixX& du,
+                       MatrixX& dz, double tolerance, bool fresh, int most) const;
   struct Point {
     std::size_t contact;
     Index face;
@@ -45,6 +49,9 @@ void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactI
 ContactPathSensitivity path_sensitivity(ContactSystem& system, const ContactEquilibrium& at,
                                         const std::vector<ContactIncrement>& path, const ContactLoadsAlong& along,
                                         const ContactPathSensitivity& from);
+
+/// ContactStatics::layer_travel_m.
+VectorX layer_travel_of(ContactSystem& system, const ContactStatics& statics, const ContactEquilibrium& at);
 
 /// ContactStatics::sensitivity.
 ContactSensitivity sensitivity_of(ContactSystem& system, const ContactStatics& statics, const ContactEquilibrium& at);

@@ -41,7 +41,7 @@ ContactSystem::ContactSystem(const TetMesh& mesh_in, const std::string& material
     : mesh(mesh_in),
       law(material_law(material)),
       options(options_in),
-      assembly(mesh_in, options_in.statics.dilatation),
+      assembly(mesh_in, options_in.statics.dilatation, options_in.statics.region),
       boundary(checked(mesh_in, std::move(boundary_in))),
       floating(leaves_motions(mesh_in, boundary)),
       system(assembly.pattern(), boundary.constraints,
@@ -72,7 +72,17 @@ ContactSystem::ContactSystem(const TetMesh& mesh_in, const std::string& material
   }
   motions = MatrixX(boundary.motions);
   for (Index k = 0; k < motions.cols(); ++k) motions.col(k) = system.prescribed_part(motions.col(k));
+  if (assembly.region_count() > 0) {
+    const VectorX given = options.statics.region_stiffness;
+    set_region_stiffness(given.size() > 0 ? given : VectorX::Ones(assembly.region_count()));
+  }
   diameter_m = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
+}
+
+void ContactSystem::set_region_stiffness(const VectorX& stiffness) {
+  assembly.set_region_stiffness(stiffness);
+  terms.set_regions(options.statics.region, stiffness);
+  body_blocks_.clear();
 }
 
 TouchingBody ContactSystem::body(std::size_t contact, const Moduli& m, const Pose& pose,
@@ -161,7 +171,7 @@ void ContactSystem::tangent(const ContactProblem& p, const std::vector<TouchMemo
 bool ContactSystem::factorise(const ContactTangent& t, double shift, double proximal) {
   proximal_ = 0;
   if (!floating || proximal == 0)
-    return system.factorise(assembly.pattern(), t.blocks, shift, assembly.expected_negative_pivots());
+    return has_factor_ = system.factorise(assembly.pattern(), t.blocks, shift, assembly.expected_negative_pivots());
   shifted_ = t.blocks;
   const BlockPattern& pattern = assembly.pattern();
   diagonal_ = 0;
@@ -171,7 +181,7 @@ bool ContactSystem::factorise(const ContactTangent& t, double shift, double prox
   for (Index i = 0; i < assembly.node_count(); ++i)
     for (int k = 0; k < 9; k += 4) block(i)[k] += proximal * diagonal_;
   proximal_ = proximal;
-  return system.factorise(pattern, shifted_, shift, assembly.expected_negative_pivots());
+  return has_factor_ = system.factorise(pattern, shifted_, shift, assembly.expected_negative_pivots());
 }
 
 void ContactSystem::solve(const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, bool definite, MatrixX& du,

@@ -45,6 +45,7 @@ class ContactSystem {
   ContactSystem(const TetMesh& mesh, const std::string& material, Boundary boundary, std::vector<RigidContact> contacts,
                 ContactOptions options);
 
+  void set_region_stiffness(const VectorX& stiffness);
   TouchingBody body(std::size_t contact, const Moduli& m, const Pose& pose, const std::vector<TouchMemory>& memory) const;
   ContactProblem problem(double young, double poisson, const ContactLoads& loads, const VectorX& extra) const;
   /// False where the law does not exist.
@@ -53,6 +54,8 @@ class ContactSystem {
                ContactTangent& t);
   /// @param proximal  added to every diagonal, over their mean: holds rigid motions that nothing holds
   bool factorise(const ContactTangent& t, double shift, double proximal);
+  bool has_factor() const { return has_factor_; }  ///< of the last tangent that was factorised
+  void forget_factor() { has_factor_ = false; }
   /// Solves [K C; C' D] [du; dz] = [ru; rz] with the last factor; refines where proximal terms were added.
   /// @param definite  Newton's method: a tool without stiffness gets some; false: as it is (sensitivities)
   void solve(const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, bool definite, MatrixX& du, MatrixX& dz) const;
@@ -89,6 +92,7 @@ class ContactSystem {
   Moduli linear_;
   mutable BlockValues shifted_;
   double proximal_ = 0, diagonal_ = 0;
+  bool has_factor_ = false;
 };
 
 /// The pose moved by a twist: tip translated, rotated about the tip.

@@ -31,6 +31,8 @@ void widen(ContactPathSensitivity& d, Index q) {
   }
   widen(d.loads.log_young, q);
   widen(d.loads.poisson, q);
+  widen(d.loads.log_layer, q);
+  widen(d.loads.log_stiffness, q);
   widen(d.loads.force_coefficients, q);
   widen(d.loads.motion_coefficients, q);
   for (auto& each : d.loads.motion) widen(each, q);
@@ -39,7 +41,7 @@ void widen(ContactPathSensitivity& d, Index q) {
 }
 
 ContactLoadsAlong between(const ContactLoadsAlong& a, const ContactLoadsAlong& b, double t) {
-  ContactLoadsAlong out = b;  // E, nu and radii are those of the whole step
+  ContactLoadsAlong out = b;  // E, nu, radii, layers and regions are those of the whole step
   out.force_coefficients = (1 - t) * a.force_coefficients + t * b.force_coefficients;
   out.motion_coefficients = (1 - t) * a.motion_coefficients + t * b.motion_coefficients;
   for (std::size_t c = 0; c < b.motion.size(); ++c) {
@@ -50,6 +52,29 @@ ContactLoadsAlong between(const ContactLoadsAlong& a, const ContactLoadsAlong& b
 }
 
 bool remembers(Touch law) { return law == Touch::friction || law == Touch::sticking; }
+
+// The way from rest to a state; where nothing remembers, as if it had been gone in one go.
+std::vector<ContactIncrement> path_from_rest(const ContactSystem& system, const ContactStatics& statics,
+                                             const ContactEquilibrium& at) {
+  const auto count = system.contacts.size();
+  if (at.displacement_m.size() != 3 * system.mesh.nodes_m.rows() || at.touches.size() != count || !at.path ||
+      at.path->size() < 2)
+    throw Error("is not a state of this mesh and these contacts", "sensitivity.at");
+  bool path_matters = false;
+  for (std::size_t c = 0; c < count; ++c) {
+    if (!remembers(system.contacts[c].law)) continue;
+    path_matters = true;
+    if (at.increments_from_rest != at.increments)
+      throw Error("depends on the steps before: hand the derivatives on from step to step with sensitivity_along",
+                  "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
+  }
+  if (path_matters) return *at.path;
+  std::vector<ContactIncrement> path{at.path->front(), at.path->back()};
+  path.front().displacement_m.setZero();
+  path.front().loads = statics.no_loads();
+  for (std::size_t c = 0; c < count; ++c) path.front().poses[c] = system.contacts[c].T_base_tool;
+  return path;
+}
 
 }  // namespace
 
@@ -74,19 +99,37 @@ ContactPathSensitivity path_sensitivity(ContactSystem& system, const ContactEqui
   return d;
 }
 
+VectorX layer_travel_of(ContactSystem& system, const ContactStatics& statics, const ContactEquilibrium& at) {
+  const Index count = static_cast<Index>(system.contacts.size());
+  const std::vector<ContactIncrement> path = path_from_rest(system, statics, at);
+  // The layers together, then the travel of every tool whose pose is prescribed.
+  ContactLoadsAlong along = statics.no_loads_along(1 + count);
+  ContactPathSensitivity rest = statics.rest_along(1 + count);
+  along.log_layer(0) = 1;
+  std::vector<Vec3> into(system.contacts.size(), Vec3::Zero());
+  for (Index c = 0; c < count; ++c) {
+    const auto k = static_cast<std::size_t>(c);
+    const Vec3 force = at.touches[k].wrench.head<3>();
+    if (force.norm() > 0) into[k] = force.normalized();
+    if (system.contacts[k].free_axes.cols() == 0) rest.motion[k].col(1 + c).head<3>() = into[k];
+  }
+  const ContactPathSensitivity d = path_sensitivity(system, at, path, along, rest);
+  VectorX travel = VectorX::Zero(count);
+  for (Index c = 0; c < count; ++c) {
+    const auto k = static_cast<std::size_t>(c);
+    if (system.contacts[k].free_axes.cols() > 0) {
+      travel(c) = -into[k].dot(d.motion[k].col(0).head<3>());
+    } else {
+      const double stiffness = into[k].dot(d.wrench[k].col(1 + c).head<3>());
+      if (stiffness > 0) travel(c) = into[k].dot(d.wrench[k].col(0).head<3>()) / stiffness;
+    }
+  }
+  return travel;
+}
+
 ContactSensitivity sensitivity_of(ContactSystem& system, const ContactStatics& statics, const ContactEquilibrium& at) {
   const auto count = system.contacts.size();
-  if (at.displacement_m.size() != 3 * system.mesh.nodes_m.rows() || at.touches.size() != count || !at.path ||
-      at.path->size() < 2)
-    throw Error("is not a state of this mesh and these contacts", "sensitivity.at");
-  bool path_matters = false;
-  for (std::size_t c = 0; c < count; ++c) {
-    if (!remembers(system.contacts[c].law)) continue;
-    path_matters = true;
-    if (at.increments_from_rest != at.increments)
-      throw Error("depends on the steps before: hand the derivatives on from step to step with sensitivity_along",
-                  "contacts[" + std::to_string(c) + "] '" + system.contacts[c].name + "'");
-  }
+  const std::vector<ContactIncrement> path = path_from_rest(system, statics, at);
   ContactSensitivity out;
   const Index forces = static_cast<Index>(system.boundary.forces.cols()), driven = static_cast<Index>(system.motions.cols());
   Index columns = 2;
@@ -100,7 +143,11 @@ ContactSensitivity sensitivity_of(ContactSystem& system, const ContactStatics& s
     columns += 12;
     out.radius.push_back(system.contacts[c].shape->has_radius() ? columns++ : -1);
   }
+  const Index regions = system.assembly.region_count();
+  out.first_stiffness = columns;
+  columns += regions;
   ContactLoadsAlong along = statics.no_loads_along(columns);
+  along.log_stiffness.middleCols(out.first_stiffness, regions).setIdentity();
   along.log_young(out.log_young) = along.poisson(out.poisson) = 1;
   along.force_coefficients.middleCols(out.first_force, forces).setIdentity();
   along.motion_coefficients.middleCols(out.first_motion, driven).setIdentity();
@@ -109,13 +156,6 @@ ContactSensitivity sensitivity_of(ContactSystem& system, const ContactStatics& s
     rest.motion[c].middleCols(out.first_pose[c], 6).setIdentity();
     along.wrench[c].middleCols(out.first_wrench[c], 6).setIdentity();
     if (out.radius[c] >= 0) along.radius[c](out.radius[c]) = 1;
-  }
-  std::vector<ContactIncrement> path = *at.path;
-  if (!path_matters) {  // as if it had been reached from rest in one go
-    path = {path.front(), path.back()};
-    path.front().displacement_m.setZero();
-    path.front().loads = statics.no_loads();
-    for (std::size_t c = 0; c < count; ++c) path.front().poses[c] = system.contacts[c].T_base_tool;
   }
   ContactPathSensitivity d = path_sensitivity(system, at, path, along, rest);
   out.displacement = std::move(d.displacement);

@@ -29,6 +29,15 @@ void make_convex(Mat3& h) {
 ContactTerms::ContactTerms(const TetMesh& mesh, const BlockPattern& pattern, int per_edge)
     : rest_m_(mesh.nodes_m), points_(mesh, pattern, per_edge) {}
 
+void ContactTerms::set_regions(const std::vector<int>& region, const VectorX& stiffness) {
+  region_.resize(static_cast<std::size_t>(points_.face_count()));
+  harder_.resize(region_.size());
+  for (Index f = 0; f < points_.face_count(); ++f) {
+    region_[static_cast<std::size_t>(f)] = region[static_cast<std::size_t>(points_.element(f))];
+    harder_[static_cast<std::size_t>(f)] = stiffness(region_[static_cast<std::size_t>(f)]);
+  }
+}
+
 Vec3 ContactTerms::position(const VectorX& u, Index face, int point) const {
   Vec3 x = Vec3::Zero();
   for (int a = 0; a < points_.nodes_per_face(); ++a) {
@@ -90,7 +99,7 @@ std::vector<double> ContactTerms::seats(const TouchingBody& body, double reach_m
 
 bool ContactTerms::sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Vec3& outward,
                           bool with_hessian, Sample& out) const {
-  const double k = body.stiffness_pa / points_.face_size_m(face);
+  const double k = layer_pa_m(body, face);
   const std::size_t index = static_cast<std::size_t>(face) * points_.per_face() + point;
   if (body.law == Touch::bonded) {
     if (!body.memory->touching[index]) return false;
@@ -198,13 +207,25 @@ void ContactTerms::tangent(const TouchingBody& body, const VectorX& u, bool conv
   });
 }
 
+void ContactTerms::forces_by_region(const TouchingBody& body, const VectorX& u, MatrixX& forces, MatrixX& gradients) const {
+  const Mat3& r = body.T_base_tool.linear();
+  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3&, const Sample& s) {
+    const Index region = region_[static_cast<std::size_t>(f)];
+    const Vec3 force = points_.weight_m2(f, p) * (r * s.gradient);
+    for (int a = 0; a < points_.nodes_per_face(); ++a)
+      forces.block<3, 1>(3 * points_.node(f, a), region) += points_.shape(p)(a) * force;
+    gradients.col(region).head<3>() -= force;
+    gradients.col(region).tail<3>() -= (x - body.T_base_tool.translation()).cross(force);
+  });
+}
+
 void ContactTerms::d_radius(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient) const {
   const Mat3& r = body.T_base_tool.linear();
   ShapePoint shape;
   for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3& y, const Sample&) {
     if (body.law == Touch::bonded || !shape_at(body, f, p, y, shape)) return;
     const RadiusDerivative d = body.shape->d_radius(y, points_.cell_m(f));
-    const double k = points_.weight_m2(f, p) * body.stiffness_pa / points_.face_size_m(f), g = shape.gap_m;
+    const double k = points_.weight_m2(f, p) * layer_pa_m(body, f), g = shape.gap_m;
     const Vec3 change = k * ((d.coverage * g + shape.coverage * d.gap) * shape.normal + shape.coverage * g * d.normal +
                        g * d.gap * shape.coverage_gradient + 0.5 * g * g * d.coverage_gradient);
     const Vec3 force = r * change;
@@ -225,7 +246,7 @@ std::vector<ContactTerms::Held> ContactTerms::held(const TouchingBody& body, con
     h.point = p;
     h.index = static_cast<std::size_t>(f) * points_.per_face() + p;
     h.weight_m2 = points_.weight_m2(f, p);
-    h.stiffness_pa_m = body.stiffness_pa / points_.face_size_m(f);
+    h.stiffness_pa_m = layer_pa_m(body, f);
     h.arm_m = x - body.T_base_tool.translation();
     h.y_m = y;
     h.anchor_m = body.memory->anchor_m[h.index];
@@ -330,7 +351,7 @@ void ContactTerms::end_increment(const TouchingBody& body, const VectorX& u, Tou
     if (!sample.slips) return;
     const Vec3 offset = y - memory.anchor_m[index];
     const Vec3 s = offset - memory.normal[index].dot(offset) * memory.normal[index];
-    const double k = body.stiffness_pa / points_.face_size_m(f);
+    const double k = layer_pa_m(body, f);
     memory.normal[index] = shape.normal.normalized();
     memory.anchor_m[index] = y - memory.limit_pa[index] / (k * s.norm()) * s;
   });

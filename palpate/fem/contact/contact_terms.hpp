@@ -51,6 +51,11 @@ class ContactTerms {
  public:
   ContactTerms(const TetMesh& mesh, const BlockPattern& pattern, int per_edge);
 
+  /// The layer is as much stiffer as what lies behind it. @param region  an element: its region
+  void set_regions(const std::vector<int>& region, const VectorX& stiffness);
+  /// Adds what each region's surface has of forces (3n x r) and of the tool's gradient (6 x r).
+  void forces_by_region(const TouchingBody& body, const VectorX& u, MatrixX& forces, MatrixX& gradients) const;
+
   const SurfacePoints& points() const { return points_; }
   Vec3 position(const VectorX& u, Index face, int point) const;
 
@@ -110,6 +115,10 @@ class ContactTerms {
     double energy = 0, pressure = 0, gap = 0;
     bool slips = false;
   };
+  /// Stiffness of the layer per area, Pa/m.
+  double layer_pa_m(const TouchingBody& body, Index face) const {
+    return body.stiffness_pa * (harder_.empty() ? 1 : harder_[static_cast<std::size_t>(face)]) / points_.face_size_m(face);
+  }
   bool sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Vec3& outward, bool with_hessian,
               Sample& out) const;
   bool shape_at(const TouchingBody& body, Index face, int point, const Vec3& y, ShapePoint& out) const;
@@ -120,6 +129,8 @@ class ContactTerms {
 
   Points rest_m_;
   SurfacePoints points_;
+  std::vector<int> region_;     // a face; empty: one
+  std::vector<double> harder_;  // a face: its region's stiffness
 };
 
 }  // namespace palpate::fem

@@ -31,7 +31,7 @@ void face_shapes(int nodes, const Vec3& l, Eigen::Ref<VectorX> value, Eigen::Ref
 }  // namespace
 
 SurfacePoints::SurfacePoints(const TetMesh& mesh, const BlockPattern& pattern, int per_edge)
-    : per_edge_(per_edge), faces_(boundary_faces(mesh)) {
+    : per_edge_(per_edge), faces_(boundary_faces(mesh, &elements_)) {
   if (per_edge < 1) throw Error("must be at least 1", "points_per_edge");
   const int nodes = static_cast<int>(faces_.cols());
   std::vector<Vec3> points;

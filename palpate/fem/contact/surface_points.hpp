@@ -20,6 +20,7 @@ class SurfacePoints {
   int nodes_per_face() const { return static_cast<int>(faces_.cols()); }
   Index point_count() const { return face_count() * per_face(); }
 
+  Index element(Index face) const { return elements_[static_cast<std::size_t>(face)]; }  ///< that it bounds
   Index node(Index face, int a) const { return faces_(face, a); }
   /// Lower block of two nodes of a face; stored transposed when node a has the smaller number.
   Index block(Index face, int a, int b) const {
@@ -33,6 +34,7 @@ class SurfacePoints {
 
  private:
   int per_edge_;
+  std::vector<Index> elements_;
   Tetrahedra faces_;
   std::vector<Index> blocks_;
   Eigen::MatrixXd shapes_, d_shapes_;
