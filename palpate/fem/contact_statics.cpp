@@ -117,6 +117,12 @@ struct ContactStatics::Impl {
     if (!found) {
       if (!system.approach(p, next_memory, next)) return "a tool never meets the object along its wrench";
       if (!system.evaluate(p, next_memory, next)) return "the law does not exist at the start of the increment";
+      // The pressures are not known yet, and with the last ones (or none) a body on a table may slide away: what touches
+      // sticks at first.
+      for (std::size_t c = 0; c < count; ++c)
+        if (system.contacts[c].law == Touch::friction && system.contacts[c].friction_coefficient > 0)
+          std::fill(next_memory[c].limit_pa.begin(), next_memory[c].limit_pa.end(), std::numeric_limits<double>::infinity());
+      if (remembers && !system.evaluate(p, next_memory, next)) return "the law does not exist at the start of the increment";
       system.soften_start(p, next_memory, next, out);
       reason = system.newton(p, next_memory, next, out);
       if (reason.empty() && remembers && settle(p, next_memory, next, out)) remembers_open = false;
