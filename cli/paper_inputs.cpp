@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_inputs.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "palpate/geometry/ray_subset.hpp"
@@ -14,6 +16,7 @@ namespace {
 constexpr Index most_points = 2000;
 /// Squared distances have no defence against what is not the object (flying pixels, the table's edge), and the paper's
 /// points were cut to the object: so are those of both methods here.
+/// What a deeper push dents lies as far from where it was.
 constexpr double near_object_m = 0.025;
 
 /// A volume of the wished size, of the given surface or of one that is completed from views.
@@ -55,11 +58,21 @@ void press_at_nodes(Recording& recording, const TetMesh& mesh) {
 
 }  // namespace
 
-RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest) {
+double near_of(const Recording& recording) {
+  double near_m = near_object_m;
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps) {
+      const double travel_m = travel_of(step);
+      if (std::isfinite(travel_m)) near_m = std::max(near_m, 1.1 * travel_m);
+    }
+  return near_m;
+}
+
+RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest, double near_m) {
   std::vector<Index> near;
   for (Index i = 0; i < static_cast<Index>(all.range_m.size()); ++i) {
     const Vec3 point_m = Vec3(all.origins_m.row(i)) + all.range_m(i) * Vec3(all.directions.row(i));
-    if (rest.closest(point_m).squared_distance_m2 < near_object_m * near_object_m) near.push_back(i);
+    if (rest.closest(point_m).squared_distance_m2 < near_m * near_m) near.push_back(i);
   }
   const std::size_t stride = std::max<std::size_t>(1, (near.size() + most_points - 1) / most_points);
   std::vector<Index> rows;
@@ -104,9 +117,10 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
   }
   if (out.finer) out.finer->recording.pushes = recording.pushes;
   const geometry::TriangleTree rest(out.object.surface.rest());
+  const double near_m = near_of(recording);
   for (auto& step : out.inputs)
     for (auto& input : step)
-      if (auto* seen = std::get_if<estimation::RayObservation>(&input)) seen->rays = thinned(seen->rays, rest);
+      if (auto* seen = std::get_if<estimation::RayObservation>(&input)) seen->rays = thinned(seen->rays, rest, near_m);
   out.recording = std::move(recording);
   return out;
 }

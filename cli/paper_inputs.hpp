@@ -41,7 +41,9 @@ struct ModelChoice {
 ModelChoice choice_of(const lab::PaperScene& scene);
 
 /// Every n-th pixel of what lies near the object: about as many points a sample as the paper's time-of-flight camera has.
-RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest);
+RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest, double near_m);
+/// How far from the object at rest a pixel may lie: 25 mm, or the depth of the deepest push and a tenth.
+double near_of(const Recording& recording);
 
 /// @param shared  used and filled where the recording gives the shape; nullptr: nothing is kept
 Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress);

@@ -98,7 +98,7 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vecto
       "known (but for the balloon's). The paper's method is its algorithm 1: iterative closest points, squared distance to the nearest "
       "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, start and {} thread{}; a second row "
       "gives it linear tetrahedra, as the paper had. Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the "
-      "object at rest. Where a scene does not say otherwise, the truth is linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
+      "object at rest (where a push goes deeper: its depth). Where a scene does not say otherwise, the truth is linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
       version, threads, threads == 1 ? "" : "s", command);
   html += claims(scenes);
   for (const SceneAnswers& scene : scenes) html += section(scene);

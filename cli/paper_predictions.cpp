@@ -100,7 +100,7 @@ void predict_unused(const Prepared& given, const Prepared* other, const lab::Pap
   for (const auto& step : observe(recording)) {
     seen.emplace_back();
     for (const auto& input : step)
-      if (const auto* rays = std::get_if<estimation::RayObservation>(&input)) seen.back() = thinned(rays->rays, rest_tree);
+      if (const auto* rays = std::get_if<estimation::RayObservation>(&input)) seen.back() = thinned(rays->rays, rest_tree, near_of(recording));
   }
   const Prepared one = as_one(given);
   const Course paper = course_of(recording, one, out.paper, {}, seen, options, shared.fine.unused),

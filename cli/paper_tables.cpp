@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "palpate/report/words.hpp"
 
@@ -64,8 +65,18 @@ std::string pascal(double young_modulus_pa) {
 }
 
 std::string listed(const std::vector<std::string>& codes) {
+  std::vector<std::pair<std::string, int>> counted;
+  for (const std::string& code : codes) {
+    const auto known = std::find_if(counted.begin(), counted.end(), [&](const auto& one) { return one.first == code; });
+    if (known == counted.end()) {
+      counted.emplace_back(code, 1);
+    } else {
+      ++known->second;
+    }
+  }
   std::string all;
-  for (const std::string& code : codes) all += (all.empty() ? "" : ", ") + code;
+  for (const auto& [code, count] : counted)
+    all += (all.empty() ? "" : ", ") + code + (count > 1 ? fmt::format(" ({} times)", count) : "");
   return all.empty() ? "none" : all;
 }
 

@@ -11,7 +11,7 @@ namespace palpate::cli {
 
 /// "none" where there is none.
 std::string pascal(double young_modulus_pa);
-/// "a, b", or "none".
+/// "a, b (3 times)", or "none".
 std::string listed(const std::vector<std::string>& codes);
 
 std::string site_table(const TrialAnswer& trial);

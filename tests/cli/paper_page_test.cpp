@@ -91,6 +91,11 @@ TEST(PaperPage, SaysWhereAStudysIntervalMisses) {
   EXPECT_NE(cells(right).find("<td>none</td></tr>"), std::string::npos) << "no verdicts is said";
 }
 
+TEST(PaperPage, NamesAVerdictOnceAndCountsIt) {
+  EXPECT_EQ(listed({}), "none");
+  EXPECT_EQ(listed({"b", "a", "b", "c", "b"}), "b (3 times), a, c");
+}
+
 TEST(PaperPage, WithoutAnAnswerItSaysSo) {
   TrialAnswer none = trial(13e3, no_answer());
   none.unused.push_back({2.0, 0.004, {2.2, 1e-4}, {nan, nan}, {nan, nan}, 2e-3});
