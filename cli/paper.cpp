@@ -104,7 +104,7 @@ Run verbs::paper(CLI::App& app) {
   for (const lab::PaperScene& scene : lab::paper_scenes()) scenes += fmt::format("\n{}: {}", scene.name, scene.title);
   for (const Study& study : studies()) scenes += fmt::format("\n{}: {}", study.name, study.title);
   app.add_option("-o,--output", arguments->output, "folder for paper.html and paper.json")->required();
-  app.add_flag("--quick", arguments->quick, "one seed a scene and a coarse error surface: minutes in place of many hours");
+  app.add_flag("--quick", arguments->quick, "one seed a scene and a coarse error surface: minutes a scene in place of many hours");
   app.add_option("--seeds", arguments->seeds, "seeds a scene, from --seed on (default: 100, with --quick 1)")->check(CLI::PositiveNumber);
   app.add_option("--scene", arguments->scenes, "only this one; may be given several times" + scenes);
   return [arguments](Session& session) { return remake(session, *arguments); };
