@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -18,6 +19,7 @@ namespace {
 constexpr double reach = 0.15;         // of the longest edge: faces that near the plane are laid on it
 constexpr double least_volume = 0.2;   // of an element, that it keeps
 constexpr double outline_reach = 0.7;  // of the mean edge around a node: further it does not go out
+constexpr double beside = 0.5;         // of the longest edge: faces with a corner further beside the foot are not of it
 constexpr double sharp = 0.9;          // cosine between two pieces of the outline that meet at a corner
 
 double signed_volume(const TetMesh& mesh, Index t) {
@@ -25,18 +27,23 @@ double signed_volume(const TetMesh& mesh, Index t) {
   return (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6;
 }
 
-/// Takes back what leaves an element too little of its volume.
+/// Takes back half of a move, and half again, where it leaves an element too little of its volume.
 void keep_volumes(const Points& before, TetMesh& volume) {
-  for (bool again = true; again;) {
-    again = false;
-    const TetMesh old{before, volume.tetrahedra};
+  constexpr int halvings = 6;  // then the rest
+  const TetMesh old{before, volume.tetrahedra};
+  for (int round = 0;; ++round) {
+    std::set<Index> back;
     for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
       if (signed_volume(volume, t) >= least_volume * signed_volume(old, t)) continue;
       for (int k = 0; k < 4; ++k) {
         const Index i = volume.tetrahedra(t, k);
-        again = again || volume.nodes_m.row(i) != before.row(i);
-        volume.nodes_m.row(i) = before.row(i);
+        if (volume.nodes_m.row(i) != before.row(i)) back.insert(i);
       }
+    }
+    if (back.empty()) return;
+    for (Index i : back) {
+      if (round < halvings) volume.nodes_m.row(i) = 0.5 * (volume.nodes_m.row(i) + before.row(i)).eval();
+      else volume.nodes_m.row(i) = before.row(i);
     }
   }
 }
@@ -56,14 +63,19 @@ Triangles boundary_of(const TetMesh& volume) {
   return faces;
 }
 
-std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& volume) {
+/// @param may_lie  whether a node, at its place in the plane, may be laid on it, given the face's longest edge
+std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& volume,
+                          const std::function<bool(const Vec3&, double)>& may_lie) {
   std::set<Index> laid;
   for (Index t = 0; t < faces.rows(); ++t) {
     const auto corner = [&](int k) { return Vec3(volume.nodes_m.row(faces(t, k))); };
     const double edge =
         std::max({(corner(1) - corner(0)).norm(), (corner(2) - corner(1)).norm(), (corner(0) - corner(2)).norm()});
     bool along = std::abs((corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized().dot(plane.normal)) > 0.7;
-    for (int k = 0; k < 3; ++k) along = along && std::abs(plane.normal.dot(corner(k) - plane.point_m)) < reach * edge;
+    for (int k = 0; along && k < 3; ++k) {
+      const double off_m = plane.normal.dot(corner(k) - plane.point_m);
+      along = std::abs(off_m) < reach * edge && may_lie(corner(k) - off_m * plane.normal, edge);
+    }
     for (int k = 0; along && k < 3; ++k) laid.insert(faces(t, k));
   }
   const Points before = volume.nodes_m;
@@ -87,6 +99,13 @@ std::vector<Index> foot_triangles(const Plane& plane, const TriMesh& surface) {
     if (all) in_plane.push_back(t);
   }
   return in_plane;
+}
+
+TriMesh foot_of(const Plane& plane, const TriMesh& surface) {
+  TriMesh foot{surface.vertices_m, {}};
+  const std::vector<Index> triangles = foot_triangles(plane, surface);
+  foot.triangles = surface.triangles(triangles, Eigen::all);
+  return foot;
 }
 
 struct Outline {
@@ -145,7 +164,7 @@ std::vector<FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface)
                  c = surface.vertices_m.row(surface.triangles(t, 2));
       area += 0.5 * (b - a).cross(c - a).norm();
     }
-    const double edge_m = 0.2 * std::sqrt(area);
+    const double edge_m = 0.12 * std::sqrt(area);
     const std::size_t first = finer.size();
     for (const Index t : members)
       for (int k = 0; k < 3; ++k) {
@@ -158,13 +177,21 @@ std::vector<FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface)
   return finer;
 }
 
-void lay_on(const Plane& plane, TetMesh& volume) { lay_faces(plane, boundary_of(volume), volume); }
+void lay_on(const Plane& plane, TetMesh& volume) {
+  lay_faces(plane, boundary_of(volume), volume, [](const Vec3&, double) { return true; });
+}
 
 void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume) {
-  const Triangles faces = boundary_of(volume);
-  const std::set<Index> laid = lay_faces(plane, faces, volume);
   const Outline outline = outline_of(plane, surface);
-  if (outline.pieces.empty()) return;
+  if (outline.pieces.empty()) return lay_on(plane, volume);
+  // A round object leaves the plane so slowly that faces beside its foot lie as near to the plane as those of the foot. One held
+  // node too many on one side, and the object tilts under its load: only what can reach the outline is laid.
+  const TriangleTree foot(foot_of(plane, surface));
+  const auto distance_m = [&](const Vec3& p) { return std::sqrt(foot.closest(p).squared_distance_m2); };
+  const Triangles faces = boundary_of(volume);
+  const std::set<Index> laid = lay_faces(plane, faces, volume, [&](const Vec3& p, double edge_m) {
+    return distance_m(p) < beside * edge_m;
+  });
 
   // Nodes on the plane from which the boundary leaves it, with the mean length of its edges there.
   const auto on_plane = [&](Index i) {

@@ -9,15 +9,16 @@
 namespace palpate::geometry {
 
 /// Makes a filled object stand on a plane as its surface does, whatever the size of the elements: boundary faces that run along
-/// the plane, within 0.15 of their longest edge, are laid flat on it, and nodes around them go out to the outline of the
-/// surface's own faces in the plane, its corners first. Edges that the mesher cut off would else leave a foot that is too small:
-/// a bar then seems to be on a soft base. No element loses more than four fifths of its volume.
+/// the plane, within 0.15 of their longest edge and not beside the foot, are laid flat on it, and nodes around them go to the
+/// outline of the surface's own faces in the plane, its corners first. Edges that the mesher cut off would else leave a foot
+/// that is too small (a bar then seems to be on a soft base), and a round object one that is held too far out on one side. No
+/// element loses more than four fifths of its volume.
 void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume);
 
 /// Its first half alone, for surfaces of loose facets, whose foot has no outline.
 void lay_on(const Plane& plane, TetMesh& volume);
 
-/// Where a volume must be fine enough to stand on a plane: over each foot of the surface in it, edges of a fifth of the foot's
+/// Where a volume must be fine enough to stand on a plane: over each foot of the surface in it, edges of an eighth of the foot's
 /// size (the root of its area). A slender object else hangs on two or three elements.
 std::vector<FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface);
 

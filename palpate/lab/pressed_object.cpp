@@ -135,7 +135,7 @@ struct PressedObject::Impl {
     for (const Support& support : options.supports)
       if (flat(support))
         for (auto near : geometry::finer_at_feet(support.plane, options.surface)) {
-          near.edge_m *= 0.5;
+          near.edge_m *= 5.0 / 6;
           filling.finer.push_back(near);
         }
     TetMesh linear = geometry::tetrahedralise(options.surface, filling).mesh;

@@ -19,6 +19,7 @@
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/linear_response.hpp"
 #include "palpate/geometry/embedding.hpp"
+#include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/io/mesh_file.hpp"
@@ -229,8 +230,16 @@ class Scene {
     recording_.pushes.clear();
 
     reconstruction::BuildOptions filling;
-    filling.mesh.tetrahedra = 6000;
+    filling.mesh.tetrahedra = 8000;
     filling.mesh.finer = {{spec_.contact_m, 1.1 * spec_.pad_radius_m, spec_.pad_radius_m / fine}};
+    // Where a round object is glued is as sharp as the pad's rim: half the fit's edges.
+    for (const Support& support : spec_.supports) {
+      if (support.kind != SupportKind::plane) continue;
+      for (auto near : geometry::finer_at_feet(support.plane, spec_.surface)) {
+        near.edge_m *= 0.5;
+        filling.mesh.finer.push_back(near);
+      }
+    }
     auto built = reconstruction::build_object(spec_.surface, spec_.supports, filling);
     supports_ = built.model.supports;
     mesh_ = fem::to_quadratic(built.model.volume);
