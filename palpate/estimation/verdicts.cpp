@@ -88,16 +88,24 @@ void judge_fit(const VerdictInput& in, std::vector<Verdict>& out) {
   }
 }
 
+/// One verdict for all of them: the farthest in full, others by name.
 void judge_nuisances(const VerdictInput& in, std::vector<Verdict>& out) {
-  for (const auto& nuisance : in.answer.nuisances) {
-    if (std::abs(nuisance.pull) <= 3) continue;
-    out.push_back({"nuisance_beyond_prior", nuisance.name + " ended at " + number(nuisance.value) + " " + nuisance.unit + ", " +
-                                                number(std::abs(nuisance.pull), "{:.1f}") +
-                                                " standard deviations of its prior away from what was expected (prior " +
-                                                number(nuisance.prior_std) + " " + nuisance.unit +
-                                                "). Something that the model takes for small is not: check it before "
-                                                "believing E."});
-  }
+  std::vector<const Nuisance*> beyond;
+  for (const auto& nuisance : in.answer.nuisances)
+    if (std::abs(nuisance.pull) > 3) beyond.push_back(&nuisance);
+  if (beyond.empty()) return;
+  std::stable_sort(beyond.begin(), beyond.end(), [](auto* a, auto* b) { return std::abs(a->pull) > std::abs(b->pull); });
+  constexpr std::size_t most_named = 4;
+  std::string others;
+  for (std::size_t k = 1; k < std::min(beyond.size(), most_named); ++k) others += (k > 1 ? ", " : "") + beyond[k]->name;
+  if (beyond.size() > most_named) others += " and " + std::to_string(beyond.size() - most_named) + " more";
+  const Nuisance& farthest = *beyond.front();
+  out.push_back({"nuisance_beyond_prior",
+                 farthest.name + " ended at " + number(farthest.value) + " " + farthest.unit + ", " +
+                     number(std::abs(farthest.pull), "{:.1f}") +
+                     " standard deviations of its prior away from what was expected (prior " + number(farthest.prior_std) + " " +
+                     farthest.unit + ")" + (others.empty() ? "" : "; beyond three of theirs: " + others) +
+                     ". Something that the model takes for small is not: check it before believing E."});
 }
 
 void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {

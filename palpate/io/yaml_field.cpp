@@ -59,7 +59,8 @@ YamlField YamlField::parse(const std::string& bytes, const std::string& name) {
       throw Error("is empty; see docs/recording-format.md for what belongs in it", name);
     return {root, "", file};
   } catch (const YAML::Exception& problem) {
-    throw Error("is not valid YAML: " + problem.msg, name + ":" + std::to_string(problem.mark.line + 1));
+    throw Error("is not valid YAML: " + problem.msg + "; mend this line, or give another file if this was not meant to be one",
+                name + ":" + std::to_string(problem.mark.line + 1));
   }
 }
 

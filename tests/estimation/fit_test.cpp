@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "palpate/core/error.hpp"
@@ -294,7 +295,10 @@ TEST(DisplacedClamp, FarBeyondItsPriorIsSaid) {
   recording.supports[0].pose_std_m = 0.0005;
   recording.supports[0].pose_std_rad = 0.01;
   const Identification answer = fit(recording, coarse_block(), clouds_of(with_displaced_clamp()), {});
-  EXPECT_TRUE(says(answer, "nuisance_beyond_prior"));
+  // Once, whatever the number of nuisances.
+  EXPECT_EQ(std::count_if(answer.verdicts.begin(), answer.verdicts.end(),
+                          [](const Verdict& each) { return each.code == "nuisance_beyond_prior"; }),
+            1);
 }
 
 TEST(FitOptionsCheck, EveryFieldOutOfItsRangeIsNamed) {
