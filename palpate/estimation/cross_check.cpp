@@ -208,7 +208,9 @@ class CrossCheck {
     double rms() const { return count > 0 ? std::sqrt(sum_m2 / static_cast<double>(count)) : 0; }
   };
   void add_distance(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns, Distance& out) const {
-    const auto rows = objective_.rows_of(s, predicted, unknowns, false);
+    Loss closest = loss_;
+    closest.along_rays = false;
+    const auto rows = objective_.rows_of(s, predicted, unknowns, closest);
     for (std::size_t t = 0; t < rows.size(); ++t) {
       if (rows[t].unit != "m" || rows[t].observed_m.rows() == 0) continue;
       const VectorX& joint = joint_rows_[s][t].residual;

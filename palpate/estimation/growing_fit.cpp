@@ -16,6 +16,7 @@ namespace palpate::estimation {
 namespace {
 
 constexpr double reuse = 0.3;   // standard deviations: equations that are moved along this far are right to some hundredths
+constexpr double search_reuse = 0.1;  // the same, for the search over nu, which adds up slopes over its whole range
 constexpr double anew = 1e-9;   // keep, but evaluate every step that has moved at all
 constexpr double misfit = 1.5;  // robust spread of the residuals in standard deviations: the start was far off
 
@@ -80,7 +81,11 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
       optimum = optimise(objective, optimum.unknowns, *loss_, optimiser, progress);
       objective.set_reuse(reuse);
     }
-    optimum.loss = *loss_;
+    // Which rays of a new step count is chosen where it has been fitted.
+    const Loss chosen = objective.with_chosen_rays(*loss_);
+    if (optimum.evaluation.usable && optimum.termination != Termination::cancelled && chosen.rays != loss_->rays)
+      optimum = optimise(objective, optimum.unknowns, chosen, optimiser, progress);
+    optimum.loss = chosen;
     found = optimum.evaluation.usable && objective.residual_scale() < misfit * std::max(1.0, loss_->tukey / loss.tukey);
   }
   if (!found && optimum.termination != Termination::cancelled) {
@@ -137,6 +142,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   known_.clear();
   for (std::size_t k = 0; k < names.size(); ++k) known_[names[k]] = optimum.unknowns(static_cast<Index>(k));
 
+  objective.set_reuse(search_reuse);
   const Posterior posterior = explore_posterior(objective, optimum, optimum.loss, factor, progress);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;

@@ -83,7 +83,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
     moved.surface_m += change_m;
     if (moved.field != nullptr) moved.material_m += change_m;
     moved.travel_m += fine[s].travel_m - coarse[s].travel_m;
-    changed[s] = objective.rows_of(s, moved, optimum.unknowns, loss.along_rays);
+    changed[s] = objective.rows_of(s, moved, optimum.unknowns, loss);
   }
   const Evaluation before = objective.assemble(objective.last_rows(), optimum.unknowns, highest);
   const Evaluation after = objective.assemble(changed, optimum.unknowns, highest);

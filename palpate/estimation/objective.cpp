@@ -11,6 +11,12 @@
 #include "palpate/core/error.hpp"
 
 namespace palpate::estimation {
+namespace {
+
+// 75 degrees: a sphere's ray there is a thirtieth of the radius inside the outline, and a grazing ray stops counting at 80.
+constexpr double well_inside = 0.26;
+
+}  // namespace
 
 double tukey_rho(double residual, double cut) {
   const double t = residual / cut;
@@ -96,9 +102,11 @@ Evaluation nothing(Index count) {
 
 }  // namespace
 
-bool Objective::may_reuse(const KeptStep& kept, const VectorX& unknowns, const Loss& loss) const {
+bool Objective::may_reuse(std::size_t s, const VectorX& unknowns, const Loss& loss) const {
+  const KeptStep& kept = kept_[s];
   if (kept.unknowns.empty() || kept.loss.tukey != loss.tukey || kept.loss.widening != loss.widening ||
-      kept.loss.along_rays != loss.along_rays || kept.loss.surface_weight != loss.surface_weight) {
+      kept.loss.along_rays != loss.along_rays || kept.loss.surface_weight != loss.surface_weight ||
+      kept.loss.rays_of(s) != loss.rays_of(s)) {
     return false;
   }
   const VectorX change = unknowns(kept.unknowns) - kept.at;
@@ -177,7 +185,7 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
     try {
       for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
         if (terms_[s].empty() || !loss.counts(s)) continue;
-        if (reuse_ > 0 && may_reuse(kept_[s], unknowns, loss)) {
+        if (reuse_ > 0 && may_reuse(s, unknowns, loss)) {
           rows_[s] = kept_[s].rows;
           continue;
         }
@@ -185,7 +193,7 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
         predictions_[s] = model_.predict(s, unknowns);
         if (!predictions_[s].converged) stop = true;
         if (stop) return;
-        for (const auto& term : terms_[s]) rows_[s].push_back(term->rows(predictions_[s], unknowns, loss.along_rays));
+        rows_[s] = rows_of(s, predictions_[s], unknowns, loss);
         if (reuse_ > 0) keep(s, unknowns, loss);
         ++done;
         // Only the calling thread speaks to the caller.
@@ -242,17 +250,40 @@ void Objective::add_priors(const VectorX& unknowns, Evaluation& out) const {
 }
 
 std::vector<TermRows> Objective::rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns,
-                                         bool along_rays) const {
+                                         const Loss& loss) const {
+  const RaysOfStep* chosen = loss.along_rays ? loss.rays_of(s) : nullptr;
   std::vector<TermRows> rows;
-  for (const auto& term : terms_[s]) rows.push_back(term->rows(predicted, unknowns, along_rays));
+  for (const auto& term : terms_[s]) {
+    rows.push_back(term->rows(predicted, unknowns, loss.along_rays));
+    if (chosen == nullptr) continue;
+    const std::vector<char>& counts = (*chosen)[rows.size() - 1];
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      if (counts[i] == 0) rows.back().residual(static_cast<Index>(i)) = std::numeric_limits<double>::infinity();
+    }
+  }
   return rows;
+}
+
+Loss Objective::with_chosen_rays(Loss loss) const {
+  loss.rays.resize(std::max(loss.rays.size(), rows_.size()));
+  for (std::size_t s = 0; s < rows_.size(); ++s) {
+    if (loss.rays[s] != nullptr || rows_[s].empty()) continue;
+    RaysOfStep chosen(rows_[s].size());
+    for (std::size_t t = 0; t < chosen.size(); ++t) {
+      const VectorX& facing = rows_[s][t].facing;
+      chosen[t].resize(static_cast<std::size_t>(facing.size()));
+      for (Index i = 0; i < facing.size(); ++i) chosen[t][static_cast<std::size_t>(i)] = facing(i) > well_inside ? 1 : 0;
+    }
+    loss.rays[s] = std::make_shared<const RaysOfStep>(std::move(chosen));
+  }
+  return loss;
 }
 
 double Objective::cost_of(const std::vector<StepPrediction>& predictions, const VectorX& unknowns, const Loss& loss) const {
   double cost = 0;
   for (std::size_t s = 0; s < predictions.size(); ++s) {
     if (predictions[s].surface_m.rows() == 0) continue;
-    for (const TermRows& rows : rows_of(s, predictions[s], unknowns, loss.along_rays)) {
+    for (const TermRows& rows : rows_of(s, predictions[s], unknowns, loss)) {
       for (Index i = 0; i < rows.residual.size(); ++i) {
         cost += rows.robust ? tukey_rho(rows.residual(i), loss.tukey) : 0.5 * rows.residual(i) * rows.residual(i);
       }

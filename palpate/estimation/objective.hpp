@@ -14,6 +14,9 @@
 
 namespace palpate::estimation {
 
+/// Rays of a step that count, a term and a ray each; a term without flags: all.
+using RaysOfStep = std::vector<std::vector<char>>;
+
 /// How residuals are weighed in one evaluation.
 struct Loss {
   double tukey = 4.685;    ///< cut of Tukey's biweight in standard deviations, 95 % efficient on clean data
@@ -21,8 +24,13 @@ struct Loss {
   bool along_rays = true;  ///< depth residuals along the ray (else closest point)
   std::size_t every = 1;      ///< steps that count: every n-th (the first rounds of a long recording need no more)
   std::vector<char> steps;    ///< steps that count, one flag each (held-out prediction, a push alone); empty = all
+  /// Rays that count, a step each; nullptr or none: all. Which rays meet the object near its outline changes with the unknowns,
+  /// and a ray that passes by costs as much as an outlier: without a choice that is kept, the cost rises and falls with the
+  /// number of such rays, which no gradient knows of, and favours whatever makes the object look larger.
+  std::vector<std::shared_ptr<const RaysOfStep>> rays;
   double surface_weight = 1;  ///< of rows with neighbours whose errors are correlated: 1 / variance inflation
 
+  const RaysOfStep* rays_of(std::size_t step) const { return step < rays.size() ? rays[step].get() : nullptr; }
   bool counts(std::size_t step) const { return step % every == every / 2 && (steps.empty() || steps[step] != 0); }
 };
 
@@ -32,13 +40,12 @@ struct Evaluation {
   double cost = 0;         ///< sum of rho + prior, half of minus twice the log posterior
   MatrixX hessian;         ///< Gauss-Newton, priors included
   VectorX gradient;
-  double robust_cost = 0;  ///< the part of cost and Hessian that robust rows make
+  double robust_cost = 0;  ///< the part of the cost that robust rows make
   MatrixX robust_hessian;
 
   /// Inverse covariance of all unknowns under clean Gaussian data: what robust rows say counts `factor` times (see
   /// tukey_information_factor), exact rows and priors as they are.
   MatrixX information(double factor) const { return hessian + (factor - 1) * robust_hessian; }
-  double information_cost(double factor) const { return cost + (factor - 1) * robust_cost; }
 };
 
 /// What the residuals at an optimum look like.
@@ -66,7 +73,11 @@ class Objective {
   Evaluation assemble(const std::vector<std::vector<TermRows>>& rows, const VectorX& unknowns, const Loss& loss) const;
 
   /// Rows of step s for a prediction that was made elsewhere.
-  std::vector<TermRows> rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns, bool along_rays) const;
+  std::vector<TermRows> rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns, const Loss& loss) const;
+
+  /// `loss` with a choice of rays for every evaluated step that has none: those that met the object well inside its outline in
+  /// the last evaluation. It hangs on the simulated surface and not on what was measured, so that it does not bias.
+  Loss with_chosen_rays(Loss loss) const;
 
   /// Normal equations of one step, and the unknowns that they were made at.
   struct KeptStep {
@@ -101,7 +112,7 @@ class Objective {
   double residual_scale() const;
 
  private:
-  bool may_reuse(const KeptStep& kept, const VectorX& unknowns, const Loss& loss) const;
+  bool may_reuse(std::size_t s, const VectorX& unknowns, const Loss& loss) const;
   void keep(std::size_t s, const VectorX& unknowns, const Loss& loss);
   Evaluation sum_kept(const VectorX& unknowns, const Loss& loss) const;
   void add_priors(const VectorX& unknowns, Evaluation& out) const;

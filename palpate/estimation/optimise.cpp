@@ -29,6 +29,14 @@ std::vector<int> free_unknowns(const Unknowns& unknowns) {
   return moving;
 }
 
+NewtonStep newton_step(const Evaluation& evaluation, const std::vector<int>& moving) {
+  const VectorX gradient = evaluation.gradient(moving);
+  NewtonStep out;
+  out.move = MatrixX(evaluation.hessian(moving, moving)).ldlt().solve(-gradient);
+  out.gain = -0.5 * gradient.dot(out.move);
+  return out;
+}
+
 Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, const OptimiseOptions& options,
                  const OnProgress& progress) {
   const Unknowns& unknowns = objective.unknowns();
@@ -66,6 +74,11 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
     VectorX gradient(static_cast<Index>(moving.size()));
     for (std::size_t k = 0; k < moving.size(); ++k) gradient(static_cast<Index>(k)) = best.evaluation.gradient(moving[k]);
     const VectorX scale = hessian.diagonal().cwiseMax(1e-300);
+    if (options.enough_gain > 0 && newton_step(best.evaluation, moving).gain < options.enough_gain) {
+      best.termination = Termination::converged;
+      best.message = "converged";
+      return best;
+    }
 
     bool accepted = false;
     for (int attempt = 0; attempt < 12 && !accepted; ++attempt) {
@@ -130,9 +143,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
     if (!accepted) {
       // Correspondences that flip between triangles leave a floor; a step that nothing improves on is the end.
       objective.evaluate(best.unknowns, loss, progress);
-      const VectorX newton = hessian.ldlt().solve(-gradient);
-      const double predicted_gain = -0.5 * gradient.dot(newton);
-      best.termination = predicted_gain < 0.5 ? Termination::converged : Termination::no_progress;
+      best.termination = newton_step(best.evaluation, moving).gain < 0.5 ? Termination::converged : Termination::no_progress;
       best.message = best.termination == Termination::converged ? "converged" : "no step improves the fit: " + best.message;
       return best;
     }
@@ -182,20 +193,22 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
     loss.every = 1;
   }
   // Where the model does not fit, the cut follows the residuals' spread: a fit that calls everything an outlier has no say.
-  const Loss last = fitting_loss(objective, final_loss);
+  Loss last = fitting_loss(objective, final_loss);
   if (final_loss.along_rays) {
     cut(2 * final_loss.tukey);
     loss.along_rays = true;
     at = optimise(objective, at.unknowns, loss, rough, progress);
     iterations += at.iterations;
     if (at.termination == Termination::failed || at.termination == Termination::cancelled) return at;
+    last = objective.with_chosen_rays(last);
   }
   at = optimise(objective, at.unknowns, last, options, progress);
   at.loss = last;
   // A better fit has a narrower spread: tighten while that helps.
   for (int round = 0; round < 6 && at.evaluation.usable && at.termination != Termination::cancelled; ++round) {
-    const Loss tighter = fitting_loss(objective, final_loss);
+    Loss tighter = fitting_loss(objective, final_loss);
     if (tighter.tukey > 0.9 * at.loss.tukey) break;
+    tighter.rays = at.loss.rays;
     iterations += at.iterations;
     at = optimise(objective, at.unknowns, tighter, options, progress);
     at.loss = tighter;

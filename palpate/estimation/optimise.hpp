@@ -13,6 +13,7 @@ struct Optimum;
 struct OptimiseOptions {
   int max_iterations = 60;
   double step_tolerance = 1e-3;  ///< stop when log E and nu move by less than this share of their standard deviation
+  double enough_gain = 0;         ///< stop where a Newton step would lower the cost by less than this
   /// Called where a round starts and after every accepted step; the objective's last evaluation is this one's.
   std::function<void(const Optimum&, bool starts)> on_accepted;
   /// Non-linear steps follow their derivatives this far (ForwardModel::set_reuse), the optimum itself no further than
@@ -42,6 +43,13 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
 /// (poses and E trade against each other when the shape is far off). The best one counts.
 Optimum optimise_from_several(Objective& objective, const VectorX& start, const Loss& final_loss, const OptimiseOptions& options,
                               const OnProgress& progress);
+
+/// Change of every free unknown but those held that leads to the optimum of the evaluation's quadratic, and what it gains.
+struct NewtonStep {
+  VectorX move;
+  double gain = 0;
+};
+NewtonStep newton_step(const Evaluation& evaluation, const std::vector<int>& moving);
 
 /// `loss` with its cut widened by the robust spread of the last evaluation's residuals where that exceeds the sensors' sigma.
 /// The spread only says what counts as an outlier; weights and intervals keep the sensors' sigma.

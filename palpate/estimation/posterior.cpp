@@ -12,9 +12,10 @@ constexpr int grid_size = 401;
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
-/// Mean, standard deviation of log E and log determinant, all given nu, from the Hessian.
+/// Mean, standard deviation of log E and log determinant, all given nu, from the Hessian; and the slope over nu of the least
+/// cost that the others leave.
 struct Conditional {
-  double log_determinant = 0, cost = 0;
+  double log_determinant = 0, cost_slope = 0;
   VectorX log_young, std_dev, slope;  // a region; slope: d log E / d nu along the ridge
   MatrixX correlation;
 };
@@ -27,6 +28,12 @@ Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& un
   }
   const MatrixX information = evaluation.information(factor);
   const VectorX cross = information.col(poisson)(others);
+  // The cost's slope leads to the estimate, the information says how sharp it is.
+  const MatrixX& hessian = evaluation.hessian;
+  const VectorX hessian_cross = hessian.col(poisson)(others);
+  const Eigen::LDLT<MatrixX> held(hessian(others, others));
+  const double slope = evaluation.gradient(poisson) - hessian_cross.dot(held.solve(VectorX(evaluation.gradient(others))));
+  const double sharpness = hessian(poisson, poisson) - hessian_cross.dot(held.solve(hessian_cross));
   const Eigen::LDLT<MatrixX> factorised(information(others, others));
   // log E of the first region comes first, then the log ratios of the others: a region's log E is the sum of two.
   const Index regions = 1 + list.ratio_count();
@@ -44,31 +51,38 @@ Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& un
   out.std_dev = covariance.diagonal().cwiseMax(1e-30).cwiseSqrt();
   out.correlation = out.std_dev.cwiseInverse().asDiagonal() * covariance * out.std_dev.cwiseInverse().asDiagonal();
   out.log_determinant = factorised.vectorD().array().abs().max(1e-300).log().sum();
-  out.cost = evaluation.information_cost(factor);
+  const double informed = information(poisson, poisson) - cross.dot(factorised.solve(cross));
+  out.cost_slope = sharpness > 0 && informed > 0 ? slope * informed / sharpness : slope;
   out.slope = -sum.transpose() * factorised.solve(cross);
   return out;
 }
 
-/// Natural cubic spline through (x, y), evaluated at `at`.
-VectorX spline(const VectorX& x, const VectorX& y, const VectorX& at) {
+/// Piecewise cubic through (x, y) that rises and falls only where the data do (Fritsch and Carlson 1980, slopes of Fritsch and
+/// Butland 1984), evaluated at `at`. Towards nu = 0.5 stiffness has a pole, which a spline would answer with swings elsewhere.
+VectorX interpolate(const VectorX& x, const VectorX& y, const VectorX& at) {
   const Index n = x.size();
-  MatrixX system = MatrixX::Identity(n, n);
-  VectorX right = VectorX::Zero(n);
+  const VectorX h = x.tail(n - 1) - x.head(n - 1), rise = (y.tail(n - 1) - y.head(n - 1)).cwiseQuotient(h);
+  VectorX slope(n);
   for (Index i = 1; i + 1 < n; ++i) {
-    const double before = x(i) - x(i - 1), after = x(i + 1) - x(i);
-    system(i, i - 1) = before / 6;
-    system(i, i) = (before + after) / 3;
-    system(i, i + 1) = after / 6;
-    right(i) = (y(i + 1) - y(i)) / after - (y(i) - y(i - 1)) / before;
+    const double before = 2 * h(i) + h(i - 1), after = h(i) + 2 * h(i - 1);
+    slope(i) = rise(i - 1) * rise(i) > 0 ? (before + after) / (before / rise(i - 1) + after / rise(i)) : 0;
   }
-  const VectorX bend = system.partialPivLu().solve(right);
+  slope(0) = rise(0);
+  slope(n - 1) = rise(n - 2);
   VectorX out(at.size());
   for (Index k = 0; k < at.size(); ++k) {
     Index i = 0;
     while (i + 2 < n && at(k) > x(i + 1)) ++i;
-    const double h = x(i + 1) - x(i), a = (x(i + 1) - at(k)) / h, b = (at(k) - x(i)) / h;
-    out(k) = a * y(i) + b * y(i + 1) + ((a * a * a - a) * bend(i) + (b * b * b - b) * bend(i + 1)) * h * h / 6;
+    const double t = (at(k) - x(i)) / h(i), u = 1 - t;
+    out(k) = u * u * (1 + 2 * t) * y(i) + t * t * (3 - 2 * t) * y(i + 1) + h(i) * t * u * (u * slope(i) - t * slope(i + 1));
   }
+  return out;
+}
+
+/// Integral of y over x, zero at the first one.
+VectorX integral(const VectorX& x, const VectorX& y) {
+  VectorX out = VectorX::Zero(x.size());
+  for (Index i = 1; i < x.size(); ++i) out(i) = out(i - 1) + 0.5 * (x(i) - x(i - 1)) * (y(i) + y(i - 1));
   return out;
 }
 
@@ -171,57 +185,91 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   // Conditional optima outwards from the best one, each started from its neighbour.
   posterior.quadrature = true;
   const double from = std::max(lower, nu - 6 * std_nu), to = std::min(upper, nu + 6 * std_nu);
-  constexpr int nodes = 9;
-  VectorX node(nodes), density(nodes);
+  constexpr int nodes = 7;
+  VectorX node(nodes), cost_slope(nodes), log_determinant(nodes);
   MatrixX mean(nodes, at.log_young.size()), std_dev(nodes, at.log_young.size());  // a region a column
   for (int i = 0; i < nodes; ++i) node(i) = 0.5 * (from + to) - 0.5 * (to - from) * std::cos(EIGEN_PI * i / (nodes - 1));
   Index nearest = 0;
   (node.array() - nu).abs().minCoeff(&nearest);
+  if (nu > from && nu < to) nearest = std::clamp<Index>(nearest, 1, nodes - 2);
+  node(nearest) = nu;  // is known already
+  std::vector<char> usable(nodes, 0);
+  // Given nu the others are nearly linear: from the neighbour's ridge, one evaluation and the Newton step from there say where
+  // the optimum is and how low.
   OptimiseOptions few;
   few.max_iterations = 6;
   few.step_tolerance = 0.02;
+  few.enough_gain = 0.05;
+  std::vector<int> others = moving;
+  others.erase(std::remove(others.begin(), others.end(), poisson), others.end());
   int done = 0;
   const OnProgress keep_going = [&](std::string_view, double) {
     return !progress || progress("posterior", static_cast<double>(done) / nodes);
   };
-  const auto visit = [&](Index i, const VectorX& start) {
-    ++done;
-    VectorX begin = start;
-    begin(poisson) = node(i);
-    objective.hold_poisson(true);
-    const Optimum conditional = optimise(objective, begin, loss, few, keep_going);
-    objective.hold_poisson(false);
-    posterior.cancelled = conditional.termination == Termination::cancelled;
-    if (posterior.cancelled) return start;
-    if (!conditional.evaluation.usable) {
-      density(i) = -1e6;
-      mean.row(i) = at.log_young.transpose();
-      std_dev.row(i) = at.std_dev.transpose();
-      return start;
-    }
-    const Conditional c = condition_on_poisson(conditional.evaluation, conditional.unknowns, list, information_factor);
-    density(i) = -c.cost - 0.5 * c.log_determinant;
+  const auto note = [&](Index i, const Conditional& c) {
+    usable[static_cast<std::size_t>(i)] = 1;
+    cost_slope(i) = c.cost_slope;
+    log_determinant(i) = c.log_determinant;
     mean.row(i) = c.log_young.transpose();
     std_dev.row(i) = c.std_dev.transpose();
-    return conditional.unknowns;
   };
-  VectorX here = visit(nearest, optimum.unknowns);
-  VectorX walk = here;
-  for (Index i = nearest + 1; i < nodes && !posterior.cancelled; ++i) walk = visit(i, walk);
-  walk = here;
-  for (Index i = nearest - 1; i >= 0 && !posterior.cancelled; --i) walk = visit(i, walk);
+  const auto visit = [&](Index i, const Optimum& from_there) {
+    ++done;
+    VectorX begin = from_there.unknowns;
+    const VectorX along = MatrixX(from_there.evaluation.hessian(others, others))
+                              .ldlt()
+                              .solve(-VectorX(from_there.evaluation.hessian.col(poisson)(others)));
+    for (std::size_t k = 0; k < others.size(); ++k) {
+      begin(others[k]) += (node(i) - from_there.unknowns(poisson)) * along(static_cast<Index>(k));
+    }
+    begin(poisson) = node(i);
+    objective.hold_poisson(true);
+    Optimum conditional = optimise(objective, begin, loss, few, keep_going);
+    objective.hold_poisson(false);
+    posterior.cancelled = conditional.termination == Termination::cancelled;
+    if (posterior.cancelled) return from_there;
+    if (!conditional.evaluation.usable) return from_there;  // no equilibrium: not this nu
+    const NewtonStep step = newton_step(conditional.evaluation, others);
+    for (std::size_t k = 0; k < others.size(); ++k) conditional.unknowns(others[k]) += step.move(static_cast<Index>(k));
+    note(i, condition_on_poisson(conditional.evaluation, conditional.unknowns, list, information_factor));
+    return conditional;
+  };
+  note(nearest, at);
+  Optimum walk = optimum;
+  Index first = nearest, last = nearest;  // that have an equilibrium
+  for (; last + 1 < nodes && !posterior.cancelled; ++last) {
+    walk = visit(last + 1, walk);
+    if (usable[static_cast<std::size_t>(last + 1)] == 0) break;
+  }
+  walk = optimum;
+  for (; first > 0 && !posterior.cancelled; --first) {
+    walk = visit(first - 1, walk);
+    if (usable[static_cast<std::size_t>(first - 1)] == 0) break;
+  }
   if (posterior.cancelled) return posterior;
+  const Index count = last - first + 1;
+  if (count < 2) {
+    posterior.quadrature = false;
+    posterior.poisson = VectorX::Constant(1, nu);
+    fill(posterior, at.log_young.transpose(), at.std_dev.transpose());
+    finish(posterior, VectorX::Zero(1));
+    return posterior;
+  }
+  node = node.segment(first, count).eval();
+  cost_slope = cost_slope.segment(first, count).eval();
+  log_determinant = log_determinant.segment(first, count).eval();
+  mean = mean.middleRows(first, count).eval();
+  std_dev = std_dev.middleRows(first, count).eval();
 
-  posterior.poisson = VectorX::LinSpaced(grid_size, from, to);
-  density.array() -= density.maxCoeff();
-  density = density.cwiseMax(-200);
+  posterior.poisson = VectorX::LinSpaced(grid_size, node(0), node(count - 1));
   MatrixX fine_mean(grid_size, mean.cols()), fine_std(grid_size, mean.cols());
   for (Index r = 0; r < mean.cols(); ++r) {
-    fine_mean.col(r) = spline(node, mean.col(r), posterior.poisson);
-    fine_std.col(r) = spline(node, std_dev.col(r), posterior.poisson).cwiseMax(1e-3 * std_dev.col(r).minCoeff());
+    fine_mean.col(r) = interpolate(node, mean.col(r), posterior.poisson);
+    fine_std.col(r) = interpolate(node, std_dev.col(r), posterior.poisson).cwiseMax(1e-3 * std_dev.col(r).minCoeff());
   }
   fill(posterior, fine_mean, fine_std);
-  finish(posterior, spline(node, density, posterior.poisson));
+  const VectorX cost = integral(posterior.poisson, interpolate(node, cost_slope, posterior.poisson));
+  finish(posterior, -cost - 0.5 * interpolate(node, log_determinant, posterior.poisson));
   return posterior;
 }
 

@@ -28,8 +28,9 @@ struct Posterior {
 };
 
 /// Laplace where nu is well determined and far from its bounds; elsewhere a quadrature over nu: at each of a few nodes all
-/// other unknowns are optimised again and integrated out (Laplace given nu), and the log posterior between nodes is a
-/// cubic polynomial (Rue, Martino and Chopin 2009, section 3, with one hyperparameter).
+/// other unknowns are optimised again and integrated out (Laplace given nu; Rue, Martino and Chopin 2009, section 3, with one
+/// hyperparameter). The log posterior is the integral of its slope, a cubic polynomial between nodes: the cost itself jumps
+/// where a single ray leaves the object, by more than what tells two nodes apart.
 Posterior explore_posterior(Objective& objective, const Optimum& optimum, const Loss& loss, double information_factor,
                             const OnProgress& progress);
 

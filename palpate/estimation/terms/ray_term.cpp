@@ -46,6 +46,7 @@ class RayTerm : public Term {
     rows.residual.resize(rays_.range_m.size());
     rows.sigma = rays_.sigma_m;
     rows.observed_m.resize(rays_.range_m.size(), 3);
+    if (along_rays) rows.facing = VectorX::Zero(rays_.range_m.size());
     rows.robust = true;
     rows.unit = "m";
     rows.cell.resize(static_cast<std::size_t>(rays_.range_m.size()));
@@ -67,6 +68,7 @@ class RayTerm : public Term {
         if (const auto hit = tree_.cast(frame.apply(rays_.origins_m.row(i)), direction)) {
           const Vec3 normal = face_normal(hit->triangle);
           const double cosine = normal.dot(direction);
+          rows.facing(i) = std::abs(cosine);
           if (std::abs(cosine) > grazing_cosine) {
             triangle = hit->triangle;
             barycentric = hit->barycentric;

@@ -33,6 +33,7 @@ struct TermRows {
   std::string unit = "1";     ///< of residual * sigma
   VectorX sigma;              ///< a row
   Points observed_m;          ///< at the fitted pose; empty for what is not a point
+  VectorX facing;             ///< |cosine| between ray and surface normal, 0 where the ray passes by; empty: not along rays
   std::vector<int> cell;      ///< group of neighbours whose errors may be correlated (image or space cell); empty = independent
 };
 

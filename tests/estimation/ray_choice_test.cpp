@@ -1,0 +1,146 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// Rays near an object's outline: they come and go as the object bulges, and the answer must not follow their number.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/estimation/objective.hpp"
+#include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/posterior.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/identify.hpp"
+#include "palpate/lab/implicit_surface.hpp"
+#include "palpate/lab/random.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr double sigma_m = 2e-3, young_pa = 2e4, true_nu = 0.3, force_n = 10;
+
+/// A ball on its foot that a pad presses, as a camera beside it sees it, without and with the load.
+struct PressedBall {
+  Recording recording;
+  Unknowns unknowns;
+  std::unique_ptr<ForwardModel> model;
+  std::unique_ptr<Objective> objective;
+  Loss loss;
+  Optimum optimum;
+
+  PressedBall() {
+    const Vec3 centre(0, 0, 0.065);
+    recording.rest.surface = lab::implicit_surface([centre](const Vec3& p) { return (p - centre).norm() - 0.075; },
+                                                   {Vec3(-0.085, -0.085, 0), Vec3(0.085, 0.085, 0.15), 0.008});
+    recording.model.material = "linear";
+    recording.model.element = "tet4";  // truth and fit are one body: only what rays do is tested
+    Support table;
+    table.name = "table";
+    table.kind = SupportKind::plane;
+    table.select = NodeSelection::plane;
+    recording.supports = {table};
+    Tool pad;
+    pad.name = "pad";
+    pad.shape = ToolShape::disc;
+    pad.radius_m = 0.02;
+    recording.tools = {pad};
+    Push push;
+    push.name = "push";
+    push.steps.resize(2);
+    push.steps[1].time_s = 1;
+    Load load;
+    load.tool = "pad";
+    load.direction = -Vec3::UnitZ();
+    load.contact_m = Vec3(0, 0, 0.14);
+    load.force_n = force_n * load.direction;
+    push.steps[1].loads = {load};
+    recording.pushes = {push};
+    model = std::make_unique<ForwardModel>(recording, build_simulated_object(recording), unknowns);
+
+    VectorX truth = unknowns.prior_mean();
+    truth(log_young) = std::log(young_pa);
+    truth(poisson) = true_nu;
+    lab::Random random(3, 0);
+    Inputs inputs;
+    TriMesh surface = model->object().surface.rest();
+    for (std::size_t s = 0; s < model->step_count(); ++s) {
+      surface.vertices_m = model->predict(s, truth).surface_m;
+      inputs.push_back({seen(surface, random)});
+    }
+    objective = std::make_unique<Objective>(*model, inputs, unknowns);
+    VectorX start = unknowns.prior_mean();  // with the cameras' poses
+    start(log_young) = truth(log_young) + 0.2;
+    start(poisson) = 0.2;
+    optimum = optimise_annealed(*objective, start, loss, {}, {});
+    loss = optimum.loss;
+  }
+
+  /// Noise along the ray, and pixels beside the ball that report it all the same, as a sensor's edges do.
+  static RayObservation seen(const TriMesh& surface, lab::Random& random) {
+    const geometry::TriangleTree tree(surface);
+    const Vec3 eye(0.35, -0.4, 0.3), z = (Vec3(0, 0, 0.065) - eye).normalized(), x = z.cross(Vec3::UnitZ()).normalized(),
+                                     y = z.cross(x);
+    std::vector<Vec3> directions;
+    std::vector<double> ranges;
+    for (double v = -0.2; v <= 0.2; v += 0.004) {
+      for (double u = -0.2; u <= 0.2; u += 0.004) {
+        const Vec3 direction = (z + u * x + v * y).normalized();
+        const Vec3 beside = (z + 1.03 * (u * x + v * y)).normalized();
+        const auto hit = tree.cast(eye, direction);
+        if (!hit) continue;
+        directions.push_back(tree.cast(eye, beside) ? direction : beside);
+        ranges.push_back(hit->range_m + sigma_m * random.normal());
+      }
+    }
+    RayObservation out;
+    out.pose_std_m = 1e-3;
+    out.pose_std_rad = 4e-3;
+    const Index count = static_cast<Index>(ranges.size());
+    out.rays.origins_m = eye.transpose().replicate(count, 1);
+    out.rays.directions.resize(count, 3);
+    out.rays.range_m.resize(count);
+    out.rays.sigma_m = VectorX::Constant(count, sigma_m);
+    for (Index i = 0; i < count; ++i) {
+      out.rays.directions.row(i) = directions[static_cast<std::size_t>(i)];
+      out.rays.range_m(i) = ranges[static_cast<std::size_t>(i)];
+    }
+    return out;
+  }
+
+  Index finite_rows(double nu, const Loss& by) {
+    VectorX at = optimum.unknowns;
+    at(poisson) = nu;
+    objective->evaluate(at, by);
+    Index finite = 0;
+    for (const auto& step : objective->last_rows())
+      for (const TermRows& rows : step) finite += rows.residual.array().isFinite().count();
+    return finite;
+  }
+};
+
+TEST(RayChoice, TheSameRaysCountForEveryPoissonRatio) {
+  PressedBall ball;
+  ASSERT_EQ(ball.optimum.termination, Termination::converged) << ball.optimum.message;
+  ASSERT_EQ(ball.loss.rays.size(), 2u);
+  Loss all = ball.loss;
+  all.rays.clear();
+  const double nu = ball.optimum.unknowns(poisson);
+  const auto apart = [&](const Loss& loss) { return std::abs(ball.finite_rows(0.15, loss) - ball.finite_rows(0.45, loss)); };
+  EXPECT_GE(apart(all), 8) << "the scene has no outline worth a test";
+  EXPECT_LE(apart(ball.loss), 1);  // a facet of the dent's rim may turn away from one ray
+  // The choice leaves out what grazes, not what faces the camera.
+  EXPECT_GT(ball.finite_rows(nu, ball.loss), 0.9 * ball.finite_rows(nu, all));
+}
+
+TEST(RayChoice, TheSearchOverThePoissonRatioAgreesWithTheFit) {
+  PressedBall ball;
+  ASSERT_EQ(ball.optimum.termination, Termination::converged) << ball.optimum.message;
+  const Posterior posterior =
+      explore_posterior(*ball.objective, ball.optimum, ball.loss, tukey_information_factor(ball.loss.tukey), {});
+  ASSERT_TRUE(posterior.quadrature) << "sharper than what is searched";
+  const double std_nu = posterior.poisson_std();
+  EXPECT_NEAR(posterior.poisson_quantile(0.5), ball.optimum.unknowns(poisson), 0.3 * std_nu);
+  EXPECT_NEAR(posterior.log_young_quantile(0.5), ball.optimum.unknowns(log_young), 0.3 * posterior.log_young_std_total());
+}
+
+}  // namespace
+}  // namespace palpate::estimation
