@@ -173,12 +173,15 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   unit(1) = 1;
   const double variance = hessian.ldlt().solve(unit)(1);
   const double std_nu = variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : upper - lower;
-  const bool inside = nu - 5 * std_nu > lower && nu + 5 * std_nu < upper;
-  if (inside && std_nu < 0.03) {
-    posterior.poisson = VectorX::LinSpaced(grid_size, nu - 5 * std_nu, nu + 5 * std_nu);
+  const auto normal = [&](double from, double to) {
+    posterior.poisson = VectorX::LinSpaced(grid_size, from, to);
     const VectorX off = posterior.poisson.array() - nu;
     fill(posterior, (off * at.slope.transpose()).rowwise() + at.log_young.transpose(), at.std_dev.transpose().replicate(grid_size, 1));
     finish(posterior, -0.5 * (off / std_nu).cwiseAbs2());
+  };
+  const bool inside = nu - 5 * std_nu > lower && nu + 5 * std_nu < upper;
+  if (inside && std_nu < 0.03) {
+    normal(nu - 5 * std_nu, nu + 5 * std_nu);
     return posterior;
   }
 
@@ -227,8 +230,7 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
     Optimum conditional = optimise(objective, begin, loss, few, keep_going);
     objective.hold_poisson(false);
     posterior.cancelled = conditional.termination == Termination::cancelled;
-    if (posterior.cancelled) return from_there;
-    if (!conditional.evaluation.usable) return from_there;  // no equilibrium: not this nu
+    if (posterior.cancelled || !conditional.evaluation.usable) return from_there;  // no equilibrium: not this nu
     const NewtonStep step = newton_step(conditional.evaluation, others);
     for (std::size_t k = 0; k < others.size(); ++k) conditional.unknowns(others[k]) += step.move(static_cast<Index>(k));
     note(i, condition_on_poisson(conditional.evaluation, conditional.unknowns, list, information_factor));
@@ -248,11 +250,9 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   }
   if (posterior.cancelled) return posterior;
   const Index count = last - first + 1;
-  if (count < 2) {
+  if (count < 2) {  // no neighbour could be solved: what the optimum alone says
     posterior.quadrature = false;
-    posterior.poisson = VectorX::Constant(1, nu);
-    fill(posterior, at.log_young.transpose(), at.std_dev.transpose());
-    finish(posterior, VectorX::Zero(1));
+    normal(from, to);
     return posterior;
   }
   node = node.segment(first, count).eval();
