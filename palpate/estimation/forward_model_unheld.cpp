@@ -87,8 +87,7 @@ std::string ForwardModel::why_unheld(double sideways_n, double std_n) const {
   return "the supports leave the object free to slide where a load acts on it: " + words(sideways_n) + " act that way" +
          (std_n > 0 ? ", which the force's uncertainty (" + words(std_n) + ") does not explain" : "") + "; " + cure +
          "add the support that holds it, state the uncertainty of the force (force_std_n, force_tare_std_n), or give the "
-         "load's "
-         "normal component alone";
+         "load's normal component alone";
 }
 
 }  // namespace palpate::estimation

@@ -196,7 +196,6 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   (node.array() - nu).abs().minCoeff(&nearest);
   if (nu > from && nu < to) nearest = std::clamp<Index>(nearest, 1, nodes - 2);
   node(nearest) = nu;  // is known already
-  std::vector<char> usable(nodes, 0);
   // Given nu the others are nearly linear: from the neighbour's ridge, one evaluation and the Newton step from there say where
   // the optimum is and how low.
   OptimiseOptions few;
@@ -210,44 +209,39 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
     return !progress || progress("posterior", static_cast<double>(done) / nodes);
   };
   const auto note = [&](Index i, const Conditional& c) {
-    usable[static_cast<std::size_t>(i)] = 1;
     cost_slope(i) = c.cost_slope;
     log_determinant(i) = c.log_determinant;
     mean.row(i) = c.log_young.transpose();
     std_dev.row(i) = c.std_dev.transpose();
   };
-  const auto visit = [&](Index i, const Optimum& from_there) {
+  // False: cancelled, or no equilibrium at this nu.
+  const auto visit = [&](Index i, Optimum& walk) {
     ++done;
-    VectorX begin = from_there.unknowns;
-    const VectorX along = MatrixX(from_there.evaluation.hessian(others, others))
+    VectorX begin = walk.unknowns;
+    const VectorX along = MatrixX(walk.evaluation.hessian(others, others))
                               .ldlt()
-                              .solve(-VectorX(from_there.evaluation.hessian.col(poisson)(others)));
+                              .solve(-VectorX(walk.evaluation.hessian.col(poisson)(others)));
     for (std::size_t k = 0; k < others.size(); ++k) {
-      begin(others[k]) += (node(i) - from_there.unknowns(poisson)) * along(static_cast<Index>(k));
+      begin(others[k]) += (node(i) - walk.unknowns(poisson)) * along(static_cast<Index>(k));
     }
     begin(poisson) = node(i);
     objective.hold_poisson(true);
     Optimum conditional = optimise(objective, begin, loss, few, keep_going);
     objective.hold_poisson(false);
     posterior.cancelled = conditional.termination == Termination::cancelled;
-    if (posterior.cancelled || !conditional.evaluation.usable) return from_there;  // no equilibrium: not this nu
+    if (posterior.cancelled || !conditional.evaluation.usable) return false;
     const NewtonStep step = newton_step(conditional.evaluation, others);
     for (std::size_t k = 0; k < others.size(); ++k) conditional.unknowns(others[k]) += step.move(static_cast<Index>(k));
     note(i, condition_on_poisson(conditional.evaluation, conditional.unknowns, list, information_factor));
-    return conditional;
+    walk = std::move(conditional);
+    return true;
   };
   note(nearest, at);
-  Optimum walk = optimum;
   Index first = nearest, last = nearest;  // that have an equilibrium
-  for (; last + 1 < nodes && !posterior.cancelled; ++last) {
-    walk = visit(last + 1, walk);
-    if (usable[static_cast<std::size_t>(last + 1)] == 0) break;
-  }
+  Optimum walk = optimum;
+  while (last + 1 < nodes && visit(last + 1, walk)) ++last;
   walk = optimum;
-  for (; first > 0 && !posterior.cancelled; --first) {
-    walk = visit(first - 1, walk);
-    if (usable[static_cast<std::size_t>(first - 1)] == 0) break;
-  }
+  while (!posterior.cancelled && first > 0 && visit(first - 1, walk)) --first;
   if (posterior.cancelled) return posterior;
   const Index count = last - first + 1;
   if (count < 2) {  // no neighbour could be solved: what the optimum alone says
