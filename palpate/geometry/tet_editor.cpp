@@ -162,6 +162,10 @@ Vec3 TetEditor::boundary_normal(Index v) const {
   return l > 0 ? Vec3(n / l) : Vec3(Vec3::Zero());
 }
 
+bool TetEditor::joined(Index a, Index b) const {
+  return std::any_of(star[a].begin(), star[a].end(), [&](Index t) { return has(tets[t], b); });
+}
+
 bool TetEditor::link_condition(Index a, Index b, const std::vector<Index>& ring) const {
   // Dey, Edelsbrunner, Guha, Nekhayev 1999, with the outside as one more vertex that is joined to every boundary face
   std::vector<Index> ring_vertices;
@@ -297,10 +301,7 @@ bool TetEditor::remove_edge(Index a, Index b, const Accept& accept) {
   }
   const int m = static_cast<int>(ring.size());
   if (m < 3 || (open && m != n + 1)) return false;
-  if (open) {
-    const auto touching = neighbours(ring.front());
-    if (std::binary_search(touching.begin(), touching.end(), ring.back())) return false;
-  }
+  if (open && joined(ring.front(), ring.back())) return false;
   // best[i][j]: best triangulation of the polygon ring[i..j] (Klincsek 1980)
   double best[most + 1][most + 1];
   int cut[most + 1][most + 1];
@@ -331,16 +332,21 @@ bool TetEditor::remove_edge(Index a, Index b, const Accept& accept) {
     if (!accept(before, after)) return false;
   }
   std::vector<std::array<int, 2>> pending{{0, m - 1}};
-  for (const Index id : around) remove(id);
+  std::vector<std::array<int, 3>> chosen;
   while (!pending.empty()) {
     const auto [i, j] = pending.back();
     pending.pop_back();
     if (j < i + 2) continue;
-    const int k = cut[i][j];
+    // where a thin part overlaps itself these two may be joined elsewhere: two fans at one edge would be no manifold
+    if (!(i == 0 && j == m - 1) && joined(ring[i], ring[j])) return false;
+    chosen.push_back({i, cut[i][j], j});
+    pending.push_back({i, cut[i][j]});
+    pending.push_back({cut[i][j], j});
+  }
+  for (const Index id : around) remove(id);
+  for (const auto& [i, k, j] : chosen) {
     add({a, ring[i], ring[k], ring[j]});
     add({b, ring[i], ring[j], ring[k]});
-    pending.push_back({i, k});
-    pending.push_back({k, j});
   }
   return true;
 }
@@ -376,6 +382,7 @@ bool TetEditor::remove_face(Index tet, int opposite) {
   Index e = -1;
   for (const Index v : tets[other])
     if (v != f[0] && v != f[1] && v != f[2]) e = v;
+  if (joined(d, e)) return false;
   const double old = std::min(quality[tet], quality[other]);
   std::array<Tet, 3> fresh;
   for (int k = 0; k < 3; ++k) {
@@ -409,6 +416,17 @@ Index TetEditor::split_edge(Index a, Index b) {
     add(q);
   }
   return v;
+}
+
+void TetEditor::unsplit_edge(Index v, Index a, Index b) {
+  std::vector<Tet> whole;
+  for (const Index id : star[v])
+    if (has(tets[id], a)) {
+      whole.push_back(tets[id]);
+      whole.back()[place(whole.back(), v)] = b;
+    }
+  while (!star[v].empty()) remove(star[v].back());
+  for (const Tet& t : whole) add(t);
 }
 
 TetEditor::Pieces TetEditor::pieces() const {

@@ -54,6 +54,8 @@ class TetEditor {
   bool remove_face(Index tet, int opposite);
   /// Splits an edge in the middle.
   Index split_edge(Index a, Index b);
+  /// Takes split_edge(a, b) back, which made v; nothing but v's place may have changed since.
+  void unsplit_edge(Index v, Index a, Index b);
 
   /// Pieces joined by faces; of a tetrahedron its piece (-1: removed), and the pieces' volumes.
   struct Pieces {
@@ -75,6 +77,7 @@ class TetEditor {
   bool peel(Index tet, Index a, Index b, const Accept& accept);
   bool link_condition(Index a, Index b, const std::vector<Index>& ring) const;
   bool is_boundary_face(Index a, Index b, Index c) const;
+  bool joined(Index a, Index b) const;
   Index count_ = 0;
   std::vector<Index> free_;
 };

@@ -147,7 +147,7 @@ class Improver {
           const Index v = m_.split_edge(tet[i], tet[j]);
           smooth_vertex(v);
           done = m_.star_quality(v) > old + 0.01;
-          if (!done) m_.collapse(v, tet[i], -2, nullptr);
+          if (!done) m_.unsplit_edge(v, tet[i], tet[j]);
         }
     }
   }
