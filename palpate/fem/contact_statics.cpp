@@ -55,7 +55,8 @@ struct ContactStatics::Impl {
   // Newton's method with friction limits that follow the pressures at once. There is no energy to watch, so it must win
   // fast, or it is left (false, nothing changed) to the fixed point.
   bool settle(const ContactProblem& p, std::vector<TouchMemory>& memory, ContactState& s, ContactEquilibrium& out) {
-    constexpr int most = 12;
+    // From sticking all over, what slides grows step by step before the residual falls.
+    constexpr int most = 30, most_worse = 10;
     constexpr double krylov_tolerance = 1e-3;
     ContactState now = s;
     std::vector<TouchMemory> now_memory = memory;
@@ -64,12 +65,12 @@ struct ContactStatics::Impl {
     for (int step = 0, worse = 0; step < most; ++step) {
       update_limits(p, now_memory, now);
       if (!system.evaluate(p, now_memory, now)) return false;
-      if (now.residual <= system.options.statics.residual_tolerance) {
+      if (is_settled(now, system.options.statics.residual_tolerance)) {
         s = std::move(now);
         memory = std::move(now_memory);
         return true;
       }
-      if (now.residual > 0.5 * best && ++worse > 2) return false;
+      if (now.residual > 0.5 * best && ++worse > most_worse) return false;
       best = std::min(best, now.residual);
       system.tangent(p, now_memory, now, false, t);
       MatrixX du, dz;
@@ -132,7 +133,9 @@ struct ContactStatics::Impl {
       const double change = update_limits(p, next_memory, next);
       double force = 0;
       for (const Vec6& wrench : next.gradients) force = std::max(force, wrench.head<3>().norm());
-      const double tolerance = system.options.friction_tolerance * force;
+      // A sum over points against a norm over them.
+      const double rounding_n = std::sqrt(static_cast<double>(system.terms.points().point_count())) * next.rounding_n;
+      const double tolerance = std::max(system.options.friction_tolerance * force, rounding_n);
       if (change <= tolerance) break;
       if (round == system.options.max_friction_rounds) {
         reason = "pressures and friction did not settle in " + std::to_string(round) + " rounds";
@@ -245,10 +248,15 @@ ContactEquilibrium ContactStatics::solve(double young_modulus_pa, double poisson
   // What was reached, also when it is not the whole load.
   const ContactProblem reached = system.problem(young_modulus_pa, poisson_ratio, last, extra);
   // Anchors have moved on since the last increment; its forces are those of its own.
-  if (out.increments == 0) system.evaluate(reached, memory, s);
+  if (out.increments == 0) {
+    for (std::size_t c = 0; c < count; ++c)
+      system.terms.begin_increment(system.body(c, reached.m, s.poses[c], memory), s.u, memory[c]);
+    system.evaluate(reached, memory, s);
+  }
   out.loads = last;
   out.displacement_m = s.u;
   out.residual = s.residual;
+  out.rounding = s.scale_n > 0 ? s.rounding_n / s.scale_n : 0;
   out.inverted_elements = s.inverted;
   if (out.converged && s.inverted > 0)
     out.reason =

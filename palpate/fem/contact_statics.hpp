@@ -29,8 +29,8 @@ struct RigidContact {
   /// wrench; no columns: the pose is prescribed and the wrench is the answer.
   MatrixX free_axes = MatrixX(6, 0);
   double stiffness = 0;        ///< 0: that of the options
-  /// What lies this near to the shape at the start just touches it there: its gap and the force are zero, also where a mesh
-  /// is a little uneven or reaches into the table.
+  /// Above zero: what lies this near to the shape at the start, or inside it, just touches it there: gap and force are zero.
+  /// A mesh is a little uneven; one vertex that reaches into the table would else lift a stiff object off the rest of its foot.
   double seat_m = 0;
   double bond_reach_m = 1e-6;  ///< Touch::bonded: what lies this near to the shape at the start is glued
 };
@@ -94,6 +94,9 @@ struct ContactEquilibrium {
   int increments_from_rest = 0;  ///< of all steps of the sequence
   int inverted_elements = 0;
   double residual = 0;
+  /// What the rounding of positions leaves of the residual: a stiff layer feels the last digit of a place. Where it is above
+  /// the tolerance, the equilibrium is known to this share of the forces only.
+  double rounding = 0;
   std::shared_ptr<const std::vector<TouchMemory>> memory;  ///< what the next step of a sequence starts from
   /// Where this load step started, and its increments (the last one alone where nothing depends on the path).
   std::shared_ptr<const std::vector<ContactIncrement>> path;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "palpate/fem/contact/contact_problem.hpp"
 
@@ -21,7 +22,7 @@ std::string ContactSystem::newton(const ContactProblem& p, const std::vector<Tou
 
 void ContactSystem::soften_start(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s,
                                  ContactEquilibrium& out) {
-  if (s.residual < 0.3) return;
+  if (is_settled(s, 0.3)) return;
   const ContactState before = s;
   softest = 3;
   if (evaluate(p, memory, s)) iterate(p, memory, s, out, 0.03, 8);
@@ -34,10 +35,14 @@ std::string ContactSystem::iterate(const ContactProblem& p, const std::vector<To
   ContactTangent t;
   ContactState trial;
   double proximal = floating ? 1e-4 : 0;
+  double last_residual = std::numeric_limits<double>::infinity();
   for (int step = 0;; ++step) {
     const VectorX jump = p.prescribed - system.prescribed_part(s.u);
     const bool at_target = jump.lpNorm<Eigen::Infinity>() <= 1e-14 * diameter_m;
-    if (at_target && s.residual <= tolerance) return {};
+    if (at_target && is_settled(s, tolerance)) return {};
+    // Near the floor, and a whole Newton step no longer halves what is left: this is the floor.
+    if (at_target && is_settled(s, tolerance, 10) && s.residual > 0.5 * last_residual) return {};
+    last_residual = s.residual;
     if (step == max_steps) return "Newton's method did not converge in " + std::to_string(step) + " steps";
     tangent(p, memory, s, s.residual > 1e-3, t);
     bool factored = false;
@@ -67,7 +72,11 @@ std::string ContactSystem::iterate(const ContactProblem& p, const std::vector<To
       if (!evaluate(p, memory, trial)) continue;
       const bool falls = trial.energy <= s.energy + 1e-4 * alpha * slope;
       const bool smaller = trial.residual <= (1 - 0.1 * alpha) * s.residual && shift == 0 && s.residual < 1e-3;
-      if (!at_target || falls || smaller) {
+      // Under tiny strains energies differ by less than their rounding; forces still know the way down: the approximate Wolfe
+      // condition (Hager & Zhang, SIAM J. Optim. 16, 2005, eq. 4.1).
+      const bool level = trial.energy <= s.energy + s.rounding_j &&
+                         trial.unbalanced.dot(du.col(0)) + trial.unbalanced_tool.dot(dz.col(0)) <= 0.9998 * -slope;
+      if (!at_target || falls || level || smaller) {
         accepted = true;
         break;
       }

@@ -76,6 +76,14 @@ ContactSystem::ContactSystem(const TetMesh& mesh_in, const std::string& material
     const VectorX given = options.statics.region_stiffness;
     set_region_stiffness(given.size() > 0 ? given : VectorX::Ones(assembly.region_count()));
   }
+  double volume43 = 0;
+  for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
+    const auto corner = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(e, k))); };
+    const double volume = std::abs((corner(1) - corner(0)).cross(corner(2) - corner(0)).dot(corner(3) - corner(0))) / 6;
+    volume43 += std::pow(volume, 4.0 / 3);
+    volume_m3 += volume;
+  }
+  element_area_m2 = std::sqrt(volume43);
   diameter_m = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
 }
 
@@ -128,22 +136,30 @@ bool ContactSystem::evaluate(const ContactProblem& p, const std::vector<TouchMem
   s.energy = strain - p.external.dot(s.u) - p.wrench.dot(s.travelled);
   s.unbalanced_tool = -p.wrench;
   double tool_force = p.wrench.size() > 0 ? p.wrench.norm() : 0;
+  // F = I + grad u is rounded as 1 is, and so are stresses.
+  const double stress_pa = std::numeric_limits<double>::epsilon() * (p.m.lambda + 2 * p.m.mu);
+  double rounding2_n2 = std::pow(stress_pa * element_area_m2, 2);
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    s.energy += terms.energy_and_forces(body(c, p.m, s.poses[c], memory), s.u, s.touching, s.gradients[c]);
+    s.energy += terms.energy_and_forces(body(c, p.m, s.poses[c], memory), s.u, s.touching, s.gradients[c],
+                                        &rounding2_n2);
     s.unbalanced_tool.segment(first_axis[c], contacts[c].free_axes.cols()) +=
         contacts[c].free_axes.transpose() * s.gradients[c];
     tool_force = std::max(tool_force, s.gradients[c].head<3>().norm());
   }
   s.unbalanced = system.free_part(s.internal + s.touching - p.external);
-  const double scale = std::max({p.external.norm(), s.internal.norm(), s.touching.norm()});
-  s.residual = scale > 0 ? s.unbalanced.norm() / scale : 0;
+  s.scale_n = std::max({p.external.norm(), s.internal.norm(), s.touching.norm()});
+  s.tool_scale_n = tool_force;
+  s.rounding_n = std::sqrt(rounding2_n2);
+  s.rounding_j = stress_pa * volume_m3;
+  s.tool_residual = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c)
     for (Index k = 0; k < contacts[c].free_axes.cols(); ++k) {
       const auto axis = contacts[c].free_axes.col(k);
       const double arm = axis.head<3>().norm() + axis.tail<3>().norm() * diameter_m;
       if (tool_force > 0)
-        s.residual = std::max(s.residual, std::abs(s.unbalanced_tool(first_axis[c] + k)) / (arm * tool_force));
+        s.tool_residual = std::max(s.tool_residual, std::abs(s.unbalanced_tool(first_axis[c] + k)) / (arm * tool_force));
     }
+  s.residual = std::max(s.scale_n > 0 ? s.unbalanced.norm() / s.scale_n : 0, s.tool_residual);
   return std::isfinite(s.energy) && std::isfinite(s.residual);
 }
 

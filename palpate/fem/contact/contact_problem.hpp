@@ -2,6 +2,7 @@
 // What ContactStatics is made of: one state of body and tools, its residual and tangent, Newton's method on both together.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -27,10 +28,22 @@ struct ContactState {
   VectorX touching;   // forces of the contacts
   std::vector<Vec6> gradients;
   double energy = 0, residual = 0;
+  double tool_residual = 0;  // its part of tools along their free axes, over the largest force of a tool
+  double scale_n = 0;        // of the nodes' part
+  double tool_scale_n = 0;
+  double rounding_n = 0;   // what positions in double precision leave of forces; no step brings the residual lower
+  double rounding_j = 0;   // of energy: differences below say nothing
   VectorX unbalanced;       // free part of internal + touching - external
   VectorX unbalanced_tool;  // A' dE/dq - A' w
   int inverted = 0;
 };
+
+/// True where forces balance to `tolerance`, or as far as rounding lets them (times `roundings`).
+inline bool is_settled(const ContactState& s, double tolerance, double roundings = 1) {
+  const double left_n = roundings * s.rounding_n;
+  return s.unbalanced.norm() <= std::max(tolerance * s.scale_n, left_n) &&
+         s.tool_residual * s.tool_scale_n <= std::max(tolerance * s.tool_scale_n, left_n);
+}
 
 /// Tangent of body and tools; tool rows and columns along free axes only.
 struct ContactTangent {
@@ -83,6 +96,8 @@ class ContactSystem {
   std::vector<Index> first_axis;  // of a contact in z, and the total
   MatrixX motions;
   double diameter_m = 0;
+  double volume_m3 = 0;
+  double element_area_m2 = 0;  // norm over the elements: what a stress in each of them gives in nodal forces
 
  private:
   std::string iterate(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s,

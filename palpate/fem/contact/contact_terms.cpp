@@ -91,7 +91,7 @@ std::vector<double> ContactTerms::seats(const TouchingBody& body, double reach_m
   const VectorX rest = VectorX::Zero(3 * static_cast<Index>(rest_m_.rows()));
   ShapePoint shape;
   for_each_candidate(body, rest, [&](Index f, int p, const Vec3& x, const Vec3&) {
-    if (!body.shape->at(body.T_base_tool.inverse() * x, points_.cell_m(f), shape) || std::abs(shape.gap_m) > reach_m) return;
+    if (!body.shape->at(body.T_base_tool.inverse() * x, points_.cell_m(f), shape) || shape.gap_m > reach_m) return;
     seat[static_cast<std::size_t>(f) * points_.per_face() + p] = shape.gap_m;
   });
   return seat;
@@ -160,13 +160,21 @@ void ContactTerms::for_each_touching(const TouchingBody& body, const VectorX& u,
   });
 }
 
-double ContactTerms::energy_and_forces(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient) const {
+double ContactTerms::energy_and_forces(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient,
+                                       double* rounding2_n2) const {
   const Mat3& r = body.T_base_tool.linear();
+  // Interpolation, frame change and anchor round one after the other.
+  constexpr double place = 3 * std::numeric_limits<double>::epsilon();
+  const double tip_m = body.T_base_tool.translation().norm();
   double energy = 0;
   for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3&, const Sample& s) {
     const double weight = points_.weight_m2(f, p);
     const Vec3 force = weight * (r * s.gradient);
     energy += weight * s.energy;
+    if (rounding2_n2 != nullptr) {
+      const double lost_n = weight * layer_pa_m(body, f) * place * (x.norm() + tip_m);
+      *rounding2_n2 += lost_n * lost_n;
+    }
     for (int a = 0; a < points_.nodes_per_face(); ++a)
       forces.segment<3>(3 * points_.node(f, a)) += points_.shape(p)(a) * force;
     gradient.head<3>() -= force;

@@ -60,7 +60,9 @@ class ContactTerms {
   Vec3 position(const VectorX& u, Index face, int point) const;
 
   /// Adds the nodal forces dE/du (3n) and the tool's gradient; returns the energy.
-  double energy_and_forces(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient) const;
+  /// @param rounding2_n2  adds the squared norm of what the rounding of positions does to the forces
+  double energy_and_forces(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient,
+                           double* rounding2_n2 = nullptr) const;
   /// Adds the tangent to the blocks and fills the tool's terms. @param convex  leaves out what bends the wrong way (deep
   /// penetration of a curved tool), far from the solution
   void tangent(const TouchingBody& body, const VectorX& u, bool convex, BlockValues& blocks, ToolTerms& tool) const;
@@ -93,7 +95,7 @@ class ContactTerms {
   void begin_increment(const TouchingBody& body, const VectorX& u, TouchMemory& memory) const;
   /// Friction limits from the present pressures; returns the largest change of force, newton.
   double update_limits(const TouchingBody& body, const VectorX& u, double friction, TouchMemory& memory) const;
-  /// Gaps at the start of points that lie within `reach_m` of the body's surface, else 0 (TouchingBody::seat_m).
+  /// Gaps at the start of points that lie within `reach_m` of the body's surface or inside it, else 0 (TouchingBody::seat_m).
   std::vector<double> seats(const TouchingBody& body, double reach_m) const;
   /// At the end of an increment: anchors follow what has slipped (return map).
   void end_increment(const TouchingBody& body, const VectorX& u, TouchMemory& memory) const;
