@@ -84,7 +84,7 @@ int run(const Options& o, Session& session) {
   std::filesystem::create_directories(folder);
   for (const char* name : {"model.vtu", "model.msh", "model.vtk"}) io::write_mesh(folder / name, built.model.volume);
   io::write_mesh(folder / "surface.ply", built.model.surface);
-  io::write_file(folder / "model.png", report::encode_png(report::draw_mesh(built.model.volume, 1600, 800)));
+  io::write_file(folder / "model.png", report::encode_png(report::draw_mesh(built.model.volume, 1200, 600)));
 
   const auto& c = built.check;
   for (const std::string& w : built.model.warnings) session.warn(w);

@@ -32,6 +32,7 @@ SurfaceSamples sample_surface(const Solid& solid, int count) {
     cumulative[t] = area;
   }
   out.area_each_m2 = area / count;
+  const Vec3 middle = 0.5 * (solid.min_m() + solid.max_m());
   out.evenly = 0;
   std::mt19937 rng(7);
   std::uniform_real_distribution<double> u;
@@ -43,7 +44,10 @@ SurfaceSamples sample_surface(const Solid& solid, int count) {
     if (v + w > 1) v = 1 - v, w = 1 - w;
     const auto id = static_cast<Index>(t);
     const Vec3 p = (1 - v - w) * corner(id, 0) + v * corner(id, 1) + w * corner(id, 2);
-    if (!solid.separates(p, id)) continue;
+    if (!solid.separates(p, id)) {
+      out.buried_m3 += out.area_each_m2 / 3 * solid.normal(id).dot(p - middle);
+      continue;
+    }
     out.point.push_back(p);
     out.normal.push_back(solid.normal(id));
   }

@@ -17,6 +17,7 @@ struct SurfaceSamples {
   std::vector<Vec3> point, normal;
   std::size_t evenly = 0;  ///< that many are spread by area, the rest lies in the middle of triangles
   double area_each_m2 = 0;
+  double buried_m3 = 0;  ///< what hidden parts add to the solid's signed volume
 };
 SurfaceSamples sample_surface(const Solid& solid, int count);
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numeric>
 
 #include "palpate/core/error.hpp"
@@ -173,7 +172,7 @@ SurfaceCheck check_surface(const TriMesh& mesh) {
   const Vec3 middle = 0.5 * (out.min_m + out.max_m);
   double volume = 0;
   std::vector<bool> skip(out.triangles, false);
-  std::map<std::array<Index, 3>, Index> seen;
+  const std::vector<char> again = copies(welded.triangles);
   for (Index i = 0; i < out.triangles; ++i) {
     const Eigen::Matrix<Index, 1, 3> t = welded.triangles.row(i);
     const Vec3 a = welded.vertices_m.row(t[0]).transpose() - middle, b = welded.vertices_m.row(t[1]).transpose() - middle,
@@ -183,11 +182,9 @@ SurfaceCheck check_surface(const TriMesh& mesh) {
     out.area_m2 += area;
     volume += a.dot(b.cross(c)) / 6;
     if (!(area > 1e-12 * longest2)) ++out.degenerate_triangles;
-    std::array<Index, 3> key{t[0], t[1], t[2]};
-    std::sort(key.begin(), key.end());
-    if (key[0] == key[1] || key[1] == key[2]) {
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) {
       skip[i] = true;  // collapsed: its edges would look non-manifold
-    } else if (!seen.try_emplace(key, i).second) {
+    } else if (again[i]) {
       ++out.duplicate_triangles;
       skip[i] = true;
     }
@@ -375,6 +372,23 @@ TriMesh weld(const TriMesh& mesh, std::vector<Index>* vertex_of) {
   out.vertices_m.conservativeResize(kept, 3);
   out.triangles = mesh.triangles.unaryExpr([&](Index v) { return to[v]; });
   if (vertex_of != nullptr) *vertex_of = std::move(to);
+  return out;
+}
+
+std::vector<char> copies(const Triangles& triangles) {
+  struct Entry {
+    std::array<Index, 3> key;
+    Index triangle;
+  };
+  std::vector<Entry> list(triangles.rows());
+  for (Index i = 0; i < triangles.rows(); ++i) {
+    list[i] = {{triangles(i, 0), triangles(i, 1), triangles(i, 2)}, i};
+    std::sort(list[i].key.begin(), list[i].key.end());
+  }
+  std::sort(list.begin(), list.end(),
+            [](const Entry& a, const Entry& b) { return std::tie(a.key, a.triangle) < std::tie(b.key, b.triangle); });
+  std::vector<char> out(triangles.rows(), 0);
+  for (std::size_t i = 1; i < list.size(); ++i) out[list[i].triangle] = list[i].key == list[i - 1].key;
   return out;
 }
 

@@ -80,4 +80,7 @@ std::string unit_guess(double longest_edge_m);
 /// Smallest and largest of the six dihedral angles of a tetrahedron in degrees (0 and 180 when flat).
 std::pair<double, double> dihedral_range_deg(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 
+/// 1 for a triangle whose corners an earlier one has, in whatever order.
+std::vector<char> copies(const Triangles& triangles);
+
 }  // namespace palpate::geometry

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <random>
 
 #include "palpate/core/error.hpp"
+#include "palpate/geometry/hole_covers.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -33,16 +33,15 @@ std::vector<Side> sorted_sides(const Triangles& t) {
 /// Drops copies (in either orientation) and triangles without area.
 TriMesh cleaned(const TriMesh& mesh) {
   TriMesh out = weld(mesh);
-  std::map<std::array<Index, 3>, bool> seen;
+  const std::vector<char> again = copies(out.triangles);
   Index kept = 0;
   for (Index i = 0; i < out.triangles.rows(); ++i) {
-    std::array<Index, 3> key{out.triangles(i, 0), out.triangles(i, 1), out.triangles(i, 2)};
+    const std::array<Index, 3> key{out.triangles(i, 0), out.triangles(i, 1), out.triangles(i, 2)};
     const Vec3 a = out.vertices_m.row(key[0]).transpose(), b = out.vertices_m.row(key[1]).transpose(),
                c = out.vertices_m.row(key[2]).transpose();
     const double longest2 = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
     if (!((b - a).cross(c - a).norm() > 1e-12 * longest2)) continue;
-    std::sort(key.begin(), key.end());
-    if (!seen.try_emplace(key, true).second) continue;
+    if (again[i]) continue;
     out.triangles.row(kept++) = Eigen::Matrix<Index, 1, 3>(out.triangles.row(i));
   }
   out.triangles.conservativeResize(kept, 3);
@@ -86,6 +85,26 @@ int outward_votes(const TriangleTree& tree, const std::vector<Index>& patch, dou
   return votes;
 }
 
+bool closed(const std::vector<Side>& sides) {
+  for (std::size_t i = 0; i < sides.size(); i += 2) {
+    if (i + 1 == sides.size()) return false;
+    const Side &a = sides[i], &b = sides[i + 1];
+    if (a.low != b.low || a.high != b.high || a.ascending == b.ascending) return false;
+    if (i + 2 < sides.size() && sides[i + 2].low == a.low && sides[i + 2].high == a.high) return false;
+  }
+  return !sides.empty();
+}
+
+void close_holes(OrientedSurface& s, const std::vector<std::array<Index, 3>>& open) {
+  HoleCovers covers = cover_holes(s.mesh, open);
+  const auto first = s.mesh.triangles.rows();
+  s.mesh.triangles.conservativeResize(first + static_cast<Eigen::Index>(covers.triangles.size()), 3);
+  for (std::size_t i = 0; i < covers.triangles.size(); ++i)
+    s.mesh.triangles.row(first + static_cast<Eigen::Index>(i)) = covers.triangles[i];
+  s.cover_width_m = std::move(covers.width_m);
+  s.closed = closed(sorted_sides(s.mesh.triangles));
+}
+
 }  // namespace
 
 OrientedSurface orient(const TriMesh& mesh) {
@@ -104,9 +123,11 @@ OrientedSurface orient(const TriMesh& mesh) {
   std::vector<std::array<Neighbour, 3>> neighbours(n, {Neighbour{-1, false}, {-1, false}, {-1, false}});
   std::vector<int> count(n, 0);
   Index inconsistent = 0;
+  std::vector<std::array<Index, 3>> open;
   for (std::size_t i = 0; i < sides.size();) {
     std::size_t j = i;
     while (j < sides.size() && sides[j].low == sides[i].low && sides[j].high == sides[i].high) ++j;
+    if (j - i == 1) open.push_back({sides[i].low, sides[i].high, sides[i].triangle});
     if (j - i == 2) {
       const bool same = sides[i].ascending == sides[i + 1].ascending;
       inconsistent += same;
@@ -137,6 +158,7 @@ OrientedSurface orient(const TriMesh& mesh) {
       for (Index i = 0; i < n; ++i) turn(i);
       out.flipped = n;
     }
+    if (out.closed = closed(sides); !out.closed) close_holes(out, open);
     return out;
   }
   for (Index i = 0; i < n; ++i)
@@ -151,6 +173,7 @@ OrientedSurface orient(const TriMesh& mesh) {
       out.flipped += (flip[i] == 1) != !outward;
     }
   }
+  close_holes(out, open);
   return out;
 }
 
@@ -176,7 +199,8 @@ Solid::Solid(const TriMesh& soup)
     max_m_ = max_m_.cwiseMax(a).cwiseMax(b).cwiseMax(c);
   }
   diagonal_m_ = (max_m_ - min_m_).norm();
-  watertight_ = check_surface(m).watertight();
+  watertight_ = oriented_.closed;
+  volume_m3_ = signed_volume(m);
 }
 
 double Solid::signed_distance(const Vec3& p) const {

@@ -18,11 +18,13 @@ struct OrientedSurface {
   Index flipped = 0;  ///< triangles that were turned round
   Index dropped = 0;  ///< copies and triangles without area
   Index patches = 0;  ///< pieces across whose edges the orientation could be carried
+  bool closed = false;  ///< every edge has two triangles that run along it in opposite directions
+  std::vector<double> cover_width_m;  ///< of the mesh's last triangles, which close small holes: the width of the hole
 };
 
 /// Orientation is carried over edges with two triangles; when the input was inconsistent, every patch is then turned so that
 /// most of the rays cast from its two sides agree on what is inside by the parity of their crossings. A consistent input
-/// keeps its orientation, unless all of it is inside out.
+/// keeps its orientation, unless all of it is inside out. Small holes are then closed.
 OrientedSurface orient(const TriMesh& mesh);
 
 /// A soup seen as a solid: inside is where its winding number is above one half.
@@ -35,6 +37,7 @@ class Solid {
   /// Distance to the nearest triangle, negative inside.
   double signed_distance(const Vec3& point_m) const;
   ClosestPoint closest(const Vec3& point_m, Index hint = -1) const { return tree_.closest(point_m, hint); }
+  bool within(const Vec3& point_m, double squared_m2, Index hint = -1) const { return tree_.within(point_m, squared_m2, hint); }
   Vec3 normal(Index triangle) const { return normals_.row(triangle).transpose(); }
   /// Where the segment from an inside to an outside point leaves the solid, as a share of its length.
   double leaves(const Vec3& inside_m, const Vec3& outside_m) const;
@@ -44,7 +47,14 @@ class Solid {
   const TriMesh& surface() const { return tree_.mesh(); }
   const TriangleTree& tree() const { return tree_; }
   const OrientedSurface& orientation() const { return oriented_; }  ///< without its mesh
-  bool watertight() const { return watertight_; }
+  bool watertight() const { return watertight_; }  ///< once small holes are closed
+  /// Width of the hole that this triangle closes; 0 for a given one.
+  double hole_width_m(Index triangle) const {
+    const auto first = static_cast<Index>(normals_.rows()) - static_cast<Index>(oriented_.cover_width_m.size());
+    return triangle < first ? 0 : oriented_.cover_width_m[triangle - first];
+  }
+  /// Of watertight surfaces: what lies within several parts of the soup counts several times.
+  double signed_volume_m3() const { return volume_m3_; }
   double diagonal_m() const { return diagonal_m_; }
   const Vec3& min_m() const { return min_m_; }
   const Vec3& max_m() const { return max_m_; }
@@ -55,6 +65,7 @@ class Solid {
   WindingNumber winding_;
   Points normals_;
   bool watertight_ = false;
+  double volume_m3_ = 0;
   double diagonal_m_ = 0;
   Vec3 min_m_, max_m_;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <utility>
 
 #include "palpate/geometry/surface_fit.hpp"
 #include "palpate/geometry/tet_quality.hpp"
@@ -17,26 +18,29 @@ TetEditor::Accept near_surface(const TetEditor& mesh, const Solid& solid, double
   return [&mesh, &solid, tolerance](const std::vector<TetEditor::Tri>& before, const std::vector<TetEditor::Tri>& after) {
     const auto& x = mesh.x;
     const auto normal = [&](const TetEditor::Tri& t) { return Vec3((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]])); };
-    double size = 0, was = 0;
+    double size = 0;
+    for (const auto& t : before) size += mesh.size_m[t[0]] / double(before.size());
+    double allowed2 = std::pow(mesh.allowed_m(tolerance, size), 2);
+    bool widened = false;
     Index hint = -1;
-    for (const auto& t : before) {
-      size += mesh.size_m[t[0]] / double(before.size());
-      const ClosestPoint c = solid.closest((x[t[0]] + x[t[1]] + x[t[2]]) / 3, hint);
-      hint = c.triangle;
-      was = std::max(was, std::sqrt(c.squared_distance_m2));
-    }
-    const double allowed = std::max(mesh.allowed_m(tolerance, size), was);
+    // as far as it was already is near enough; asked for only when it matters
+    const auto near = [&](const Vec3& p) {
+      if (solid.within(p, allowed2, hint)) return true;
+      if (std::exchange(widened, true)) return false;
+      for (const auto& t : before) {
+        const ClosestPoint c = solid.closest((x[t[0]] + x[t[1]] + x[t[2]]) / 3, hint);
+        allowed2 = std::max(allowed2, c.squared_distance_m2);
+      }
+      return solid.within(p, allowed2, hint);
+    };
     for (const auto& t : after) {
       const Vec3 n = normal(t), middle = (x[t[0]] + x[t[1]] + x[t[2]]) / 3;
       const ClosestPoint c = solid.closest(middle, hint);
       hint = c.triangle;
-      const double d = std::sqrt(c.squared_distance_m2);
-      if (d > allowed) return false;
-      if (d < 0.3 * size && solid.normal(c.triangle).dot(n) < 0.3 * n.norm()) return false;
-      for (int k = 0; k < 3; ++k) {
-        const Vec3 m = 0.5 * (x[t[k]] + x[t[(k + 1) % 3]]);
-        if (solid.closest(m, c.triangle).squared_distance_m2 > allowed * allowed) return false;
-      }
+      if (c.squared_distance_m2 > allowed2 && !near(middle)) return false;
+      if (c.squared_distance_m2 < 0.09 * size * size && solid.normal(c.triangle).dot(n) < 0.3 * n.norm()) return false;
+      for (int k = 0; k < 3; ++k)
+        if (!near(0.5 * (x[t[k]] + x[t[(k + 1) % 3]]))) return false;
       bool folds = true;
       for (const auto& b : before) {
         const Vec3 nb = normal(b);
@@ -238,7 +242,7 @@ class Improver {
     }
   }
 
-  /// The boundary triangles around a vertex that moves, and the largest squared distance of their middles so far.
+  /// The boundary triangles around a vertex that moves, and the largest squared distance of their middles at first.
   struct Around {
     std::vector<TetEditor::Tri> triangles;
     double farthest2 = -1;
@@ -246,21 +250,18 @@ class Improver {
 
   /// That distance must not grow noticeably.
   bool stays_near(Index v, const Vec3& to, Index hint, Around& around) const {
-    const auto farthest2 = [&](const Vec3& at) {
-      double most = 0;
-      for (const auto& t : around.triangles)
-        most = std::max(most, solid_.closest((at + m_.x[t[1]] + m_.x[t[2]]) / 3, hint).squared_distance_m2);
-      return most;
-    };
-    if (around.farthest2 < 0) {
-      around.triangles = m_.boundary_triangles(v);
-      around.farthest2 = farthest2(m_.x[v]);
+    const double allowed = (off_surface_ ? tolerance_ : 0.04) * m_.size_m[v], allowed2 = allowed * allowed;
+    if (off_surface_ && !solid_.within(to, allowed2, hint)) return false;
+    const auto middle = [&](const TetEditor::Tri& t, const Vec3& at) { return Vec3((at + m_.x[t[1]] + m_.x[t[2]]) / 3); };
+    if (around.triangles.empty()) around.triangles = m_.boundary_triangles(v);
+    for (const auto& t : around.triangles) {
+      const Vec3 p = middle(t, to);
+      if (solid_.within(p, around.farthest2 < 0 ? allowed2 : std::max(1.02 * around.farthest2, allowed2), hint)) continue;
+      if (around.farthest2 >= 0) return false;
+      for (const auto& b : around.triangles)
+        around.farthest2 = std::max(around.farthest2, solid_.closest(middle(b, m_.x[v]), hint).squared_distance_m2);
+      if (!solid_.within(p, std::max(1.02 * around.farthest2, allowed2), hint)) return false;
     }
-    const double allowed = (off_surface_ ? tolerance_ : 0.04) * m_.size_m[v];
-    if (off_surface_ && solid_.closest(to, hint).squared_distance_m2 > allowed * allowed) return false;
-    const double after = farthest2(to);
-    if (after > std::max(1.02 * around.farthest2, allowed * allowed)) return false;
-    around.farthest2 = after;  // the caller moves the vertex now
     return true;
   }
 

@@ -121,7 +121,8 @@ double share_over_holes(const TriMesh& boundary, const Solid& solid) {
     const ClosestPoint q = solid.closest((a + b + c) / 3, hint);
     hint = q.triangle;
     all += area;
-    if (q.squared_distance_m2 > std::pow(0.01 * solid.diagonal_m(), 2)) far += area;
+    const double wide = 0.02 * solid.diagonal_m();
+    if (4 * q.squared_distance_m2 > wide * wide || solid.hole_width_m(q.triangle) > wide) far += area;
   }
   return all > 0 ? far / all : 0;
 }
@@ -153,14 +154,14 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   for (const Finding& f : out.surface.findings)
     if (f.fatal) throw Error(f.message, "surface");
   const Solid solid(surface);
-  const bool known_volume = out.surface.volume_m3.has_value() || solid.watertight();
+  const bool known_volume = solid.watertight() && solid.orientation().cover_width_m.empty();
   out.flipped_triangles = solid.orientation().flipped;
   out.warnings = out.surface.findings;
 
   const SurfaceSamples samples = sample_surface(solid, 10000);
   if (!encloses_something(solid, samples))
     throw Error("the surface encloses nothing: there is no inside to fill. Close it, or complete it first", "surface");
-  const double reference = solid.watertight() ? *check_surface(solid.surface()).volume_m3 : counted_volume(solid);
+  const double reference = solid.watertight() ? solid.signed_volume_m3() - samples.buried_m3 : counted_volume(solid);
   const double volume = std::max(reference, 1e-4 * (solid.max_m() - solid.min_m()).prod());
   // A lattice of cubes has 12 tetrahedra a cube; boundaries and thin parts cost more, found by trying. What is too much is
   // merged again where the surface loses least.
@@ -203,11 +204,11 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
                            },
                            20 * step};
   constexpr int points = 20000;
-  const auto distance = solid.watertight() ? surface_distance(surface, boundary, points, seen)
+  const auto distance = known_volume ? surface_distance(surface, boundary, points, seen)
                                            : one_sided_distance(surface, boundary, points, seen);
   out.surface_rms_m = distance.rms_m;
   out.hausdorff_m = distance.hausdorff_m;
-  if (!solid.watertight()) out.unseen_share = share_over_holes(boundary, solid);
+  if (!known_volume) out.unseen_share = share_over_holes(boundary, solid);
 
   const auto warn = [&](const char* code, std::string message) {
     out.warnings.push_back({code, std::move(message), false});

@@ -249,6 +249,31 @@ ClosestPoint TriangleTree::closest(const Vec3& p, Index hint) const {
   return out;
 }
 
+bool TriangleTree::within(const Vec3& p, double squared, Index hint) const {
+  const Impl& s = *impl_;
+  if (!p.allFinite()) return false;
+  if (hint >= 0 && hint < static_cast<Index>(s.slot.size()) && closest_on(s.corners[s.slot[hint]], p).squared <= squared)
+    return true;
+  const WideQuery query(s.wide, p);
+  std::array<Index, 3 * bvh_stack_size> stack;
+  int top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const WideNode& node = s.wide.nodes[stack[--top]];
+    const Eigen::Array4f d = query.squared(node);
+    for (int i = 0; i < 4; ++i) {
+      if (node.child[i] < 0 || !(d[i] <= squared)) continue;
+      if (node.count[i] == 0) {
+        stack[top++] = node.child[i];
+        continue;
+      }
+      for (Index t = node.child[i]; t < node.child[i] + node.count[i]; ++t)
+        if (closest_on(s.corners[t], p).squared <= squared) return true;
+    }
+  }
+  return false;
+}
+
 std::optional<RayHit> TriangleTree::cast(const Vec3& origin, const Vec3& direction, double max_range) const {
   const Impl& s = *impl_;
   if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0)) return std::nullopt;

@@ -39,6 +39,9 @@ class TriangleTree {
   /// squared distance of NaN.
   ClosestPoint closest(const Vec3& point_m, Index hint = -1) const;
 
+  /// Is the surface within this distance? Several times as fast as closest() where it is.
+  bool within(const Vec3& point_m, double squared_distance_m2, Index hint = -1) const;
+
   /// First hit of a ray, both sides of a triangle count. `direction` need not have unit length; range is in its units.
   /// No ray slips between two triangles that share an edge (Woop, Benthin, Wald 2013).
   std::optional<RayHit> cast(const Vec3& origin_m, const Vec3& direction, double max_range = 1e300) const;

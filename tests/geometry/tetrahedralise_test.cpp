@@ -7,6 +7,7 @@
 
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/geometry/solid.hpp"
 #include "palpate/geometry/surface_distance.hpp"
 #include "palpate/geometry/winding_number.hpp"
 #include "refusals.hpp"
@@ -133,9 +134,30 @@ TEST(Tetrahedralise, copes_with_missing_flipped_and_doubled_triangles) {
   expect_usable(r);
   EXPECT_FALSE(r.volume_error);
   const double truth = *check_surface(whole).volume_m3;
-  EXPECT_NEAR(r.check.volume_m3, truth, 0.03 * truth);
+  EXPECT_NEAR(r.check.volume_m3, truth, 0.02 * truth);
   const auto d = surface_distance(whole, boundary_surface(r.mesh).surface);
-  EXPECT_LT(d.rms_m, 0.005 * r.surface.diagonal_m());
+  EXPECT_LT(d.rms_m, 0.0025 * r.surface.diagonal_m());
+  EXPECT_LT(d.hausdorff_m, 0.02 * r.surface.diagonal_m());
+}
+
+TEST(Solid, small_holes_are_closed_and_rims_of_open_parts_are_not) {
+  // single triangles of a cube come back exactly, two that share an edge as well
+  TriMesh cube = shapes::box(Vec3(0.1, 0.2, 0.3));
+  TriMesh holed = cube;
+  holed.triangles.row(7) = Eigen::Matrix<Index, 1, 3>(cube.triangles.row(10));
+  holed.triangles.row(3) = Eigen::Matrix<Index, 1, 3>(cube.triangles.row(11));
+  holed.triangles.conservativeResize(10, 3);
+  const Solid solid(holed);
+  EXPECT_TRUE(solid.watertight());
+  EXPECT_EQ(solid.orientation().cover_width_m.size(), 2u);
+  EXPECT_NEAR(solid.signed_volume_m3(), 0.006, 1e-12);
+  EXPECT_EQ(solid.hole_width_m(0), 0);
+  EXPECT_GT(solid.hole_width_m(11), 0.05);
+  TriMesh open = cube;
+  open.triangles.conservativeResize(8, 3);  // all of one side and of the next: more than a quarter
+  EXPECT_FALSE(Solid(open).watertight());
+  open.triangles.conservativeResize(1, 3);
+  EXPECT_EQ(Solid(open).surface().triangles.rows(), 1);
 }
 
 TEST(Tetrahedralise, overlapping_pieces_become_their_union) {
@@ -144,6 +166,8 @@ TEST(Tetrahedralise, overlapping_pieces_become_their_union) {
   EXPECT_EQ(r.check.components, 1);
   const double ball = 4.0 / 3 * M_PI * std::pow(0.05, 3), lens = M_PI / 12 * std::pow(0.05, 3) * (4 + 1);
   EXPECT_NEAR(r.check.volume_m3, 2 * ball - lens, 0.01 * ball);
+  ASSERT_TRUE(r.volume_error);  // of the union, not of what is counted twice
+  EXPECT_LT(std::abs(*r.volume_error), 0.01);
 }
 
 TEST(Tetrahedralise, an_inner_shell_that_faces_inward_is_a_cavity_and_all_inside_out_is_turned) {

@@ -73,7 +73,13 @@ TEST_P(ClosestPointOf, equals_brute_force_near_and_far_with_and_without_hint) {
     expect_exact(tree, p, -1);
     expect_exact(tree, p, last);
     expect_exact(tree, p, pick(rng));
-    last = tree.closest(p).triangle;
+    const ClosestPoint c = tree.closest(p);
+    EXPECT_TRUE(tree.within(p, c.squared_distance_m2, last));
+    EXPECT_TRUE(tree.within(p, 1.1 * c.squared_distance_m2 + 1e-30));
+    if (c.squared_distance_m2 > 0) {
+      EXPECT_FALSE(tree.within(p, 0.999 * c.squared_distance_m2, last));
+    }
+    last = c.triangle;
     if (HasFatalFailure()) return;
   }
 }
