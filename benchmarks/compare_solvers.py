@@ -82,6 +82,7 @@ def disc_load(nodes, tets, samples=24):
 
 
 def write_deck(path, nodes, tets, load, poisson, solver):
+    # CalculiX reads twenty characters of a number and no more: -1.23456789012345e-05 loses its last digit, that of the exponent.
     with open(path, "w") as deck:
         deck.write("*NODE, NSET=ALL\n")
         np.savetxt(deck, np.column_stack([np.arange(1, len(nodes) + 1), nodes]), fmt=["%d"] + ["%.12g"] * 3, delimiter=",")
@@ -91,7 +92,7 @@ def write_deck(path, nodes, tets, load, poisson, solver):
         deck.writelines(f"{i + 1},1,3\n" for i in np.flatnonzero(nodes[:, 2] < 1e-9))
         deck.write(f"*MATERIAL, NAME=FOAM\n*ELASTIC\n{YOUNG},{poisson}\n*SOLID SECTION, ELSET=BODY, MATERIAL=FOAM\n")
         deck.write(f"*STEP\n*STATIC{', SOLVER=' + solver if solver else ''}\n*CLOAD\n")
-        deck.writelines(f"{i + 1},3,{load[i]:.15g}\n" for i in np.flatnonzero(load))
+        deck.writelines(f"{i + 1},3,{load[i]:.12g}\n" for i in np.flatnonzero(load))
         deck.write("*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
 
 

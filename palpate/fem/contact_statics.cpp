@@ -61,7 +61,7 @@ struct ContactStatics::Impl {
     ContactState now = s;
     std::vector<TouchMemory> now_memory = memory;
     ContactTangent t;
-    double best = std::numeric_limits<double>::infinity();
+    double best = std::numeric_limits<double>::infinity(), first = 0;
     for (int step = 0, worse = 0; step < most; ++step) {
       update_limits(p, now_memory, now);
       if (!system.evaluate(p, now_memory, now)) return false;
@@ -70,7 +70,8 @@ struct ContactStatics::Impl {
         memory = std::move(now_memory);
         return true;
       }
-      if (now.residual > 0.5 * best && ++worse > most_worse) return false;
+      if (step == 0) first = now.residual;
+      if (now.residual > 3 * first || (now.residual > 0.5 * best && ++worse > most_worse)) return false;
       best = std::min(best, now.residual);
       system.tangent(p, now_memory, now, false, t);
       MatrixX du, dz;
@@ -93,14 +94,15 @@ struct ContactStatics::Impl {
     const auto count = system.contacts.size();
     ContactState next = s;
     std::vector<TouchMemory> next_memory = memory;
-    bool remembers = false;
+    bool remembers = false, rubs = false;
     for (std::size_t c = 0; c < count; ++c) {
+      rubs = rubs || (system.contacts[c].law == Touch::friction && system.contacts[c].friction_coefficient > 0);
       remembers = remembers || system.contacts[c].law == Touch::friction || system.contacts[c].law == Touch::sticking;
       system.terms.begin_increment(system.body(c, p.m, s.poses[c], memory), s.u, next_memory[c]);
       next.poses[c] = carried(s.poses[c], from.motion[c], to.motion[c]);
     }
     std::string reason;
-    bool remembers_open = remembers, found = false;
+    bool remembers_open = remembers, found = false, balanced = false;
     if (guess != nullptr && remembers) {
       ContactState near = next;
       near.u = guess->displacement_m + p.prescribed - system.system.prescribed_part(guess->displacement_m);
@@ -126,9 +128,16 @@ struct ContactStatics::Impl {
       if (remembers && !system.evaluate(p, next_memory, next)) return "the law does not exist at the start of the increment";
       system.soften_start(p, next_memory, next, out);
       reason = system.newton(p, next_memory, next, out);
+      // Under friction this is a start. It may come to a halt: a point that comes to touch away from where it would stick
+      // makes the energy jump.
+      balanced = reason.empty();
+      if (rubs) reason.clear();
       if (reason.empty() && remembers && settle(p, next_memory, next, out)) remembers_open = false;
     }
-    // Friction limits follow the pressures: a fixed point around problems that each have an energy.
+    // Friction limits follow the pressures: a fixed point around problems that each have an energy, solved roughly as long as
+    // both together may still be found from where it leads.
+    constexpr int rough_rounds = 4;
+    constexpr double rough_tolerance = 1e-3;
     for (int round = 0; reason.empty() && remembers_open; ++round) {
       const double change = update_limits(p, next_memory, next);
       double force = 0;
@@ -136,13 +145,19 @@ struct ContactStatics::Impl {
       // A sum over points against a norm over them.
       const double rounding_n = std::sqrt(static_cast<double>(system.terms.points().point_count())) * next.rounding_n;
       const double tolerance = std::max(system.options.friction_tolerance * force, rounding_n);
-      if (change <= tolerance) break;
+      if (change <= tolerance && balanced) break;
       if (round == system.options.max_friction_rounds) {
         reason = "pressures and friction did not settle in " + std::to_string(round) + " rounds";
         break;
       }
       if (!system.evaluate(p, next_memory, next)) return "the law does not exist at the start of a friction round";
-      reason = system.newton(p, next_memory, next, out);
+      balanced = round >= rough_rounds || !rubs;
+      if (!balanced) {
+        reason = system.newton(p, next_memory, next, out, rough_tolerance);
+        if (reason.empty() && settle(p, next_memory, next, out)) break;
+      } else {
+        reason = system.newton(p, next_memory, next, out);
+      }
     }
     if (!reason.empty()) return reason;
     if (!remembers && path.size() > 1) path.pop_back();  // only the last one matters

@@ -8,8 +8,9 @@
 namespace palpate::fem {
 
 std::string ContactSystem::newton(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s,
-                                  ContactEquilibrium& out) {
-  std::string reason = iterate(p, memory, s, out, options.statics.residual_tolerance, options.statics.max_newton_steps);
+                                  ContactEquilibrium& out, double tolerance) {
+  std::string reason = iterate(p, memory, s, out, tolerance > 0 ? tolerance : options.statics.residual_tolerance,
+                               options.statics.max_newton_steps);
   if (reason.empty() || !floating) return reason;
   Vec3 left = Vec3::Zero();
   for (Index i = 0; i < assembly.node_count(); ++i) left += s.unbalanced.segment<3>(3 * i);
