@@ -15,7 +15,7 @@ namespace {
 using Loop = std::vector<Index>;
 using Tri = Eigen::Matrix<Index, 1, 3>;
 
-constexpr double largest_share = 0.25;  // of a part's area that a lid may add
+constexpr double largest_share = 0.7;  // of a part's area that a lid may add: half a ball is closed, a flat patch is not
 
 class HoleFinder {
  public:

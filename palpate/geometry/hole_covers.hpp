@@ -15,8 +15,7 @@ struct HoleCovers {
 };
 
 /// Closes loops of edges that have one triangle, shortest loops first, each by the triangulation of least area (Barequet,
-/// Sharir 1995). What would cover more than a quarter of a connected part's area is left open: such a loop is the part's own
-/// rim.
+/// Sharir 1995). What would cover more than 0.7 of a connected part's area is left open: such a loop is the part's own rim.
 /// @param mesh  oriented and welded
 /// @param open  the ends of all edges that have one triangle, and that triangle
 HoleCovers cover_holes(const TriMesh& mesh, const std::vector<std::array<Index, 3>>& open);

@@ -251,7 +251,8 @@ class Improver {
   /// That distance must not grow noticeably.
   bool stays_near(Index v, const Vec3& to, Index hint, Around& around) const {
     const double allowed = (off_surface_ ? tolerance_ : 0.04) * m_.size_m[v], allowed2 = allowed * allowed;
-    if (off_surface_ && !solid_.within(to, allowed2, hint)) return false;
+    // (a vertex over a hole is far from every triangle already)
+    if (off_surface_ && !solid_.within(to, allowed2, hint) && solid_.within(m_.x[v], 4 * allowed2, hint)) return false;
     const auto middle = [&](const TetEditor::Tri& t, const Vec3& at) { return Vec3((at + m_.x[t[1]] + m_.x[t[2]]) / 3); };
     if (around.triangles.empty()) around.triangles = m_.boundary_triangles(v);
     for (const auto& t : around.triangles) {
