@@ -186,7 +186,7 @@ OrientedSurface checked(OrientedSurface s) {
 }  // namespace
 
 Solid::Solid(const TriMesh& soup)
-    : oriented_(checked(orient(soup))), tree_(std::move(oriented_.mesh)), winding_(tree_.mesh()) {
+    : oriented_(checked(orient(soup))), tree_(std::move(oriented_.mesh)), winding_(tree_.mesh(), tree_.bvh()) {
   const TriMesh& m = tree_.mesh();
   normals_.resize(m.triangles.rows(), 3);
   min_m_.setConstant(std::numeric_limits<double>::infinity());

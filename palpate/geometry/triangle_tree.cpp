@@ -344,5 +344,6 @@ int TriangleTree::crossings(const Vec3& origin, const Vec3& direction) const {
 }
 
 const TriMesh& TriangleTree::mesh() const { return impl_->mesh; }
+const Bvh& TriangleTree::bvh() const { return impl_->bvh; }
 
 }  // namespace palpate::geometry

@@ -8,6 +8,8 @@
 
 namespace palpate::geometry {
 
+struct Bvh;
+
 struct ClosestPoint {
   Index triangle = -1;
   Vec3 barycentric = Vec3::Zero();  ///< sums to one; point = sum barycentric(k) * vertex(k)
@@ -50,6 +52,7 @@ class TriangleTree {
   int crossings(const Vec3& origin_m, const Vec3& direction) const;
 
   const TriMesh& mesh() const;
+  const Bvh& bvh() const;  ///< for others that walk the same triangles
 
  private:
   struct Impl;

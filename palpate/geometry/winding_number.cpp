@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace palpate::geometry {
 namespace {
@@ -19,8 +20,10 @@ double solid_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 }  // namespace
 
-WindingNumber::WindingNumber(const TriMesh& mesh)
-    : vertices_(mesh.vertices_m), triangles_(mesh.triangles), bvh_(build_bvh(triangle_boxes(mesh), 8)) {
+WindingNumber::WindingNumber(const TriMesh& mesh) : WindingNumber(mesh, build_bvh(triangle_boxes(mesh), 8)) {}
+
+WindingNumber::WindingNumber(const TriMesh& mesh, Bvh bvh)
+    : vertices_(mesh.vertices_m), triangles_(mesh.triangles), bvh_(std::move(bvh)) {
   dipoles_.resize(2 * bvh_.nodes.size());
   std::vector<double> weight(dipoles_.size(), 0);
   const auto corner = [&](Index t, int k) { return Vec3(vertices_.row(triangles_(t, k)).transpose()); };

@@ -14,6 +14,8 @@ namespace palpate::geometry {
 class WindingNumber {
  public:
   explicit WindingNumber(const TriMesh& mesh);
+  /// `bvh`: over the mesh's triangles.
+  WindingNumber(const TriMesh& mesh, Bvh bvh);
   double operator()(const Vec3& point_m) const;
   /// Without one triangle: on that triangle the mean of its two sides.
   double without(const Vec3& point_m, Index triangle) const;
