@@ -102,6 +102,7 @@ struct ContactStatics::Impl {
       next.poses[c] = carried(s.poses[c], from.motion[c], to.motion[c]);
     }
     std::string reason;
+    constexpr double rough_tolerance = 1e-3;
     bool remembers_open = remembers, found = false, balanced = false;
     if (guess != nullptr && remembers) {
       ContactState near = next;
@@ -127,17 +128,16 @@ struct ContactStatics::Impl {
           std::fill(next_memory[c].limit_pa.begin(), next_memory[c].limit_pa.end(), std::numeric_limits<double>::infinity());
       if (remembers && !system.evaluate(p, next_memory, next)) return "the law does not exist at the start of the increment";
       system.soften_start(p, next_memory, next, out);
-      reason = system.newton(p, next_memory, next, out);
       // Under friction this is a start. It may come to a halt: a point that comes to touch away from where it would stick
       // makes the energy jump.
-      balanced = reason.empty();
+      reason = system.newton(p, next_memory, next, out, rubs ? rough_tolerance : 0);
+      balanced = !rubs;
       if (rubs) reason.clear();
       if (reason.empty() && remembers && settle(p, next_memory, next, out)) remembers_open = false;
     }
     // Friction limits follow the pressures: a fixed point around problems that each have an energy, solved roughly as long as
     // both together may still be found from where it leads.
     constexpr int rough_rounds = 4;
-    constexpr double rough_tolerance = 1e-3;
     for (int round = 0; reason.empty() && remembers_open; ++round) {
       const double change = update_limits(p, next_memory, next);
       double force = 0;
@@ -153,8 +153,8 @@ struct ContactStatics::Impl {
       if (!system.evaluate(p, next_memory, next)) return "the law does not exist at the start of a friction round";
       balanced = round >= rough_rounds || !rubs;
       if (!balanced) {
-        reason = system.newton(p, next_memory, next, out, rough_tolerance);
-        if (reason.empty() && settle(p, next_memory, next, out)) break;
+        system.newton(p, next_memory, next, out, rough_tolerance);
+        if (settle(p, next_memory, next, out)) break;
       } else {
         reason = system.newton(p, next_memory, next, out);
       }

@@ -9,9 +9,11 @@ namespace palpate::fem {
 
 std::string ContactSystem::newton(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s,
                                   ContactEquilibrium& out, double tolerance) {
-  std::string reason = iterate(p, memory, s, out, tolerance > 0 ? tolerance : options.statics.residual_tolerance,
-                               options.statics.max_newton_steps);
-  if (reason.empty() || !floating) return reason;
+  constexpr int few = 15;
+  const bool rough = tolerance > 0;
+  std::string reason = iterate(p, memory, s, out, rough ? tolerance : options.statics.residual_tolerance,
+                               rough ? few : options.statics.max_newton_steps);
+  if (reason.empty() || rough || !floating) return reason;
   Vec3 left = Vec3::Zero();
   for (Index i = 0; i < assembly.node_count(); ++i) left += s.unbalanced.segment<3>(3 * i);
   // A sum over nodes as large as their norm: they pull together.

@@ -72,7 +72,8 @@ class ContactSystem {
   /// Solves [K C; C' D] [du; dz] = [ru; rz] with the last factor; refines where proximal terms were added.
   /// @param definite  Newton's method: a tool without stiffness gets some; false: as it is (sensitivities)
   void solve(const ContactTangent& t, const MatrixX& ru, const MatrixX& rz, bool definite, MatrixX& du, MatrixX& dz) const;
-  /// Newton's method; an empty reason when it converged. @param tolerance  0: that of the options
+  /// Newton's method; an empty reason when it converged. @param tolerance  0: that of the options, else few
+  /// steps are taken towards it
   std::string newton(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s,
                      ContactEquilibrium& out, double tolerance = 0);
   /// A few steps with a layer not much stiffer than the body: from a tool put deep into it to a patch that is nearly right.
