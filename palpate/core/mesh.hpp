@@ -58,6 +58,7 @@ struct Support {
   double friction_coefficient = 0.0;
   double pose_std_m = 0.0;                     ///< clamp: prior on its translation; 0 = exactly known
   double pose_std_rad = 0.0;                   ///< clamp: prior on its rotation; 0 = exactly known
+  double spread_std_m = 0.0;                   ///< flat and bonded: prior on how far its rim slides outwards at the highest load
   PoseVaries pose_varies = PoseVaries::never;  ///< clamp: one pose in the recording, or one a push, or one a step
   std::string name;
   std::string source;  ///< file and line, for messages

@@ -92,6 +92,7 @@ struct Tool {
   std::string name;
   ToolShape shape = ToolShape::sphere;
   double radius_m = 0;  ///< sphere, disc, capsule; edge: half width of its contact strip
+  double radius_std_m = 0;  ///< sphere, disc: prior on the radius of the patch that its force acts on; 0 = exactly known
   double length_m = 0;  ///< capsule, edge
   std::optional<TriMesh> mesh;
   std::vector<Index> vertices;  ///< ToolShape::vertices: 0-based nodes that the force is spread over equally

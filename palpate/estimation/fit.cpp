@@ -9,6 +9,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/answer_parts.hpp"
 #include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/doubts.hpp"
 #include "palpate/estimation/error_budget.hpp"
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/optimise.hpp"
@@ -209,9 +210,12 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   objective.evaluate(optimum.unknowns, loss);  // the last evaluation is the optimum again: what follows looks at it
   if (options.stresses && !add_stresses(answer.steps, model, optimum.unknowns, progress)) return stopped();
   CrossChecks checks;
+  Doubts doubts;
   if (options.cross_checks && optimum.termination == Termination::converged) {
     checks = cross_check(objective, optimum, loss, factor, progress);
     if (checks.cancelled) return stopped();
+    doubts = look_for_doubts(recording, objective, optimum, inputs, options, factor, std::max(1.0, summary.chi2_per_dof),
+                             progress);
     answer.prediction = checks.held_out;
     if (regions.size() == 1) {  // of one region each, else
       answer.per_push = young_of_parts(checks.pushes);
@@ -219,7 +223,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     }
   }
   answer.fit.solves = model.solves();
-  answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks});
+  answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts});
   if (doubt != nullptr) answer.verdicts.push_back(partly_seen(*doubt));
   answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";

@@ -7,6 +7,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
+#include "palpate/estimation/held_body.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/materials.hpp"
 
@@ -15,6 +16,28 @@ namespace {
 
 const std::vector<std::string> xyz{"_x", "_y", "_z"};
 
+/// How hard each step presses: its force, or else its imposed travel, as a share of the recording's highest.
+std::vector<double> efforts(const Recording& recording) {
+  std::vector<double> force, travel;
+  for (const auto& push : recording.pushes) {
+    for (const auto& step : push.steps) {
+      force.push_back(0);
+      travel.push_back(0);
+      for (const auto& load : step.loads) {
+        force.back() += load.force_n.value_or(Vec3::Zero()).norm();
+        travel.back() = std::max(travel.back(), std::abs(load.travel_m.value_or(0)));
+      }
+    }
+  }
+  const auto highest = [](const std::vector<double>& all) {
+    return all.empty() ? 0 : *std::max_element(all.begin(), all.end());
+  };
+  const double most_n = highest(force), most_m = highest(travel);
+  for (std::size_t s = 0; s < force.size(); ++s)
+    force[s] = force[s] > 0 ? force[s] / most_n : travel[s] > 0 ? travel[s] / most_m : 0;
+  return force;
+}
+
 }  // namespace
 
 ForwardModel::~ForwardModel() = default;
@@ -22,11 +45,11 @@ ForwardModel::~ForwardModel() = default;
 bool ForwardModel::Solved::holds_for(const Solved& other) const {
   const auto same = [](const VectorX& a, const VectorX& b) { return a.size() == b.size() && a == b; };
   return material == other.material && nodes == other.nodes && vertices == other.vertices && place_m == other.place_m &&
-         supports == other.supports &&
-         options.dilatation == other.options.dilatation && options.threads == other.options.threads &&
-         options.residual_tolerance == other.options.residual_tolerance && options.region == other.options.region &&
-         same(options.region_stiffness, other.options.region_stiffness) && poisson_lower == other.poisson_lower &&
-         poisson_upper == other.poisson_upper && response_tolerance == other.response_tolerance && bodies.size() == other.bodies.size();
+         supports == other.supports && spreads == other.spreads && options.dilatation == other.options.dilatation &&
+         options.threads == other.options.threads && options.residual_tolerance == other.options.residual_tolerance &&
+         options.region == other.options.region && same(options.region_stiffness, other.options.region_stiffness) &&
+         poisson_lower == other.poisson_lower && poisson_upper == other.poisson_upper &&
+         response_tolerance == other.response_tolerance && bodies.size() == other.bodies.size();
 }
 
 ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options,
@@ -88,7 +111,13 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   }
   int common_clamp = clamp != nullptr && clamp->pose_varies == PoseVaries::never ? add_clamp("") : -1;
 
-  std::map<std::string, int> shift_of;  // a push's contact: first of two unknowns
+  for (const auto& support : recording.supports) {
+    if (!recording.free && spreads(support))
+      spread_.push_back(unknowns.add({"support_spread[" + support.name + "]", "m", 0, support.spread_std_m}));
+  }
+
+  std::map<std::string, int> radius_of;  // a tool's name: its unknown
+  std::map<std::string, int> shift_of;   // a push's contact: first of two unknowns
   for (std::size_t p = 0; p < recording.pushes.size(); ++p) {
     const Push& push = recording.pushes[p];
     const std::string in_push = "[" + push.name + "]";
@@ -110,7 +139,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
       steps_.push_back({p, s});
       const std::string in_step = "[" + push.name + ":" + std::to_string(s) + "]";
       clamp_.push_back(clamp != nullptr && clamp->pose_varies == PoseVaries::step ? add_clamp(in_step) : push_clamp);
-      std::vector<int> errors, shifts;
+      std::vector<int> errors, shifts, radii;
       for (const auto& load : push.steps[s].loads) {
         const std::string shift = in_push + key_of(load);
         if (load.contact_std_m > 0 && has_place(recording, load) && shift_of.count(shift) == 0) {
@@ -118,13 +147,21 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
         }
         const auto known = shift_of.find(shift);
         shifts.push_back(known == shift_of.end() ? -1 : known->second);
+        radii.push_back(-1);
+        if (const Tool& touching = tool(load.tool); has_radius(touching, load)) {
+          const auto [own, fresh] = radius_of.emplace(load.tool, 0);
+          if (fresh) own->second = unknowns.add({"tool_radius[" + load.tool + "]", "m", 0, touching.radius_std_m});
+          radii.back() = own->second;
+        }
         const double std_n = load.force_n ? std::hypot(load.force_std_n, load.force_relative_std * load.force_n->norm()) : 0;
         errors.push_back(unknowns.add_block("force_error" + in_step, "N", std_n, xyz));
       }
       force_error_.push_back(errors);
       contact_shift_.push_back(shifts);
+      patch_radius_.push_back(radii);
     }
   }
+  effort_ = efforts(recording);
   memory_.resize(steps_.size());
   followed_.assign(steps_.size(), 0);
   contact_ = has_contacts(recording);
@@ -142,6 +179,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   solved_->vertices = object_.surface.vertex_count();
   solved_->place_m = object_.mesh.nodes_m.sum();
   solved_->supports = recording.supports.size();
+  solved_->spreads = spread_.size();
   solved_->options = options_;
   solved_->poisson_lower = poisson_lower_;
   solved_->poisson_upper = poisson_upper_;
@@ -192,6 +230,16 @@ void ForwardModel::forget() {
       if (body->contact) body->contact->forget();
       body->lying = nullptr;
     }
+  }
+}
+
+void ForwardModel::start_from(const ForwardModel& other) {
+  for (std::size_t s = 0; s < memory_.size(); ++s) {
+    const Memory& from = other.memory_[s];
+    memory_[s] = Memory{};
+    memory_[s].valid = from.valid;
+    memory_[s].displacement_m = from.displacement_m;
+    memory_[s].derivative.resize(from.displacement_m.size(), 0);
   }
 }
 

@@ -101,6 +101,12 @@ class ForwardModel {
   /// The largest square of such a share in the steps' last predictions: how far they are from solutions, relative.
   double reuse_error() const;
 
+  /// True where the object touches something that only pushes, or a rigid tool.
+  bool touches() const { return contact_; }
+
+  /// Starts where another model of the same steps and mesh was last solved.
+  void start_from(const ForwardModel& other);
+
   /// Forgets warm starts, so that the next answer does not depend on what was asked before.
   void forget();
 
@@ -159,11 +165,14 @@ class ForwardModel {
   std::vector<double> followed_;  // a step: share of itself by which the last prediction left a solution
 
   Vec3 clamp_pivot_m_ = Vec3::Zero();
-  std::vector<int> clamp_;                     // a step: first of six unknowns, or -1
-  std::vector<std::vector<int>> force_error_;  // a step and load: first of three unknowns, or -1
-  std::vector<std::vector<int>> contact_shift_;   // a step and load: first of two unknowns, or -1
-  std::vector<int> tare_, travel_offset_;      // a push: first of three, the one; or -1
-  std::vector<Vec3> tare_axis_;                // a push: zero = three unknowns, else one along this axis
+  std::vector<int> clamp_;                       // a step: first of six unknowns, or -1
+  std::vector<std::vector<int>> force_error_;    // a step and load: first of three unknowns, or -1
+  std::vector<std::vector<int>> contact_shift_;  // a step and load: first of two unknowns, or -1
+  std::vector<std::vector<int>> patch_radius_;   // a step and load: the unknown, or -1
+  std::vector<int> spread_;                      // a support that spreads: the unknown
+  std::vector<double> effort_;                   // a step: its load as a share of the highest
+  std::vector<int> tare_, travel_offset_;        // a push: first of three, the one; or -1
+  std::vector<Vec3> tare_axis_;                  // a push: zero = three unknowns, else one along this axis
   int force_scale_ = -1, density_ = -1;
   int parameters_ = first_ratio;  ///< log E, nu and the regions' ratios: the first columns of every derivative
   const SurfaceField* field_ = nullptr;  // of solved_; nullptr: none

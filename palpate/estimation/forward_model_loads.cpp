@@ -60,7 +60,13 @@ bool has_place(const Recording& recording, const Load& load) {
   return tool != recording.tools.end() && tool->shape != ToolShape::vertices && tool->shape != ToolShape::platen;
 }
 
-bool has_columns(const Load& load) { return !load.travel_m && load.force_n.value_or(Vec3::Zero()).norm() + load.force_std_n > 0; }
+bool has_radius(const Tool& tool, const Load& load) {
+  return tool.radius_std_m > 0 && (tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc) && has_columns(load);
+}
+
+bool has_columns(const Load& load) {
+  return !load.travel_m && load.force_n.value_or(Vec3::Zero()).norm() + load.force_std_n > 0;
+}
 
 void ForwardModel::drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies, const Push& push) const {
   const auto known = bodies.find(body_key(push));
@@ -71,7 +77,8 @@ void ForwardModel::drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& b
       const auto at = known->second->contacts.find(key_of(load));
       const bool shifts = load.contact_std_m > 0 && has_place(*recording_, load);
       if (at == known->second->contacts.end() ||
-          (shifts && (at->second.shift < 0 || at->second.direction != load.direction))) {
+          (shifts && (at->second.shift < 0 || at->second.direction != load.direction)) ||
+          (has_radius(tool(load.tool), load) && at->second.radius < 0)) {
         bodies.erase(known);
         return;
       }
@@ -117,6 +124,10 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
           contact.direction = load.direction;
           for (const Vec3& tangent : tangents(load.direction)) parts.push_back(shifted_columns(object_.mesh, tool, load, tangent));
         }
+        if (contact.radius < 0 && has_radius(tool, load)) {
+          contact.radius = next_column();
+          parts.push_back(widened_columns(object_.mesh, tool, load));
+        }
       }
     }
   }
@@ -149,7 +160,8 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
     tables = std::move(held.contacts);
   }
   body->forces = boundary.forces;
-  body->node_motions = static_cast<int>(platens.size());
+  body->spreads = static_cast<int>(spread_.size());
+  body->node_motions = static_cast<int>(platens.size()) + body->spreads;
   if (contact_) {
     add_contacts(*body, push, std::move(boundary), std::move(tables));
     return *body;
@@ -188,13 +200,14 @@ std::vector<ForwardModel::LoadPart> ForwardModel::load_parts(std::size_t s, std:
   std::vector<LoadPart> parts{{contact.force}};
   const int shift = contact_shift_[s][l];
   for (int k = 0; shift >= 0 && k < 2; ++k) parts.push_back({contact.shift + 3 * k, unknowns(shift + k), shift + k});
+  if (const int radius = patch_radius_[s][l]; radius >= 0) parts.push_back({contact.radius, unknowns(radius), radius});
   return parts;
 }
 
 ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const {
   Coefficients c;
   c.force = VectorX::Zero(body.forces.cols());
-  c.motion = VectorX::Zero(static_cast<Index>(body.motion_column.size()));
+  c.motion = VectorX::Zero(body.motion_count());
   c.d_force.resize(c.force.size(), 0);
   c.d_motion.resize(c.motion.size(), 0);
   std::map<int, int> column_of;
@@ -270,6 +283,11 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
       const int at = column(density_);
       c.d_force.block<3, 1>(body.gravity_column, at) += into_object * gravity;
     }
+  }
+  for (int k = 0; k < body.spreads; ++k) {
+    const int unknown = spread_[static_cast<std::size_t>(k)], motion = body.node_motions - body.spreads + k;
+    c.motion(motion) = effort_[s] * unknowns(unknown);
+    c.d_motion(motion, column(unknown)) = effort_[s];
   }
   // The clamp moves the surface, whether or not a load depends on it.
   if (clamp_[s] >= 0) {

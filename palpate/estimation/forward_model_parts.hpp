@@ -20,6 +20,9 @@ std::string key_of(const Load& load);
 /// Tools whose motion is prescribed in a push.
 std::set<std::string> driven_tools(const Push& push);
 
+/// True for a load whose patch may be wider or narrower than stated.
+bool has_radius(const Tool& tool, const Load& load);
+
 /// True for a tool that touches at Load::contact_m, which may then be elsewhere than thought.
 bool has_place(const Recording& recording, const Load& load);
 
@@ -48,8 +51,9 @@ bool has_columns(const Load& load);
 
 struct ForwardModel::Body {
   struct Contact {
-    int force = -1;                // first of three columns
-    int shift = -1;                // first of six, or -1
+    int force = -1;                 // first of three columns
+    int shift = -1;                 // first of six, or -1
+    int radius = -1;                // first of three, or -1
     Vec3 direction = Vec3::Zero();  // that the shifts are across
   };
   std::map<std::string, Contact> contacts;   // of a load's key
@@ -64,9 +68,11 @@ struct ForwardModel::Body {
     Vec3 direction;
     int motion_column;
   };
-  std::vector<Driven> driven;                           // rigid tools with an imposed motion, after the platens' columns
-  int node_motions = 0;                                 // columns of platens whose nodes are moved
-  std::shared_ptr<const ContactState> lying;            // under its weight alone, where it was last asked for
+  std::vector<Driven> driven;  // rigid tools with an imposed motion, after the platens' columns
+  int node_motions = 0;        // columns of platens whose nodes are moved, and of supports that spread
+  int spreads = 0;             // of them, the last ones
+  Index motion_count() const { return node_motions + static_cast<Index>(driven.size()); }
+  std::shared_ptr<const ContactState> lying;      // under its weight alone, where it was last asked for
   std::unique_ptr<fem::LinearResponse> response;  // linear materials only: surface rows, then the forces' own (3 a load)
 };
 
@@ -75,7 +81,7 @@ struct ForwardModel::Solved {
   std::string material;
   Index nodes = 0, vertices = 0;
   double place_m = 0;  // sum of the nodes' coordinates
-  std::size_t supports = 0;
+  std::size_t supports = 0, spreads = 0;
   fem::StaticsOptions options;
   double poisson_lower = 0, poisson_upper = 0, response_tolerance = 0;
   bool holds_for(const Solved& other) const;
@@ -111,7 +117,8 @@ struct ForwardModel::Memory {
   VectorX change_to(const VectorX& there) const;  // of the columns' unknowns
 };
 
-/// Where a load acts: its columns, and the derivatives of those to a shift of the contact along two tangents.
+/// Where a load acts: its columns, and the derivatives of those to a shift of the contact along two tangents and to the
+/// radius of its patch.
 struct ForwardModel::LoadPart {
   int first = -1;     // of three columns
   double weight = 1;  // 1, or how far the unknown is from its mean

@@ -156,7 +156,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   for (std::size_t r = 1; r < regions.size(); ++r) answer.parameters.push_back(young_from(regions[r], region_name(r)));
   answer.covariance = covariance_of(regions);
   objective.evaluate(optimum.unknowns, optimum.loss);  // verdicts look at the optimum's rows
-  answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}});
+  answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}, Doubts{}});
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   return done();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/estimation/held_body.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
@@ -131,7 +132,36 @@ std::vector<Index> platen_nodes(const TetMesh& mesh, const Tool& platen) {
   return nodes;
 }
 
+struct Rim {
+  Vec3 centre_m, normal;
+  double radius_m = 0;  // 0: the nodes are no flat patch
+};
+Rim rim_of(const TetMesh& mesh, const std::vector<Index>& nodes) {
+  Rim rim;
+  rim.centre_m.setZero();
+  for (Index node : nodes) rim.centre_m += mesh.nodes_m.row(node).transpose() / static_cast<double>(nodes.size());
+  Mat3 scatter = Mat3::Zero();
+  double radius_m = 0;
+  for (Index node : nodes) {
+    const Vec3 arm = mesh.nodes_m.row(node).transpose() - rim.centre_m;
+    scatter += arm * arm.transpose() / static_cast<double>(nodes.size());
+    radius_m = std::max(radius_m, arm.norm());
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(scatter);
+  rim.normal = axes.eigenvectors().col(0);
+  const bool flat =
+      axes.eigenvalues()(0)<1e-3 * axes.eigenvalues()(2), wide = axes.eigenvalues()(1)> 1e-2 * axes.eigenvalues()(2);
+  if (flat && wide) rim.radius_m = radius_m;
+  return rim;
+}
+
 }  // namespace
+
+double rim_radius_m(const TetMesh& mesh, const Support& support) {
+  return rim_of(mesh, fem::support_nodes(mesh, support)).radius_m;
+}
+
+bool spreads(const Support& support) { return support.contact == ContactLaw::bonded && support.spread_std_m > 0; }
 
 bool lifts_off(const Support& support) {
   const bool half_space = support.kind == SupportKind::table || support.kind == SupportKind::wall;
@@ -196,9 +226,25 @@ HeldBody hold(const TetMesh& mesh, const std::vector<Support>& supports, const s
     }
   }
 
+  int columns = static_cast<int>(platens.size());
+  for (const Support& support : supports) {
+    if (!spreads(support)) continue;
+    const auto nodes = fem::support_nodes(mesh, support);
+    const Rim rim = rim_of(mesh, nodes);
+    if (!(rim.radius_m > 0))
+      throw Error("the held nodes are not flat, so no rim of theirs can slide; leave spread_std_m out",
+                  "supports." + support.name + ".spread_std_m");
+    for (Index node : nodes) {
+      Vec3 outwards = (mesh.nodes_m.row(node).transpose() - rim.centre_m) / rim.radius_m;
+      outwards -= rim.normal.dot(outwards) * rim.normal;
+      for (int d = 0; d < 3; ++d) motion.emplace_back(3 * node + d, columns, outwards(d));
+    }
+    ++columns;
+  }
+
   body.free_motions = pin_free_motions(mesh, holds);
   body.constraints = holds.constraints();
-  body.motions.resize(3 * mesh.nodes_m.rows(), static_cast<Index>(platens.size()));
+  body.motions.resize(3 * mesh.nodes_m.rows(), columns);
   body.motions.setFromTriplets(motion.begin(), motion.end());
   return body;
 }

@@ -66,4 +66,12 @@ Eigen::SparseMatrix<double> shifted_columns(const TetMesh& mesh, const Tool& too
   return (load_columns(mesh, tool, ahead) - load_columns(mesh, tool, behind)) / (2 * h);
 }
 
+Eigen::SparseMatrix<double> widened_columns(const TetMesh& mesh, const Tool& tool, const Load& load) {
+  const double h = tool.radius_m / 8;
+  Tool wider = tool, narrower = tool;
+  wider.radius_m += h;
+  narrower.radius_m -= h;
+  return (load_columns(mesh, wider, load) - load_columns(mesh, narrower, load)) / (2 * h);
+}
+
 }  // namespace palpate::estimation

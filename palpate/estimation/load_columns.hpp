@@ -20,4 +20,7 @@ std::array<Vec3, 2> tangents(const Vec3& direction);
 /// tool's radius: a patch on a mesh is smooth on that scale only.
 Eigen::SparseMatrix<double> shifted_columns(const TetMesh& mesh, const Tool& tool, const Load& load, const Vec3& tangent);
 
+/// Derivative of load_columns to the radius of a sphere's or disc's patch (1/m), by the same differences.
+Eigen::SparseMatrix<double> widened_columns(const TetMesh& mesh, const Tool& tool, const Load& load);
+
 }  // namespace palpate::estimation

@@ -180,6 +180,48 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
 /// What one step says against the others is said where chance makes it once in a thousand recordings.
 constexpr double very_rare = 0.001;
 
+/// What is stated as exactly known, where the residuals ask for something else and it would matter for E or nu. The
+/// likeliest one is said: they explain the same residuals, and all of them would be too many.
+void judge_doubts(const VerdictInput& in, std::vector<Verdict>& out) {
+  constexpr double least_share = 0.1;  // of a tool's radius: less is within what a patch of even pressure means
+  constexpr double matters = 0.5;      // standard deviations of E or nu
+  double young_std = 0, poisson_std = 0;
+  for (const auto& parameter : in.answer.parameters) {
+    if (parameter.name == "young_modulus" && young_std == 0) young_std = parameter.std / parameter.value;
+    if (parameter.name == "poisson_ratio") poisson_std = parameter.std;
+  }
+  for (const Doubt& doubt : in.doubts.all) {
+    if (doubt.p_value >= very_rare) continue;
+    if (std::abs(doubt.log_young) < matters * young_std && std::abs(doubt.poisson) < matters * poisson_std) continue;
+    if (doubt.about != Doubt::About::support && std::abs(doubt.size_m) < least_share * doubt.scale_m) continue;
+    const std::string size = number(1e3 * std::abs(doubt.size_m), "{:.2g}") + " mm";
+    const std::string change = "; E would then be " + number(100 * std::expm1(doubt.log_young), "{:+.2g}") + " %, and nu " +
+                               number(doubt.poisson, "{:+.2g}") + ", from here";
+    switch (doubt.about) {
+      case Doubt::About::contact:
+        out.push_back({"contact_elsewhere", "The residuals ask for a contact " + size +
+                                                " aside of the stated one in push '" + doubt.name + "'" + change +
+                                                ". Check contact_m and the hand-eye calibration, or let the fit find it: "
+                                                "give contact_std_m."});
+        return;
+      case Doubt::About::tool_radius:
+        out.push_back({"tool_radius_doubtful", "The residuals ask for a patch under tool '" + doubt.name +
+                                                   "' whose radius is " + size +
+                                                   (doubt.size_m > 0 ? " larger" : " smaller") + " than stated (" +
+                                                   number(1e3 * doubt.scale_m, "{:.2g}") + " mm)" + change +
+                                                   ". Check radius_m, or let the fit find it: give radius_std_m."});
+        return;
+      case Doubt::About::support:
+        out.push_back({"boundary_suspected",
+                       "The residuals ask for a foot that gives way: the rim of support '" + doubt.name + "' moves by " +
+                           size + (doubt.size_m > 0 ? " outwards" : " inwards") + " under the highest load" + change +
+                           ". If it is not glued, say how it lies (kind: table, contact: friction or "
+                           "frictionless), or give spread_std_m."});
+        return;
+    }
+  }
+}
+
 void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
   const ForwardModel& model = in.objective.model();
   const double factor = in.residuals.points > 0 ? tukey_information_factor(in.optimum.loss.tukey) : 1;
@@ -191,12 +233,14 @@ void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
                                        " from where they stood before, more than their pose's prior allows: the object or the "
                                        "camera was moved. Fix them better, or leave out the steps from there on."});
   }
-  const auto slip = contact_slip(in.objective, in.optimum, factor);
+  auto slip = contact_slip(in.objective, in.optimum, factor);
+  if (in.doubts.slip && (!slip || in.doubts.slip->p_value < slip->p_value)) slip = in.doubts.slip;
   if (slip && slip->p_value < very_rare && slip->size > least_slip_m) {
     out.push_back({"contact_slipped", "The tool seems to have slipped by " + millimetres(slip->size) + " at " + where(slip->step) +
                                           ": the steps from there on ask for another contact point than those before. Leave "
                                           "them out, or push along the surface's normal."});
   }
+  if (!slip || slip->p_value >= very_rare) judge_doubts(in, out);  // a slip looks like a contact elsewhere
   const auto settled = settling(in.objective, in.optimum, factor);
   if (settled && settled->p_value < very_rare && settled->size > least_settling) {
     out.push_back({"not_settled", "While the load stayed the same up to " + where(settled->step) + ", the object went on giving way: E fell by " +

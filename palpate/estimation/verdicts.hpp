@@ -5,6 +5,7 @@
 
 #include "palpate/core/identification.hpp"
 #include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/doubts.hpp"
 #include "palpate/estimation/objective.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/shape_error.hpp"
@@ -18,6 +19,7 @@ struct VerdictInput {
   const ResidualSummary& residuals;
   const Identification& answer;  ///< parameters, nuisances and fit are filled
   const CrossChecks& checks;     ///< empty where none were made
+  const Doubts& doubts;          ///< the same
 };
 
 /// What the numbers mean, in plain words; codes are stable and listed in docs/uncertainty.md.

@@ -11,6 +11,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/lattice_cut.hpp"
+#include "palpate/geometry/sharp_edges.hpp"
 #include "palpate/geometry/surface_distance.hpp"
 #include "palpate/geometry/surface_fit.hpp"
 #include "palpate/geometry/tet_coarsen.hpp"
@@ -188,6 +189,12 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     coarsen(best->mesh, solid, samples, fewer);
   }
   if (o.improve && !out.cancelled) out.cancelled = !improve(best->mesh, solid, samples, {}, progress);
+
+  constexpr double usable = 0.3;  // 17 to 134 degrees
+  if (o.improve && !out.cancelled && meet_sharp_edges(best->mesh, solid, usable)) {
+    fit_to_surface(best->mesh, solid, samples, usable);  // faces had bulged in place of the edges
+    meet_sharp_edges(best->mesh, solid, usable);
+  }
 
   out.mesh = best->mesh.compact();
   out.check = check_volume(out.mesh);

@@ -201,6 +201,11 @@ void read_supports(const YamlField& field, RecordingContext& context) {
     }
     const bool half_space = support.kind == SupportKind::table || support.kind == SupportKind::wall;
     support.contact = read_contact(keys, half_space, support.friction_coefficient);
+    if (const auto spread = keys.optional("spread_std_m")) {
+      support.spread_std_m = spread->non_negative();
+      if (support.contact != ContactLaw::bonded && support.spread_std_m > 0)
+        spread->fail("is for a support that is bonded; one that is not slides by itself");
+    }
     if (clamp) {
       support.pose_std_m = keys.non_negative_or("pose_std_m", 0);
       support.pose_std_rad = keys.non_negative_or("pose_std_rad", 0);
@@ -227,6 +232,8 @@ void read_tools(const YamlField& field, RecordingContext& context) {
     const bool long_one = tool.shape == ToolShape::capsule || tool.shape == ToolShape::edge;
     if (tool.shape == ToolShape::vertices) tool.vertices = read_index_list(keys, context);
     if (round) tool.radius_m = keys.required("radius_m").positive();
+    if (tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc)
+      tool.radius_std_m = keys.non_negative_or("radius_std_m", 0);
     if (tool.shape == ToolShape::edge) tool.radius_m = keys.non_negative_or("radius_m", 0);
     if (long_one) {
       tool.length_m = keys.required("length_m").positive();

@@ -211,6 +211,7 @@ std::string RecordingWriter::Pages::support_text(const Support& support, std::si
         .number("tolerance_m", support.tolerance_m);
   }
   if (half_space || support.contact != ContactLaw::bonded) put_contact(line, support.contact, support.friction_coefficient);
+  line.number_unless(0, "spread_std_m", support.spread_std_m);
   if (support.kind == SupportKind::clamp) {
     line.number("pose_std_m", support.pose_std_m).number("pose_std_rad", support.pose_std_rad);
     line.put("pose_varies", name_of(pose_varies_names, support.pose_varies));
@@ -247,7 +248,7 @@ std::string RecordingWriter::Pages::tool_text(const Tool& tool, std::size_t numb
       break;
     case ToolShape::sphere:
     case ToolShape::disc:
-      line.number("radius_m", tool.radius_m);
+      line.number("radius_m", tool.radius_m).number_unless(0, "radius_std_m", tool.radius_std_m);
       break;
     case ToolShape::capsule:
     case ToolShape::edge:

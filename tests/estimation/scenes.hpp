@@ -98,6 +98,7 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   clamp.pose_std_m = 1e-3;
   clamp.pose_std_rad = 0.02;
   clamp.pose_varies = PoseVaries::push;
+  clamp.spread_std_m = 2e-4;
   recording.supports.push_back(clamp);
   if (weight) {
     recording.environment.gravity_m_s2 = Vec3(0, 0, -9.81);
@@ -120,6 +121,7 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   disc.name = "disc";
   disc.shape = ToolShape::disc;
   disc.radius_m = 0.012;
+  disc.radius_std_m = 1.5e-3;
   recording.tools = {tip, plate, disc};
   recording.rest.surface_std_m = 4e-4;
   recording.rest.surface_correlation_m = 0.03;

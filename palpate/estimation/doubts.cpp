@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/doubts.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/held_body.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// The same recording where nothing about tools and feet is exactly known. The priors only make unknowns of them: the test
+/// takes their information off again.
+struct Doubted {
+  Recording recording;
+  std::vector<Doubt> asked;
+  std::vector<std::vector<std::string>> unknowns;  // of each of those
+};
+
+Doubted doubted(const Recording& recording, const TetMesh& mesh) {
+  Doubted out{recording, {}, {}};
+  const auto ask = [&](Doubt::About about, const std::string& name, double scale_m, std::vector<std::string> unknowns) {
+    const bool known =
+        std::any_of(out.asked.begin(), out.asked.end(), [&](const Doubt& d) { return d.about == about && d.name == name; });
+    if (known) return;
+    Doubt doubt;
+    doubt.about = about;
+    doubt.name = name;
+    doubt.scale_m = scale_m;
+    out.asked.push_back(doubt);
+    out.unknowns.push_back(std::move(unknowns));
+  };
+  for (auto& push : out.recording.pushes) {
+    for (auto& step : push.steps) {
+      for (auto& load : step.loads) {
+        const auto tool = std::find_if(out.recording.tools.begin(), out.recording.tools.end(),
+                                       [&](const Tool& each) { return each.name == load.tool; });
+        const bool round = tool->shape == ToolShape::sphere || tool->shape == ToolShape::disc;
+        if (!round || !load.force_n || load.force_n->norm() == 0) continue;
+        if (load.contact_std_m == 0) {
+          const std::string shift = "contact_shift[" + push.name + "]";
+          ask(Doubt::About::contact, push.name, tool->radius_m, {shift + "_1", shift + "_2"});
+          load.contact_std_m = tool->radius_m;
+        }
+        if (tool->radius_std_m == 0) {
+          ask(Doubt::About::tool_radius, tool->name, tool->radius_m, {"tool_radius[" + tool->name + "]"});
+          tool->radius_std_m = tool->radius_m;
+        }
+      }
+    }
+  }
+  for (auto& support : out.recording.supports) {
+    if (recording.free || support.contact != ContactLaw::bonded || support.spread_std_m > 0) continue;
+    const double rim_m = rim_radius_m(mesh, support);
+    if (!(rim_m > 0)) continue;
+    ask(Doubt::About::support, support.name, rim_m, {"support_spread[" + support.name + "]"});
+    support.spread_std_m = rim_m;
+  }
+  return out;
+}
+
+/// Where each of the fit's unknowns is among more of them: in the same order.
+std::vector<int> places(const Unknowns& fitted, const Unknowns& more) {
+  std::vector<int> at;
+  int j = 0;
+  for (int i = 0; i < fitted.size(); ++i, ++j) {
+    while (j < more.size() && more[j].name != fitted[i].name) ++j;
+    at.push_back(j);
+  }
+  return at;
+}
+
+/// Newton's step of the unknowns `moving`, and the covariance of the last `count` of them, which have no prior.
+struct NewtonMove {
+  VectorX move;
+  MatrixX covariance;
+};
+std::optional<NewtonMove> step_of(const MatrixX& hessian, const VectorX& gradient, const std::vector<int>& moving,
+                                  Index count) {
+  const Eigen::LDLT<MatrixX> factorised(MatrixX(hessian(moving, moving)));
+  if (factorised.info() != Eigen::Success || !factorised.isPositive()) return std::nullopt;
+  const Index size = static_cast<Index>(moving.size());
+  NewtonMove out;
+  out.move = -factorised.solve(VectorX(gradient(moving)));
+  out.covariance = factorised.solve(MatrixX(MatrixX::Identity(size, size).rightCols(count))).bottomRows(count);
+  if (!out.move.allFinite() || !out.covariance.allFinite()) return std::nullopt;
+  return out;
+}
+
+}  // namespace
+
+Doubts look_for_doubts(const Recording& recording, const Objective& objective, const Optimum& optimum, const Inputs& inputs,
+                       const FitOptions& options, double factor, double misfit, const OnProgress& progress) {
+  const ForwardModel& fitted = objective.model();
+  if (fitted.touches()) return {};
+  const Doubted more = doubted(recording, fitted.object().mesh);
+  if (more.asked.empty()) return {};
+  Unknowns unknowns;
+  constexpr double between_ratios = 1e-3;  // of a linear body's answers: the test is no finer
+  ForwardModel model(more.recording, fitted.object(), unknowns, statics_options(recording, fitted.object(), options),
+                     nullptr, between_ratios);
+  model.start_from(fitted);
+  Objective wider(model, inputs, unknowns);
+  const std::vector<int> at = places(objective.unknowns(), unknowns);
+  Optimum there = optimum;
+  there.unknowns = unknowns.prior_mean();
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    const int old = static_cast<int>(k);
+    there.unknowns(at[k]) = optimum.unknowns(old);
+    unknowns[at[k]] = objective.unknowns()[old];
+  }
+  there.evaluation = wider.evaluate(there.unknowns, optimum.loss, progress);
+  if (!there.evaluation.usable) return {};
+
+  Doubts out;
+  out.slip = contact_slip(wider, there, factor);
+  std::vector<int> moving;
+  for (int k : free_unknowns(objective.unknowns())) moving.push_back(at[static_cast<std::size_t>(k)]);
+  const MatrixX information = there.evaluation.information(factor);
+  const auto as_fitted = step_of(information, there.evaluation.gradient, moving, 0);
+  if (!as_fitted) return out;
+  for (std::size_t d = 0; d < more.asked.size(); ++d) {
+    std::vector<int> free = moving;
+    MatrixX hessian = information;
+    for (const std::string& name : more.unknowns[d]) {
+      for (int k = 0; k < unknowns.size(); ++k) {
+        if (unknowns[k].name != name) continue;
+        free.push_back(k);
+        hessian(k, k) -= 1 / (unknowns[k].prior_std * unknowns[k].prior_std);
+        break;
+      }
+    }
+    const Index count = static_cast<Index>(free.size() - moving.size());
+    if (count == 0) continue;
+    const auto step = step_of(hessian, there.evaluation.gradient, free, count);
+    if (!step) continue;
+    const VectorX asked = step->move.tail(count);
+    Doubt doubt = more.asked[d];
+    doubt.chi2 = asked.dot(step->covariance.ldlt().solve(asked)) / misfit;
+    doubt.size_m = count == 1 ? asked(0) : asked.norm();
+    doubt.p_value = std::min(1.0, chi_square_tail(doubt.chi2, static_cast<int>(count)) * static_cast<double>(more.asked.size()));
+    for (std::size_t k = 0; k < moving.size(); ++k) {
+      const Index i = static_cast<Index>(k);
+      if (moving[k] == log_young) doubt.log_young = step->move(i) - as_fitted->move(i);
+      if (moving[k] == poisson) doubt.poisson = step->move(i) - as_fitted->move(i);
+    }
+    out.all.push_back(doubt);
+  }
+  std::stable_sort(out.all.begin(), out.all.end(), [](const Doubt& a, const Doubt& b) { return a.chi2 > b.chi2; });
+  return out;
+}
+
+}  // namespace palpate::estimation

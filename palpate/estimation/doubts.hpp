@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a recording states as exactly known and the residuals may speak against: where and how wide a tool touches, whether the
+// foot holds.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/step_checks.hpp"
+
+namespace palpate::estimation {
+
+/// Another value that the residuals ask for, all else of the fit free under its priors (the score test of one added unknown).
+struct Doubt {
+  enum class About { contact, tool_radius, support };
+  About about = About::contact;
+  std::string name;    ///< of the push, the tool or the support
+  double size_m = 0;   ///< contact: how far aside; tool: wider (below zero: narrower); support: how far its rim slides outwards
+  double scale_m = 0;  ///< contact and tool: the tool's radius; support: radius of its rim
+  double chi2 = 0;     ///< by how much it would fall
+  double p_value = 1;  ///< chance of asking for as much where everything is as stated, over all that was asked
+  double log_young = 0, poisson = 0;  ///< what it would do to log E and nu
+};
+
+struct Doubts {
+  std::vector<Doubt> all;          ///< the one that explains most first
+  std::optional<StepChange> slip;  ///< of contacts that are stated as exactly known (see contact_slip)
+};
+
+/// One evaluation at the optimum with everything unknown that is stated as exactly known, from the fit's own equilibria. Nothing is
+/// asked of bodies that lift off or are touched by rigid tools: their solutions cannot be handed over.
+/// @param inputs  what `objective` was made of
+/// @param factor  information factor of robust rows
+/// @param misfit  chi2 per degree of freedom, where it is above one
+Doubts look_for_doubts(const Recording& recording, const Objective& objective, const Optimum& optimum, const Inputs& inputs,
+                       const FitOptions& options, double factor, double misfit, const OnProgress& progress);
+
+}  // namespace palpate::estimation

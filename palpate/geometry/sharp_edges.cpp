@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/geometry/sharp_edges.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+namespace palpate::geometry {
+namespace {
+
+constexpr double smooth = 0.766;  // cosine of 40 degrees between neighbouring triangles
+constexpr double reach = 0.7;     // of the wished edge: further a vertex does not go
+
+/// Smooth parts of a surface, and the edges between them.
+struct Parts {
+  std::vector<Index> of;       // a triangle
+  std::vector<double> area_m2;  // a part
+  std::map<std::pair<Index, Index>, std::vector<std::pair<Vec3, Vec3>>> edges;  // of two parts, the lower first
+  std::vector<std::pair<Vec3, std::set<Index>>> corners;                        // where three or more meet
+};
+
+Parts parts_of(const Solid& solid) {
+  const TriMesh& surface = solid.surface();
+  const auto triangles = static_cast<Index>(surface.triangles.rows());
+  std::map<std::pair<Index, Index>, std::vector<Index>> at_edge;
+  for (Index t = 0; t < triangles; ++t)
+    for (int k = 0; k < 3; ++k) at_edge[std::minmax<Index>(surface.triangles(t, k), surface.triangles(t, (k + 1) % 3))].push_back(t);
+
+  std::vector<Index> up(static_cast<std::size_t>(triangles));
+  std::iota(up.begin(), up.end(), 0);
+  const auto root = [&](Index t) {
+    while (up[t] != t) t = up[t] = up[up[t]];
+    return t;
+  };
+  for (const auto& [edge, both] : at_edge)
+    if (both.size() == 2 && solid.normal(both[0]).dot(solid.normal(both[1])) > smooth) up[root(both[0])] = root(both[1]);
+
+  Parts parts;
+  std::map<Index, Index> number;
+  for (Index t = 0; t < triangles; ++t) {
+    const auto [own, fresh] = number.emplace(root(t), static_cast<Index>(number.size()));
+    if (fresh) parts.area_m2.push_back(0);
+    parts.of.push_back(own->second);
+    const auto corner = [&](int k) -> Vec3 { return surface.vertices_m.row(surface.triangles(t, k)).transpose(); };
+    parts.area_m2[own->second] += 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+  }
+  std::map<Index, std::set<Index>> at_vertex;
+  for (const auto& [edge, both] : at_edge) {
+    if (both.size() != 2 || parts.of[both[0]] == parts.of[both[1]]) continue;
+    const auto pair = std::minmax(parts.of[both[0]], parts.of[both[1]]);
+    parts.edges[pair].emplace_back(surface.vertices_m.row(edge.first).transpose(), surface.vertices_m.row(edge.second).transpose());
+    for (const Index v : {edge.first, edge.second}) at_vertex[v].insert({pair.first, pair.second});
+  }
+  for (const auto& [v, meeting] : at_vertex)
+    if (meeting.size() > 2) parts.corners.emplace_back(surface.vertices_m.row(v).transpose(), meeting);
+  return parts;
+}
+
+/// Where a vertex between these parts belongs.
+std::optional<Vec3> place_of(const Vec3& at, const std::set<Index>& between, const Parts& parts, double within) {
+  std::optional<Vec3> best;
+  const auto offer = [&](const Vec3& p) {
+    const double limit = best ? (*best - at).norm() : within;
+    if ((p - at).norm() < limit) best = p;
+  };
+  if (between.size() > 2) {
+    for (const auto& [corner, meeting] : parts.corners)
+      if (std::includes(meeting.begin(), meeting.end(), between.begin(), between.end())) offer(corner);
+    return best;
+  }
+  const auto shared = parts.edges.find({*between.begin(), *between.rbegin()});
+  if (shared == parts.edges.end()) return best;
+  for (const auto& [a, b] : shared->second) {
+    const double length2 = (b - a).squaredNorm();
+    offer(length2 > 0 ? Vec3(a + std::clamp((at - a).dot(b - a) / length2, 0.0, 1.0) * (b - a)) : a);
+  }
+  return best;
+}
+
+}  // namespace
+
+bool meet_sharp_edges(TetEditor& mesh, const Solid& solid, double floor_quality) {
+  const Parts parts = parts_of(solid);
+  if (parts.edges.empty()) return false;
+  bool any = false;
+  constexpr Index none = -1;
+  for (int sweep = 0; sweep < 4; ++sweep) {
+    std::vector<std::set<Index>> between(mesh.x.size());
+    Index hint = -1;
+    for (const auto& t : mesh.all_boundary_triangles()) {
+      const Vec3 a = mesh.x[t[0]], b = mesh.x[t[1]], c = mesh.x[t[2]];
+      const double size = (mesh.size_m[t[0]] + mesh.size_m[t[1]] + mesh.size_m[t[2]]) / 3;
+      const ClosestPoint q = solid.closest((a + b + c) / 3, hint);
+      hint = q.triangle;
+      const bool along = (b - a).cross(c - a).normalized().dot(solid.normal(q.triangle)) > 0.5;
+      const bool near = q.squared_distance_m2 < 0.25 * size * size, large = parts.area_m2[parts.of[q.triangle]] > 4 * size * size;
+      for (const Index v : t) between[v].insert(along && near && large ? parts.of[q.triangle] : none);
+    }
+    bool moved = false;
+    for (std::size_t v = 0; v < mesh.x.size(); ++v) {
+      if (between[v].size() < 2 || between[v].count(none) > 0) continue;
+      const auto id = static_cast<Index>(v);
+      const auto to = place_of(mesh.x[v], between[v], parts, reach * mesh.size_m[v]);
+      if (!to || (*to - mesh.x[v]).norm() < 1e-3 * mesh.size_m[v]) continue;
+      const double least = std::min(mesh.star_quality(id), floor_quality) - 1e-12;
+      for (const double share : {1.0, 0.5, 0.25}) {
+        const Vec3 there = share == 1 ? *to : Vec3(mesh.x[v] + share * (*to - mesh.x[v]));
+        if (!(mesh.star_quality_at(id, there, least) > least)) continue;
+        mesh.move(id, there);
+        moved = true;
+        break;
+      }
+    }
+    if (!moved) break;
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace palpate::geometry

@@ -1,0 +1,139 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// Things that a recording states as exactly known and that are not so: each is named where it is due, with about its size, and
+// nothing is said of a recording without fault.
+#include "palpate/estimation/doubts.hpp"
+
+#include <gtest/gtest.h>
+
+#include "palpate/core/error.hpp"
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// The block on its large face, glued there and pressed from above in four steps; everything is stated as exactly known.
+Recording glued_block() {
+  Recording recording = pushed_block_recording();
+  recording.supports[0].name = "glue";
+  recording.supports[0].kind = SupportKind::plane;
+  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
+  auto& steps = recording.pushes[0].steps;
+  const Step last = steps.back();
+  steps.clear();
+  for (double newton : {1.5, 3.0, 4.5, 6.0}) {
+    steps.push_back(last);
+    steps.back().loads[0].force_n = Vec3(0.3 * newton, 0, -newton);
+    steps.back().loads[0].contact_m = Vec3(0.03, 0.02, block_size_m.z());
+  }
+  return recording;
+}
+
+Identification fitted(const Recording& stated, const Recording& real, unsigned seed = 3) {
+  PushedBlock truth;
+  truth.material = "linear";
+  truth.points = 1500;
+  truth.sigma_m = 2e-4;
+  truth.seed = seed;
+  FitOptions options;
+  options.stresses = false;
+  SimulatedObject object = simulated(fem::to_quadratic(kuhn_block(6, 4, 3, block_size_m)), "linear");
+  Inputs inputs = clouds_of(truth, real);
+  for (auto& step : inputs) {  // a smooth foot is free to drift
+    std::get<PointCloud>(step[0]).pose_std_m = 1e-3;
+    std::get<PointCloud>(step[0]).pose_std_rad = 5e-3;
+  }
+  return fit(stated, object, inputs, options);
+}
+
+std::vector<std::string> doubts_in(const Identification& answer) {
+  std::vector<std::string> found;
+  for (const auto& verdict : answer.verdicts) {
+    for (const char* code : {"contact_slipped", "contact_elsewhere", "tool_radius_doubtful", "boundary_suspected"})
+      if (verdict.code == code) found.push_back(verdict.code + ": " + verdict.message);
+  }
+  return found;
+}
+
+/// The number of millimetres after `words` in the only doubt of this code.
+double millimetres_after(const Identification& answer, const std::string& code, const std::string& words) {
+  const auto found = doubts_in(answer);
+  EXPECT_EQ(found.size(), 1u);
+  if (found.empty()) return 0;
+  EXPECT_EQ(found.front().rfind(code, 0), 0u) << found.front();
+  const auto at = found.front().find(words);
+  EXPECT_NE(at, std::string::npos) << found.front();
+  return at == std::string::npos ? 0 : std::stod(found.front().substr(at + words.size()));
+}
+
+TEST(Doubts, NothingIsSaidOfARecordingWithoutFault) {
+  for (unsigned seed : {1u, 2u, 3u}) {
+    const auto found = doubts_in(fitted(glued_block(), glued_block(), seed));
+    EXPECT_TRUE(found.empty()) << found.front();
+  }
+}
+
+TEST(Doubts, AContactThatIsElsewhere) {
+  Recording real = glued_block();
+  for (auto& step : real.pushes[0].steps) step.loads[0].contact_m += Vec3(0.003, -0.002, 0);
+  const Identification answer = fitted(glued_block(), real);
+  EXPECT_NEAR(millimetres_after(answer, "contact_elsewhere", "ask for a contact "), 3.6, 1.4);  // the derivative's answer
+}
+
+TEST(Doubts, APatchThatIsWider) {
+  Recording real = glued_block();
+  real.tools[0].radius_m *= 1.3;
+  const Identification answer = fitted(glued_block(), real);
+  EXPECT_NEAR(millimetres_after(answer, "tool_radius_doubtful", "whose radius is "), 3.6, 1.6);
+}
+
+TEST(Doubts, AFootThatIsNotGlued) {
+  Recording real = glued_block();
+  real.supports[0].contact = ContactLaw::frictionless;
+  for (auto& step : real.pushes[0].steps) step.loads[0].force_n->x() = 0;
+  Recording stated = glued_block();
+  for (auto& step : stated.pushes[0].steps) step.loads[0].force_n->x() = 0;
+  const Identification answer = fitted(stated, real);
+  EXPECT_GT(millimetres_after(answer, "boundary_suspected", "moves by "), 0.1);
+}
+
+TEST(Doubts, AContactThatSlipsWhereItIsStatedExactly) {
+  Recording real = glued_block();
+  for (std::size_t s : {2u, 3u}) real.pushes[0].steps[s].loads[0].contact_m += Vec3(0.004, 0, 0);
+  const auto found = doubts_in(fitted(glued_block(), real));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found.front().rfind("contact_slipped", 0), 0u) << found.front();
+  EXPECT_NE(found.front().find("step 2"), std::string::npos) << found.front();
+}
+
+/// What a doubt asks for, given as a prior, is found by the fit.
+TEST(Doubts, AsNuisancesTheyAreFound) {
+  Recording real = glued_block(), stated = real;
+  real.tools[0].radius_m *= 1.15;
+  stated.tools[0].radius_std_m = 2e-3;
+  const Identification answer = fitted(stated, real);
+  EXPECT_TRUE(doubts_in(answer).empty());
+  bool found = false;
+  for (const auto& nuisance : answer.nuisances) {
+    if (nuisance.name != "tool_radius[finger]") continue;
+    found = true;
+    EXPECT_NEAR(nuisance.value, 0.15 * 0.012, 6e-4);
+  }
+  EXPECT_TRUE(found);
+  const Parameter& young = parameter(answer, "young_modulus");
+  EXPECT_NEAR(young.value, 2e4, 0.01 * 2e4);
+}
+
+TEST(Doubts, NodesWithoutARimCannotSpread) {
+  Recording recording = glued_block();
+  recording.supports[0].kind = SupportKind::box;
+  recording.supports[0].select = NodeSelection::box;
+  recording.supports[0].box_min_m = Vec3::Constant(-1e-3);
+  recording.supports[0].box_max_m = Vec3(0.061, 0.041, 0.016);
+  recording.supports[0].spread_std_m = 1e-3;
+  Unknowns unknowns;
+  EXPECT_THROW(ForwardModel(recording, coarse_block(), unknowns), Error);
+}
+
+}  // namespace
+}  // namespace palpate::estimation
