@@ -48,7 +48,7 @@ rest:
   surface_std_m: 0.0005
   surface_correlation_m: 0.03
 supports:
-  - {kind: clamp, name: base, point_m: [0, 0, 0], normal: [0, 0, 1], pose_std_m: 0.003, pose_std_rad: 0.03, pose_varies: push}
+  - {kind: clamp, name: base, point_m: [0, 0, 0], normal: [0, 0, 1], pose_std_m: 0.003, pose_std_rad: 0.03, pose_varies: push, spread_std_m: 0.001}
   - {kind: box, min_m: [-1, -1, -1], max_m: [1, 1, 0.001], contact: frictionless}
   - {kind: table, point_m: [0, 0, 0], normal: [0, 0, 1], contact: friction, friction_coefficient: 0.5}
 regions:
@@ -59,7 +59,7 @@ environment: {gravity_m_s2: [0, 0, -9.81], planes: [{point_m: [0, 0, 0], normal:
 density_kg_m3: {value: 1070, std: 10}
 force_scale_std: 0.01
 tools:
-  - {name: ball, shape: sphere, radius_m: 0.01, contact: frictionless, compliance_m_per_n: 0.0001}
+  - {name: ball, shape: sphere, radius_m: 0.01, radius_std_m: 0.002, contact: frictionless, compliance_m_per_n: 0.0001}
   - {name: line, shape: edge, axis: [0, 1, 0], length_m: 0.1, contact: bonded}
   - {name: plate, shape: platen, point_m: [0, 0, 0.1], normal: [0, 0, -1], contact: frictionless}
   - {name: stamp, shape: mesh, file: stamp.ply, contact: bonded}
@@ -158,6 +158,8 @@ TEST(ReadRecording, EveryKindOfKey) {
   EXPECT_EQ(recording.supports.at(0).kind, SupportKind::clamp);
   EXPECT_EQ(recording.supports[0].select, NodeSelection::plane);
   EXPECT_EQ(recording.supports[0].pose_varies, PoseVaries::push);
+  EXPECT_EQ(recording.supports[0].spread_std_m, 0.001);
+  EXPECT_EQ(recording.tools.at(0).radius_std_m, 0.002);
   EXPECT_EQ(recording.supports.at(2).contact, ContactLaw::friction);
   EXPECT_EQ(recording.density_std_kg_m3, 10);
   ASSERT_EQ(recording.regions.size(), 3u);
@@ -212,6 +214,8 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
   EXPECT_EQ(back.rest.surface->vertices_m, recording.rest.surface->vertices_m);
   EXPECT_EQ(back.supports.size(), recording.supports.size());
   EXPECT_EQ(back.supports[0].pose_std_rad, recording.supports[0].pose_std_rad);
+  EXPECT_EQ(back.supports[0].spread_std_m, recording.supports[0].spread_std_m);
+  EXPECT_EQ(back.tools[0].radius_std_m, recording.tools[0].radius_std_m);
   ASSERT_EQ(back.regions.size(), recording.regions.size());
   for (std::size_t r = 0; r < back.regions.size(); ++r) {
     EXPECT_EQ(back.regions[r].name, recording.regions[r].name);
