@@ -258,14 +258,29 @@ Loss fitting_loss(const Objective& objective, const Loss& loss) {
   return wider;
 }
 
+namespace {
+
+/// A modulus at which the body hardly moves: non-linear materials are then linear too. Not stiffer than that: what a table presses into
+/// the body must stay far above the last digit of its nodes' places.
+double stiff_young_pa(const ForwardModel& model) {
+  constexpr double over_pressure = 1e5;
+  const auto& rest = model.object().surface.rest().vertices_m;
+  const double size_m = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
+  double force_n = 0;
+  for (std::size_t s = 0; s < model.step_count(); ++s)
+    for (const Load& load : model.step(s).loads) force_n = std::max(force_n, load.force_n.value_or(Vec3::Zero()).norm());
+  return force_n > 0 ? std::clamp(over_pressure * force_n / (size_m * size_m), 1e6, 1e9) : 1e9;
+}
+
+}  // namespace
+
 VectorX find_start(Objective& objective, double poisson_start) {
   ForwardModel& model = objective.model();
   const Unknowns& unknowns = objective.unknowns();
   VectorX guess = unknowns.prior_mean();
   guess(poisson) = std::clamp(poisson_start, unknowns[poisson].lower, unknowns[poisson].upper);
 
-  // A modulus at which the body hardly moves: non-linear materials are then linear too. Raised until every step solves.
-  guess(log_young) = std::log(1e9);
+  guess(log_young) = std::log(stiff_young_pa(model));
   std::vector<StepPrediction> stiff(model.step_count());
   const auto& rest = model.object().surface.rest().vertices_m;
   const std::size_t stride = std::max<std::size_t>(1, model.step_count() / 24);  // a few steps of a long recording say enough
