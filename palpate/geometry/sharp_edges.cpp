@@ -107,7 +107,7 @@ bool meet_sharp_edges(TetEditor& mesh, const Solid& solid, double floor_quality)
       const auto to = place_of(mesh.x[v], between[v], parts, reach * mesh.size_m[v]);
       if (!to || (*to - mesh.x[v]).norm() < 1e-3 * mesh.size_m[v]) continue;
       const double least = std::min(mesh.star_quality(id), floor_quality) - 1e-12;
-      for (const double share : {1.0, 0.5, 0.25}) {
+      for (const double share : {1.0, 0.75, 0.5, 0.25, 0.12}) {
         const Vec3 there = share == 1 ? *to : Vec3(mesh.x[v] + share * (*to - mesh.x[v]));
         if (!(mesh.star_quality_at(id, there, least) > least)) continue;
         mesh.move(id, there);

@@ -37,7 +37,7 @@ TEST(BuildObject, a_surface_rides_on_its_volume_and_the_support_plane_finds_node
   EXPECT_EQ(built.model.unseen_share, 0);
 }
 
-/// Area of the volume's boundary faces that lie in a plane, m2, and their middle.
+/// Area of the volume's boundary faces that lie in a plane, within the tolerance that a support holds, m2, and their middle.
 std::pair<double, Vec3> foot_on(const Plane& plane, const TetMesh& volume) {
   const TriMesh boundary = geometry::boundary_surface(volume).surface;
   double area = 0;
@@ -45,7 +45,7 @@ std::pair<double, Vec3> foot_on(const Plane& plane, const TetMesh& volume) {
   for (Index t = 0; t < boundary.triangles.rows(); ++t) {
     const auto corner = [&](int k) { return Vec3(boundary.vertices_m.row(boundary.triangles(t, k))); };
     bool on = true;
-    for (int k = 0; k < 3; ++k) on = on && std::abs(plane.normal.dot(corner(k) - plane.point_m)) < 1e-9;
+    for (int k = 0; k < 3; ++k) on = on && std::abs(plane.normal.dot(corner(k) - plane.point_m)) < Support{}.tolerance_m;
     if (!on) continue;
     const double own = 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
     area += own;
