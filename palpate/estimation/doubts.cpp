@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string_view>
 
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/held_body.hpp"
@@ -112,7 +113,8 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
     there.unknowns(at[k]) = optimum.unknowns(old);
     unknowns[at[k]] = objective.unknowns()[old];
   }
-  there.evaluation = wider.evaluate(there.unknowns, optimum.loss, progress);
+  const OnProgress check = [&](std::string_view, double share) { return !progress || progress("cross-check", share); };
+  there.evaluation = wider.evaluate(there.unknowns, optimum.loss, check);
   if (!there.evaluation.usable) return {};
 
   Doubts out;
