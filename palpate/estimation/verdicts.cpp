@@ -182,7 +182,7 @@ constexpr double very_rare = 0.001;
 
 /// What is stated as exactly known, where the residuals ask for something else and it would matter for E or nu. The
 /// likeliest one is said: they explain the same residuals, and all of them would be too many.
-void judge_doubts(const VerdictInput& in, std::vector<Verdict>& out) {
+void judge_doubts(const VerdictInput& in, bool slipped, std::vector<Verdict>& out) {
   constexpr double least_share = 0.1;  // of a tool's radius: less is within what a patch of even pressure means
   constexpr double matters = 0.5;      // standard deviations of E or nu
   double young_std = 0, poisson_std = 0;
@@ -191,7 +191,7 @@ void judge_doubts(const VerdictInput& in, std::vector<Verdict>& out) {
     if (parameter.name == "poisson_ratio") poisson_std = parameter.std;
   }
   for (const Doubt& doubt : in.doubts.all) {
-    if (doubt.p_value >= very_rare) continue;
+    if (doubt.p_value >= very_rare || (slipped && doubt.about == Doubt::About::contact)) continue;
     if (std::abs(doubt.log_young) < matters * young_std && std::abs(doubt.poisson) < matters * poisson_std) continue;
     if (doubt.about != Doubt::About::support && std::abs(doubt.size_m) < least_share * doubt.scale_m) continue;
     const std::string size = number(1e3 * std::abs(doubt.size_m), "{:.2g}") + " mm";
@@ -240,7 +240,7 @@ void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
                                           ": the steps from there on ask for another contact point than those before. Leave "
                                           "them out, or push along the surface's normal."});
   }
-  if (!slip || slip->p_value >= very_rare) judge_doubts(in, out);  // a slip looks like a contact elsewhere
+  judge_doubts(in, slip && slip->p_value < very_rare, out);  // a slip looks like a contact elsewhere
   const auto settled = settling(in.objective, in.optimum, factor);
   if (settled && settled->p_value < very_rare && settled->size > least_settling) {
     out.push_back({"not_settled", "While the load stayed the same up to " + where(settled->step) + ", the object went on giving way: E fell by " +
