@@ -112,7 +112,6 @@ void update_covariance(Posterior& posterior) {
   posterior.covariance(0, 1) = posterior.covariance(1, 0) = posterior.weight.dot(off_e.cwiseProduct(off_nu));
 }
 
-
 Posterior Posterior::of_region(Index region) const {
   if (region == 0) return *this;
   Posterior out = *this;

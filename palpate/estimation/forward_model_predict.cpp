@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the body's own frame to what cameras see and tools read in a step.
+#include <algorithm>
+
+#include "palpate/estimation/forward_model_parts.hpp"
+
+namespace palpate::estimation {
+
+/// Into the base frame: x = T(X + b n + u).
+void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const {
+  const RigidOffset clamp = clamp_offset(s, unknowns);
+  out.surface_m = object_.surface.rest().vertices_m;
+  for (Index v = 0; v < out.surface_m.rows(); ++v) {
+    out.surface_m.row(v) = clamp.apply(out.surface_m.row(v).transpose() + moved_m.segment<3>(3 * v));
+  }
+  if (!field_) return;
+  out.field = field_;
+  out.field_unknown = field_unknown_;
+  out.material_m = out.surface_m;
+  out.field_directions = field_->normals() * clamp.rotation().transpose();
+  const VectorX offset_m = field_->basis() * unknowns.segment(field_unknown_, field_->modes());
+  out.surface_m += offset_m.asDiagonal() * out.field_directions;
+}
+
+StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
+  const std::size_t worker = worker_of(s);
+  Body& body = body_of(push(s), worker);
+  Coefficients c = coefficients(s, body, unknowns);
+  if (body.contact && path_) add_path_columns(s, body, unknowns, c);
+
+  StepPrediction out;
+  Watched at;
+  if (linear_) {
+    at = superpose(body, c, unknowns, out);
+    ++solves_[worker];
+  } else if (!(reuse_ > 0 && derivatives && follow(s, unknowns, at, out)) &&
+             !solve_step(s, body, c, unknowns, derivatives, at, out)) {
+    return out;
+  }
+
+  place_surface(s, unknowns, at.moved_m, out);
+  if (!derivatives) return out;
+
+  out.columns = parameter_columns();
+  out.columns.insert(out.columns.end(), c.columns.begin(), c.columns.end());
+  const Index count = static_cast<Index>(out.columns.size());
+
+  const RigidOffset clamp = clamp_offset(s, unknowns);
+  const Mat3 rotation = clamp.rotation();
+  out.d_surface = std::move(at.d_moved);
+  if (clamp_[s] >= 0) {
+    for (Index v = 0; v < out.surface_m.rows(); ++v) {
+      out.d_surface.middleRows<3>(3 * v) = (rotation * out.d_surface.middleRows<3>(3 * v)).eval();
+    }
+    const auto add_rigid = [&](const Points& at_m, MatrixX& derivative) {
+      for (Index v = 0; v < at_m.rows(); ++v) {
+        const auto rigid = clamp.derivative(clamp.apply_inverse(at_m.row(v)));
+        for (Index k = parameters_; k < count; ++k) {
+          const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s];
+          if (component >= 0 && component < 6) derivative.block<3, 1>(3 * v, k) += rigid.col(component);
+        }
+      }
+    };
+    if (field_) {
+      out.d_material = out.d_surface;
+      add_rigid(out.material_m, out.d_material);
+    }
+    add_rigid(out.surface_m, out.d_surface);
+  }
+
+  // What the tools should read.
+  const std::size_t p = steps_[s].push;
+  const Step& now = step(s);
+  const Index loads = static_cast<Index>(now.loads.size());
+  out.travel_m = VectorX::Zero(loads);
+  out.d_travel = MatrixX::Zero(loads, count);
+  out.force_n.assign(now.loads.size(), Vec3::Zero());
+  out.d_force.assign(now.loads.size(), Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, count));
+  const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
+  for (Index l = 0; l < loads; ++l) {
+    const auto at_load = static_cast<std::size_t>(l);
+    const Load& load = now.loads[at_load];
+    if (load.travel_m) {
+      const Vec3 direction = load.direction.normalized();
+      const int m = body.motion_column.at(load.tool);
+      const double reaction = at.reaction_n(m);
+      const Eigen::RowVectorXd d_reaction = at.d_reaction.row(m);
+      out.force_n[at_load] = scale * reaction * direction;
+      out.d_force[at_load] = scale * direction * d_reaction;
+      for (Index k = parameters_; k < count; ++k) {
+        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += reaction * direction;
+      }
+      out.travel_m(l) = c.motion(m);
+      for (Index k = parameters_; k < count; ++k) out.d_travel(l, k) = c.d_motion(m, k - parameters_);
+    } else {
+      out.force_n[at_load] = load.force_n.value_or(Vec3::Zero());
+      const std::vector<LoadPart> parts = load_parts(s, at_load, body, unknowns);
+      if (parts.empty()) continue;
+      const Vec3 direction = rotation.transpose() * load.direction.normalized();
+      Vec3 mean_motion_m = Vec3::Zero();
+      for (const LoadPart& part : parts) {
+        const Vec3 conjugate_m = at.conjugate_m.segment<3>(part.first);
+        mean_motion_m += part.weight * conjugate_m;
+        out.d_travel.row(l) += part.weight * direction.transpose() * at.d_conjugate.middleRows<3>(part.first);
+        if (part.unknown < 0) continue;
+        const auto own = std::find(out.columns.begin(), out.columns.end(), part.unknown);
+        out.d_travel(l, own - out.columns.begin()) += direction.dot(conjugate_m);
+      }
+      out.travel_m(l) = direction.dot(mean_motion_m);
+      if (clamp_[s] < 0) continue;
+      // A turned clamp turns the object under the tool's direction.
+      const Mat3 turn = clamp.inverse_rotation_derivative(load.direction.normalized());
+      for (Index k = parameters_; k < count; ++k) {
+        const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s] - 3;
+        if (component >= 0 && component < 3) out.d_travel(l, k) += mean_motion_m.dot(turn.col(component));
+      }
+    }
+  }
+
+  // The readings of a driven platen carry the sensor's tare and scale; those of an imposed force are the load itself.
+  const auto reading_column = [&](int unknown) {
+    const auto it = std::find(out.columns.begin(), out.columns.end(), unknown);
+    if (it != out.columns.end()) return static_cast<Index>(it - out.columns.begin());
+    out.columns.push_back(unknown);
+    const Index wider = static_cast<Index>(out.columns.size());
+    const auto widen = [&](auto& matrix) {
+      matrix.conservativeResize(matrix.rows(), wider);
+      matrix.rightCols(1).setZero();
+    };
+    widen(out.d_surface);
+    if (out.d_material.size() > 0) widen(out.d_material);
+    widen(out.d_travel);
+    for (auto& block : out.d_force) widen(block);
+    return wider - 1;
+  };
+  for (std::size_t l = 0; l < now.loads.size(); ++l) {
+    if (!now.loads[l].travel_m) continue;
+    if (force_scale_ >= 0 && std::find(c.columns.begin(), c.columns.end(), force_scale_) == c.columns.end()) {
+      const Index at_scale = reading_column(force_scale_);
+      out.d_force[l].col(at_scale) += out.force_n[l] / scale;
+    }
+    if (tare_[p] < 0) continue;
+    const bool along = tare_axis_[p].norm() > 0;
+    for (int k = 0; k < (along ? 1 : 3); ++k) {
+      const Index at_tare = reading_column(tare_[p] + k);
+      const Vec3 axis = along ? tare_axis_[p] : Vec3(Vec3::Unit(k));
+      out.force_n[l] += unknowns(tare_[p] + k) * axis;
+      out.d_force[l].col(at_tare) += axis;
+    }
+  }
+  return out;
+}
+
+}  // namespace palpate::estimation
