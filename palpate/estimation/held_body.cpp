@@ -149,8 +149,9 @@ Rim rim_of(const TetMesh& mesh, const std::vector<Index>& nodes) {
   }
   const Eigen::SelfAdjointEigenSolver<Mat3> axes(scatter);
   rim.normal = axes.eigenvectors().col(0);
-  const bool flat =
-      axes.eigenvalues()(0)<1e-3 * axes.eigenvalues()(2), wide = axes.eigenvalues()(1)> 1e-2 * axes.eigenvalues()(2);
+  const Vec3 spread = axes.eigenvalues();  // ascending
+  const bool flat = spread(0) < 1e-3 * spread(2);
+  const bool wide = spread(1) > 1e-2 * spread(2);
   if (flat && wide) rim.radius_m = radius_m;
   return rim;
 }

@@ -262,10 +262,8 @@ namespace {
 
 /// A modulus at which the body hardly moves: non-linear materials are then linear too. Not stiffer than that: what a table presses into
 /// the body must stay far above the last digit of its nodes' places.
-double stiff_young_pa(const ForwardModel& model) {
+double stiff_young_pa(const ForwardModel& model, double size_m) {
   constexpr double over_pressure = 1e5;
-  const auto& rest = model.object().surface.rest().vertices_m;
-  const double size_m = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
   double force_n = 0;
   for (std::size_t s = 0; s < model.step_count(); ++s)
     for (const Load& load : model.step(s).loads) force_n = std::max(force_n, load.force_n.value_or(Vec3::Zero()).norm());
@@ -280,9 +278,10 @@ VectorX find_start(Objective& objective, double poisson_start) {
   VectorX guess = unknowns.prior_mean();
   guess(poisson) = std::clamp(poisson_start, unknowns[poisson].lower, unknowns[poisson].upper);
 
-  guess(log_young) = std::log(stiff_young_pa(model));
-  std::vector<StepPrediction> stiff(model.step_count());
   const auto& rest = model.object().surface.rest().vertices_m;
+  const double size_m = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
+  guess(log_young) = std::log(stiff_young_pa(model, size_m));
+  std::vector<StepPrediction> stiff(model.step_count());
   const std::size_t stride = std::max<std::size_t>(1, model.step_count() / 24);  // a few steps of a long recording say enough
   for (std::size_t s = 0; s < model.step_count(); s += stride) {
     stiff[s] = model.predict(s, guess);
@@ -290,7 +289,6 @@ VectorX find_start(Objective& objective, double poisson_start) {
   }
   model.forget();
 
-  const double size_m = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
   Loss wide;
   wide.tukey = 1e3;
   wide.along_rays = false;

@@ -212,7 +212,7 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
                            20 * step};
   constexpr int points = 20000;
   const auto distance = known_volume ? surface_distance(surface, boundary, points, seen)
-                                           : one_sided_distance(surface, boundary, points, seen);
+                                     : one_sided_distance(surface, boundary, points, seen);
   out.surface_rms_m = distance.rms_m;
   out.hausdorff_m = distance.hausdorff_m;
   if (!known_volume) out.unseen_share = share_over_holes(boundary, solid);
