@@ -85,12 +85,16 @@ int outward_votes(const TriangleTree& tree, const std::vector<Index>& patch, dou
   return votes;
 }
 
+/// Every edge is run along as often in one direction as in the other: the winding number is then a whole number everywhere,
+/// though more than two triangles may meet at an edge (as a lid does with a triangle beside it).
 bool closed(const std::vector<Side>& sides) {
-  for (std::size_t i = 0; i < sides.size(); i += 2) {
-    if (i + 1 == sides.size()) return false;
-    const Side &a = sides[i], &b = sides[i + 1];
-    if (a.low != b.low || a.high != b.high || a.ascending == b.ascending) return false;
-    if (i + 2 < sides.size() && sides[i + 2].low == a.low && sides[i + 2].high == a.high) return false;
+  for (std::size_t i = 0; i < sides.size();) {
+    int balance = 0;
+    std::size_t j = i;
+    for (; j < sides.size() && sides[j].low == sides[i].low && sides[j].high == sides[i].high; ++j)
+      balance += sides[j].ascending ? 1 : -1;
+    if (balance != 0) return false;
+    i = j;
   }
   return !sides.empty();
 }

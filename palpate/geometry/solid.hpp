@@ -18,7 +18,7 @@ struct OrientedSurface {
   Index flipped = 0;  ///< triangles that were turned round
   Index dropped = 0;  ///< copies and triangles without area
   Index patches = 0;  ///< pieces across whose edges the orientation could be carried
-  bool closed = false;  ///< every edge has two triangles that run along it in opposite directions
+  bool closed = false;  ///< triangles run along every edge as often in one direction as in the other
   std::vector<double> cover_width_m;  ///< of the mesh's last triangles, which close small holes: the width of the hole
 };
 

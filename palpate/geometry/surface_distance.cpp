@@ -6,9 +6,21 @@
 #include <random>
 #include <vector>
 
-#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/geometry/solid.hpp"
 
 namespace palpate::geometry {
+
+CountedPoints not_buried(const TriMesh& surface, const Solid& solid) {
+  const double step = 1e-4 * solid.diagonal_m();
+  return {[&surface, &solid, step](const Vec3& p, Index triangle) {
+            const auto corner = [&](int k) -> Vec3 {
+              return surface.vertices_m.row(surface.triangles(triangle, k)).transpose();
+            };
+            const Vec3 n = step * (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+            return !(solid.inside(p + n) && solid.inside(p - n));
+          },
+          20 * step};
+}
 
 SurfaceDistance one_sided_distance(const TriMesh& from, const TriMesh& to, int samples, const CountedPoints& counted) {
   const TriangleTree tree(to);

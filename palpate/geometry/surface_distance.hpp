@@ -7,6 +7,8 @@
 
 namespace palpate::geometry {
 
+class Solid;
+
 struct SurfaceDistance {
   double rms_m = 0;        ///< over samples of both surfaces
   double hausdorff_m = 0;  ///< largest distance of a sample or vertex of one surface from the other
@@ -17,6 +19,10 @@ struct CountedPoints {
   std::function<bool(const Vec3& point_m, Index triangle)> counts;
   double from_m = 0;
 };
+
+/// Points of a self-intersecting `surface` that do not lie within another part of it: only those are boundary of the solid
+/// that it describes. Both must outlive the answer.
+CountedPoints not_buried(const TriMesh& surface, const Solid& solid);
 
 /// Largest and root-mean-square distance of `from` from `to`: `samples` points spread by area, and all vertices, which count
 /// for hausdorff_m only.

@@ -200,16 +200,7 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   out.check = check_volume(out.mesh);
   const TriMesh boundary = boundary_surface(out.mesh).surface;
   if (known_volume) out.volume_error = out.check.volume_m3 / reference - 1;
-  // what lies buried within other parts of a self-intersecting input is no boundary, and need not be met
-  const double step = 1e-4 * solid.diagonal_m();
-  const CountedPoints seen{[&](const Vec3& p, Index triangle) {
-                             const auto corner = [&](int k) -> Vec3 {
-                               return surface.vertices_m.row(surface.triangles(triangle, k)).transpose();
-                             };
-                             const Vec3 n = step * (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
-                             return !(solid.inside(p + n) && solid.inside(p - n));
-                           },
-                           20 * step};
+  const CountedPoints seen = not_buried(surface, solid);
   constexpr int points = 20000;
   const auto distance = known_volume ? surface_distance(surface, boundary, points, seen)
                                      : one_sided_distance(surface, boundary, points, seen);
