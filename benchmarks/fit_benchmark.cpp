@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The paper's measure of time: one more sample of force and displacement (one force, 10 000 points of the deformed surface) turned
-// into E and nu, everything included: correspondence, solves, posterior. The object has the paper's 815 linear tetrahedra (a ball
-// of 163 cells), or what `identify` makes of a ball's surface at its automatic settings.
+// into E and nu, everything included: correspondence, solves, posterior. The object is a ball of about the paper's
+// 815 linear tetrahedra, or what `identify` makes of a ball's surface at its automatic settings.
 //   set-up    from the mesh to answers at any nu: assembly, ordering, factorisations
 //   sample    the k-th sample added to the k - 1 before it, to the new E, nu and their intervals
 // CPU time of one thread.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <random>
 
 #include "palpate/estimation/growing_fit.hpp"
+#include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/lab/implicit_surface.hpp"
@@ -24,43 +22,11 @@ namespace {
 constexpr double radius_m = 0.06, young_pa = 2e4, poisson = 0.3, sigma_m = 2e-3;
 constexpr int samples = 6, points = 10000;
 
-/// The 163 cells of a lattice that are nearest to a ball's centre, five tetrahedra each; the lowest layer stands on z = 0.
-TetMesh ball_of_cells() {
-  constexpr int n = 9, wanted = 163;
-  const double edge_m = 2 * radius_m / 7;
-  std::vector<std::pair<double, std::array<int, 3>>> cells;
-  for (int z = 0; z < n; ++z)
-    for (int y = 0; y < n; ++y)
-      for (int x = 0; x < n; ++x)
-        cells.push_back({Vec3(x - n / 2, y - n / 2, z - n / 2).squaredNorm() + 1e-6 * (x + 3 * y + 7 * z), {x, y, z}});
-  std::sort(cells.begin(), cells.end());
-  cells.resize(wanted);
-  constexpr int pattern[5][4] = {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}};
-  std::map<std::array<int, 3>, Index> number;
-  std::vector<Vec3> nodes;
-  TetMesh mesh;
-  mesh.tetrahedra.resize(5 * wanted, 4);
-  Index row = 0;
-  for (const auto& [distance, cell] : cells) {
-    const int mirror = (cell[0] + cell[1] + cell[2]) % 2;
-    for (const auto& tet : pattern) {
-      for (int k = 0; k < 4; ++k) {
-        const int bits = tet[k] ^ mirror;
-        const std::array<int, 3> at{cell[0] + (bits & 1), cell[1] + (bits >> 1 & 1), cell[2] + (bits >> 2 & 1)};
-        const auto [known, fresh] = number.emplace(at, static_cast<Index>(nodes.size()));
-        if (fresh) nodes.push_back(edge_m * Vec3(at[0], at[1], at[2]));
-        mesh.tetrahedra(row, k) = known->second;
-      }
-      const Vec3 a = nodes[std::size_t(mesh.tetrahedra(row, 0))], b = nodes[std::size_t(mesh.tetrahedra(row, 1))],
-                 c = nodes[std::size_t(mesh.tetrahedra(row, 2))], d = nodes[std::size_t(mesh.tetrahedra(row, 3))];
-      if ((b - a).cross(c - a).dot(d - a) < 0) std::swap(mesh.tetrahedra(row, 2), mesh.tetrahedra(row, 3));
-      ++row;
-    }
-  }
-  mesh.nodes_m.resize(static_cast<Index>(nodes.size()), 3);
-  for (std::size_t i = 0; i < nodes.size(); ++i) mesh.nodes_m.row(static_cast<Index>(i)) = nodes[i];
-  mesh.nodes_m.col(2).array() -= mesh.nodes_m.col(2).minCoeff();
-  return mesh;
+/// A ball that stands on z = 0.
+TriMesh ball() {
+  const Vec3 centre(0, 0, 0.85 * radius_m);
+  return lab::implicit_surface([&](const Vec3& p) { return (p - centre).norm() - radius_m; },
+                               {Vec3(-0.07, -0.07, 0), Vec3(0.07, 0.07, 0.12), 0.004});
 }
 
 struct Bench {
@@ -83,11 +49,11 @@ struct Bench {
     recording.tools = {pad};
     recording.model.material = "linear";
     if (automatic) {
-      const Vec3 centre(0, 0, 0.85 * radius_m);
-      recording.rest.surface = lab::implicit_surface([&](const Vec3& p) { return (p - centre).norm() - radius_m; },
-                                                     {Vec3(-0.07, -0.07, 0), Vec3(0.07, 0.07, 0.12), 0.004});
+      recording.rest.surface = ball();
     } else {
-      recording.rest.volume = ball_of_cells();
+      geometry::TetrahedraliseOptions options;
+      options.tetrahedra = 815;
+      recording.rest.volume = geometry::tetrahedralise(ball(), options).mesh;
       recording.model.element = "tet4";
       recording.model.refine = "none";
     }

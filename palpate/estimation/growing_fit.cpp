@@ -16,8 +16,9 @@ namespace palpate::estimation {
 namespace {
 
 constexpr double reuse = 0.3;   // standard deviations: equations that are moved along this far are right to some hundredths
-constexpr double search_reuse = 0.1;  // the same, for the search over nu, which adds up slopes over its whole range
+constexpr double search_reuse = 0.2;  // the same, for the search over nu, which adds up slopes over its whole range
 constexpr double anew = 1e-9;   // keep, but evaluate every step that has moved at all
+constexpr double floor = 3;     // of the cost: less is not to be had for certain where rays change triangles
 constexpr double misfit = 1.5;  // robust spread of the residuals in standard deviations: the start was far off
 
 /// Unknowns that share a name (two cameras in a step) are told apart by their order, which steps to come do not change.
@@ -75,17 +76,20 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
     for (const auto& name : names_) moved.push_back(place.count(name) > 0 ? place.at(name) : -1);
     objective.adopt(kept_, moved);
     objective.set_reuse(reuse);
+    // Which rays of a new step count is chosen where the steps before it say that it should be.
+    if (objective.evaluate(start, *loss_, progress).usable) loss_ = objective.with_chosen_rays(*loss_);
     optimum = optimise(objective, start, *loss_, optimiser, progress);
+    const auto may_gain = [&] { return newton_step(optimum.evaluation, free_unknowns(unknowns)).gain; };
+    if (optimum.termination == Termination::no_progress && may_gain() < floor) {
+      optimum.termination = Termination::converged;
+      optimum.message = "converged";
+    }
     if (optimum.evaluation.usable && optimum.termination != Termination::cancelled && optimum.termination != Termination::converged) {
       objective.set_reuse(anew);
       optimum = optimise(objective, optimum.unknowns, *loss_, optimiser, progress);
       objective.set_reuse(reuse);
     }
-    // Which rays of a new step count is chosen where it has been fitted.
-    const Loss chosen = objective.with_chosen_rays(*loss_);
-    if (optimum.evaluation.usable && optimum.termination != Termination::cancelled && chosen.rays != loss_->rays)
-      optimum = optimise(objective, optimum.unknowns, chosen, optimiser, progress);
-    optimum.loss = chosen;
+    optimum.loss = *loss_;
     found = optimum.evaluation.usable && objective.residual_scale() < misfit * std::max(1.0, loss_->tukey / loss.tukey);
   }
   if (!found && optimum.termination != Termination::cancelled) {
@@ -138,11 +142,10 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   same_object_ = true;
   loss_ = optimum.loss;
   names_ = names;
-  kept_ = objective.kept();
   known_.clear();
   for (std::size_t k = 0; k < names.size(); ++k) known_[names[k]] = optimum.unknowns(static_cast<Index>(k));
 
-  objective.set_reuse(search_reuse);
+  objective.set_reuse(search_reuse, false);
   const Posterior posterior = explore_posterior(objective, optimum, optimum.loss, factor, progress);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;
@@ -155,9 +158,11 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   answer.parameters = {young_from(regions.front(), region_name(0)), ratio_from(regions.front(), unknowns[poisson])};
   for (std::size_t r = 1; r < regions.size(); ++r) answer.parameters.push_back(young_from(regions[r], region_name(r)));
   answer.covariance = covariance_of(regions);
+  objective.set_reuse(reuse);
   objective.evaluate(optimum.unknowns, optimum.loss);  // verdicts look at the optimum's rows
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}, Doubts{}});
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
+  kept_ = objective.kept();
   return done();
 }
 

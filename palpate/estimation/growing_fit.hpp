@@ -13,8 +13,8 @@
 namespace palpate::estimation {
 
 /// Starts every update at the last one's optimum. A linear object is solved for once a contact. What an earlier step says is
-/// kept as its normal equations and made anew only where the unknowns have moved by more than a third of the standard deviation
-/// that it leaves them by itself. The mesh's error, the checks of parts against each other and the inflation by neighbours that
+/// kept as its normal equations, at the optimum and at the values of nu that the search over nu visits, and made anew only where
+/// the unknowns have moved by more than a third of the standard deviation that it leaves them by itself. The mesh's error, the checks of parts against each other and the inflation by neighbours that
 /// err together are left to `fit`, which is for the end.
 class GrowingFit {
  public:
@@ -42,7 +42,7 @@ class GrowingFit {
   FitMemory memory_;
   std::map<std::string, double> known_;  // unknowns at the last optimum, by name
   std::optional<Loss> loss_;             // of the last optimum
-  std::vector<Objective::KeptStep> kept_;
+  std::vector<Objective::KeptPlaces> kept_;
   std::vector<std::string> names_;  // of the unknowns that kept_ counts
   bool same_object_ = true;
   int steps_evaluated_ = 0;

@@ -16,6 +16,8 @@ namespace {
 // 75 degrees: a sphere's ray there is a thirtieth of the radius inside the outline, and a grazing ray stops counting at 80.
 constexpr double well_inside = 0.26;
 
+constexpr std::size_t places_kept = 16;  // a step: the optimum, and those of a search over nu
+
 }  // namespace
 
 double tukey_rho(double residual, double cut) {
@@ -102,27 +104,43 @@ Evaluation nothing(Index count) {
 
 }  // namespace
 
-bool Objective::may_reuse(std::size_t s, const VectorX& unknowns, const Loss& loss) const {
-  const KeptStep& kept = kept_[s];
-  if (kept.unknowns.empty() || kept.loss.tukey != loss.tukey || kept.loss.widening != loss.widening ||
-      kept.loss.along_rays != loss.along_rays || kept.loss.surface_weight != loss.surface_weight ||
-      kept.loss.rays_of(s) != loss.rays_of(s)) {
-    return false;
+/// Puts the nearest place that is near enough at the end of what is kept; false: there is none.
+bool Objective::find_kept(std::size_t s, const VectorX& unknowns, const Loss& loss) {
+  KeptPlaces& places = kept_[s];
+  auto nearest = places.end();
+  double least = reuse_ * reuse_;
+  for (auto kept = places.begin(); kept != places.end(); ++kept) {
+    if (kept->loss.tukey != loss.tukey || kept->loss.widening != loss.widening || kept->loss.along_rays != loss.along_rays ||
+        kept->loss.surface_weight != loss.surface_weight || kept->loss.rays_of(s) != loss.rays_of(s) ||
+        (rows_wanted_ && kept->rows.empty())) {
+      continue;
+    }
+    const VectorX change = unknowns(kept->unknowns) - kept->at;
+    const double moved = change.dot(kept->normal.hessian * change);
+    if (moved <= least) {
+      least = moved;
+      nearest = kept;
+    }
   }
-  const VectorX change = unknowns(kept.unknowns) - kept.at;
-  return change.dot(kept.normal.hessian * change) <= reuse_ * reuse_;
+  if (nearest == places.end()) return false;
+  std::rotate(nearest, nearest + 1, places.end());
+  return true;
 }
 
 void Objective::keep(std::size_t s, const VectorX& unknowns, const Loss& loss) {
-  KeptStep& kept = kept_[s];
-  kept = {};
+  KeptPlaces& places = kept_[s];
+  if (places.size() == places_kept) {  // the one that was of no use for longest goes, the last one with rows stays
+    places.erase(std::find_if(places.begin(), places.end(), [](const KeptStep& p) { return p.rows.empty(); }));
+  }
+  if (rows_wanted_)
+    for (KeptStep& other : places) other.rows.clear();
+  KeptStep kept;
   for (const TermRows& rows : rows_[s]) kept.unknowns.insert(kept.unknowns.end(), rows.unknowns.begin(), rows.unknowns.end());
   std::sort(kept.unknowns.begin(), kept.unknowns.end());
   kept.unknowns.erase(std::unique(kept.unknowns.begin(), kept.unknowns.end()), kept.unknowns.end());
   kept.at = unknowns(kept.unknowns);
   kept.normal = nothing(static_cast<Index>(kept.unknowns.size()));
   kept.loss = loss;
-  kept.rows = rows_[s];
   for (const TermRows& rows : rows_[s]) {
     std::vector<int> place;
     for (int unknown : rows.unknowns) {
@@ -131,27 +149,30 @@ void Objective::keep(std::size_t s, const VectorX& unknowns, const Loss& loss) {
     add_rows(rows, loss, place, kept.normal);
   }
   kept.normal.cost += kept.normal.robust_cost;
+  if (rows_wanted_) kept.rows = rows_[s];
+  places.push_back(std::move(kept));
 }
 
-void Objective::adopt(const std::vector<KeptStep>& kept, const std::vector<int>& moved) {
+void Objective::adopt(const std::vector<KeptPlaces>& kept, const std::vector<int>& moved) {
   kept_.assign(model_.step_count(), {});
   const auto renumber = [&](std::vector<int>& unknowns) {
     for (int& unknown : unknowns) unknown = moved[static_cast<std::size_t>(unknown)];
     return std::none_of(unknowns.begin(), unknowns.end(), [](int unknown) { return unknown < 0; });
   };
   for (std::size_t s = 0; s < std::min(kept.size(), kept_.size()); ++s) {
-    KeptStep step = kept[s];
-    bool whole = renumber(step.unknowns);
-    for (TermRows& rows : step.rows) whole = renumber(rows.unknowns) && whole;
-    if (whole) kept_[s] = std::move(step);
+    for (KeptStep place : kept[s]) {
+      bool whole = renumber(place.unknowns);
+      for (TermRows& rows : place.rows) whole = renumber(rows.unknowns) && whole;
+      if (whole) kept_[s].push_back(std::move(place));
+    }
   }
 }
 
 Evaluation Objective::sum_kept(const VectorX& unknowns, const Loss& loss) const {
   Evaluation out = nothing(unknowns_.size());
   for (std::size_t s = 0; s < kept_.size(); ++s) {
-    const KeptStep& kept = kept_[s];
-    if (kept.unknowns.empty() || !loss.counts(s)) continue;
+    if (kept_[s].empty() || !loss.counts(s)) continue;
+    const KeptStep& kept = kept_[s].back();
     const VectorX change = unknowns(kept.unknowns) - kept.at;
     const VectorX bent = kept.normal.hessian * change;
     const double gain = kept.normal.gradient.dot(change) + 0.5 * change.dot(bent);
@@ -185,8 +206,8 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
     try {
       for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
         if (terms_[s].empty() || !loss.counts(s)) continue;
-        if (reuse_ > 0 && may_reuse(s, unknowns, loss)) {
-          rows_[s] = kept_[s].rows;
+        if (reuse_ > 0 && find_kept(s, unknowns, loss)) {
+          if (rows_wanted_) rows_[s] = kept_[s].back().rows;
           continue;
         }
         ++steps_evaluated_;
@@ -253,13 +274,9 @@ std::vector<TermRows> Objective::rows_of(std::size_t s, const StepPrediction& pr
                                          const Loss& loss) const {
   const RaysOfStep* chosen = loss.along_rays ? loss.rays_of(s) : nullptr;
   std::vector<TermRows> rows;
-  for (const auto& term : terms_[s]) {
-    rows.push_back(term->rows(predicted, unknowns, loss.along_rays));
-    if (chosen == nullptr) continue;
-    const std::vector<char>& counts = (*chosen)[rows.size() - 1];
-    for (std::size_t i = 0; i < counts.size(); ++i) {
-      if (counts[i] == 0) rows.back().residual(static_cast<Index>(i)) = std::numeric_limits<double>::infinity();
-    }
+  for (std::size_t t = 0; t < terms_[s].size(); ++t) {
+    const bool some = chosen != nullptr && !(*chosen)[t].empty();
+    rows.push_back(terms_[s][t]->rows(predicted, unknowns, {loss.along_rays, some ? &(*chosen)[t] : nullptr}));
   }
   return rows;
 }

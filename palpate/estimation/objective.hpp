@@ -81,18 +81,24 @@ class Objective {
 
   /// Normal equations of one step, and the unknowns that they were made at.
   struct KeptStep {
-    std::vector<int> unknowns;  ///< empty: nothing is kept
+    std::vector<int> unknowns;
     VectorX at;
     Evaluation normal;  ///< of those unknowns, without priors
     Loss loss;
-    std::vector<TermRows> rows;
+    std::vector<TermRows> rows;  ///< of the last place only: they are large
   };
+  /// The places that a step was evaluated at, the last one at the end.
+  using KeptPlaces = std::vector<KeptStep>;
   /// A step is not evaluated anew while the unknowns have moved by at most this many standard deviations of what it says of them
   /// by itself since its normal equations were made: those are moved along. 0 (the default): every step is evaluated.
-  void set_reuse(double standard_deviations) { reuse_ = standard_deviations; }
-  const std::vector<KeptStep>& kept() const { return kept_; }  ///< a step; filled while reuse is set
+  /// @param rows  last_rows() holds every step's; a search that asks for costs only does without
+  void set_reuse(double standard_deviations, bool rows = true) {
+    reuse_ = standard_deviations;
+    rows_wanted_ = rows;
+  }
+  const std::vector<KeptPlaces>& kept() const { return kept_; }  ///< a step; filled while reuse is set
   /// Takes over what another objective kept of the first steps. @param moved  where its unknowns are in this one, -1: gone
-  void adopt(const std::vector<KeptStep>& kept, const std::vector<int>& moved);
+  void adopt(const std::vector<KeptPlaces>& kept, const std::vector<int>& moved);
   int steps_evaluated() const { return steps_evaluated_; }
 
   ResidualSummary summarise(const Loss& loss) const;            ///< of the last evaluation
@@ -112,7 +118,7 @@ class Objective {
   double residual_scale() const;
 
  private:
-  bool may_reuse(std::size_t s, const VectorX& unknowns, const Loss& loss) const;
+  bool find_kept(std::size_t s, const VectorX& unknowns, const Loss& loss);
   void keep(std::size_t s, const VectorX& unknowns, const Loss& loss);
   Evaluation sum_kept(const VectorX& unknowns, const Loss& loss) const;
   void add_priors(const VectorX& unknowns, Evaluation& out) const;
@@ -124,7 +130,8 @@ class Objective {
   std::vector<std::vector<TermRows>> rows_;
   std::vector<StepPrediction> predictions_;
   double reuse_ = 0;
-  std::vector<KeptStep> kept_;
+  bool rows_wanted_ = true;
+  std::vector<KeptPlaces> kept_;
   std::atomic<int> steps_evaluated_{0};
 };
 

@@ -79,6 +79,20 @@ VectorX interpolate(const VectorX& x, const VectorX& y, const VectorX& at) {
   return out;
 }
 
+/// Where the search over nu looks: those of the nested points of Clenshaw and Curtis (1960) over all of nu's range, dense
+/// towards its ends, that lie between `from` and `to`, and the next ones outside. They stay where they are as data come in,
+/// so that what was found there before is of use again.
+VectorX nodes_between(double from, double to, double lower, double upper) {
+  for (int cells = 8;; cells *= 2) {
+    VectorX all = 0.5 * (lower + upper) - 0.5 * (upper - lower) * VectorX::LinSpaced(cells + 1, 0, EIGEN_PI).array().cos();
+    all = all.cwiseMax(lower).cwiseMin(upper);
+    Index first = 0, last = cells;
+    while (first < cells && all(first + 1) <= from) ++first;
+    while (last > 0 && all(last - 1) >= to) --last;
+    if (last - first >= 6 || cells >= 1024) return all.segment(first, last - first + 1);
+  }
+}
+
 /// Integral of y over x, zero at the first one.
 VectorX integral(const VectorX& x, const VectorX& y) {
   VectorX out = VectorX::Zero(x.size());
@@ -187,10 +201,10 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   // Conditional optima outwards from the best one, each started from its neighbour.
   posterior.quadrature = true;
   const double from = std::max(lower, nu - 6 * std_nu), to = std::min(upper, nu + 6 * std_nu);
-  constexpr int nodes = 7;
-  VectorX node(nodes), cost_slope(nodes), log_determinant(nodes);
+  VectorX node = nodes_between(from, to, lower, upper);
+  const Index nodes = node.size();
+  VectorX cost_slope(nodes), log_determinant(nodes);
   MatrixX mean(nodes, at.log_young.size()), std_dev(nodes, at.log_young.size());  // a region a column
-  for (int i = 0; i < nodes; ++i) node(i) = 0.5 * (from + to) - 0.5 * (to - from) * std::cos(EIGEN_PI * i / (nodes - 1));
   Index nearest = 0;
   (node.array() - nu).abs().minCoeff(&nearest);
   if (nu > from && nu < to) nearest = std::clamp<Index>(nearest, 1, nodes - 2);
@@ -205,7 +219,7 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   others.erase(std::remove(others.begin(), others.end(), poisson), others.end());
   int done = 0;
   const OnProgress keep_going = [&](std::string_view, double) {
-    return !progress || progress("posterior", static_cast<double>(done) / nodes);
+    return !progress || progress("posterior", static_cast<double>(done) / static_cast<double>(nodes));
   };
   const auto note = [&](Index i, const Conditional& c) {
     cost_slope(i) = c.cost_slope;

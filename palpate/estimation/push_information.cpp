@@ -276,9 +276,9 @@ std::vector<RatedPush> PushInformation::rate(std::size_t c) {
     const VectorX at = plan.values();
     const StepPrediction predicted = plan.model->predict(first + s, at);
     if (loaded) travel_m[s] = predicted.travel_m(0);
-    if (travel) tool_blocks[s] = block_of(travel->rows(predicted, at, true), 1);
+    if (travel) tool_blocks[s] = block_of(travel->rows(predicted, at, {}), 1);
     for (std::size_t v = 0; v < looks.size(); ++v) {
-      const TermRows rows = looks[v]->rows(predicted, at, true);
+      const TermRows rows = looks[v]->rows(predicted, at, {});
       view_blocks[v][s] = block_of(rows, rows.robust ? surface_weight : 1);
     }
   }

@@ -41,6 +41,12 @@ Eigen::Matrix<double, 3, 6> RigidOffset::derivative(const Vec3& point_m) const {
   return d;
 }
 
+RigidMap::RigidMap(const RigidOffset& offset)
+    : rotation_(offset.rotation()),
+      left_jacobian_(left_jacobian(offset.rotation_rad)),
+      pivot_m_(offset.pivot_m),
+      shifted_m_(offset.pivot_m + offset.translation_m) {}
+
 Mat3 RigidOffset::inverse_rotation_derivative(const Vec3& vector) const {
   // exp(w)' v = exp(-w) v, and d/dw exp(-w) v = [exp(-w) v]_x J_l(-w) with J_l(-w) = J_r(w).
   return skew(rotation().transpose() * vector) * left_jacobian(-rotation_rad);

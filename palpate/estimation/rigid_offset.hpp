@@ -20,4 +20,23 @@ struct RigidOffset {
   Mat3 inverse_rotation_derivative(const Vec3& vector) const;
 };
 
+/// A RigidOffset made ready for many points.
+class RigidMap {
+ public:
+  explicit RigidMap(const RigidOffset& offset);
+  const Mat3& rotation() const { return rotation_; }
+  Vec3 apply(const Vec3& point_m) const { return rotation_ * (point_m - pivot_m_) + shifted_m_; }
+  /// d (gradient . x') / d (t, w)
+  Eigen::Matrix<double, 1, 6> slope(const Vec3& gradient, const Vec3& point_m) const {
+    Eigen::Matrix<double, 1, 6> d;
+    d.head<3>() = gradient.transpose();
+    d.tail<3>() = (rotation_ * (point_m - pivot_m_)).cross(gradient).transpose() * left_jacobian_;
+    return d;
+  }
+
+ private:
+  Mat3 rotation_, left_jacobian_;
+  Vec3 pivot_m_, shifted_m_;
+};
+
 }  // namespace palpate::estimation

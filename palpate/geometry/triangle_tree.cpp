@@ -274,41 +274,50 @@ bool TriangleTree::within(const Vec3& p, double squared, Index hint) const {
   return false;
 }
 
-std::optional<RayHit> TriangleTree::cast(const Vec3& origin, const Vec3& direction, double max_range) const {
+std::optional<RayHit> TriangleTree::cast(const Vec3& origin, const Vec3& direction, double max_range, Index hint) const {
   const Impl& s = *impl_;
   if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0)) return std::nullopt;
   const Ray ray(origin, direction);
   RayHit best;
   double range = max_range;
+  const auto meet = [&](Index id) {
+    const auto corner = [&](int k) { return Vec3(s.mesh.vertices_m.row(s.mesh.triangles(id, k)).transpose()); };
+    if (!ray.hit(corner(0), corner(1), corner(2), range, best)) return;
+    best.triangle = id;
+    range = best.range_m;
+  };
+  if (hint >= 0 && hint < static_cast<Index>(s.slot.size())) meet(hint);
   struct Visit {
-    double enter;
+    float enter;
     Index node;
   };
-  std::array<Visit, bvh_stack_size> stack;
+  const WideRay wide(s.wide, origin, direction);
+  float limit = wide.limit(range);
+  std::array<Visit, 3 * bvh_stack_size> stack;
   int top = 0;
   stack[top++] = {0, 0};
   while (top > 0) {
     const Visit visit = stack[--top];
-    if (visit.enter > range) continue;
-    const BvhNode& node = s.bvh.nodes[visit.node];
-    std::array<double, 2> enter{};
-    for (int side = 0; side < 2; ++side)
-      enter[side] = node.child[side] < 0 ? std::numeric_limits<double>::infinity() : ray.enter(node.box[side], range);
-    const int far = enter[1] < enter[0] ? 0 : 1;
-    for (const int side : {far, 1 - far}) {
-      if (!(enter[side] <= range)) continue;
-      if (node.count[side] == 0) {
-        stack[top++] = {enter[side], node.child[side]};
-        continue;
-      }
-      for (Index i = node.child[side]; i < node.child[side] + node.count[side]; ++i) {
-        const Index id = s.bvh.order[i];
-        const auto corner = [&](int k) { return Vec3(s.mesh.vertices_m.row(s.mesh.triangles(id, k)).transpose()); };
-        if (ray.hit(corner(0), corner(1), corner(2), range, best)) {
-          best.triangle = id;
-          range = best.range_m;
-        }
-      }
+    if (visit.enter > limit) continue;
+    const WideNode& node = s.wide.nodes[visit.node];
+    const Eigen::Array4f enter = wide.enter(node, limit);
+    std::array<int, 4> order;
+    int n = 0;
+    for (int i = 0; i < 4; ++i) {
+      if (!(enter[i] <= limit) || node.child[i] < 0) continue;
+      int at = n++;
+      for (; at > 0 && enter[order[at - 1]] > enter[i]; --at) order[at] = order[at - 1];
+      order[at] = i;
+    }
+    for (int i = 0; i < n; ++i) {  // leaves first, nearest first: they shrink the limit
+      const int c = order[i];
+      if (node.count[c] == 0 || enter[c] > limit) continue;
+      for (Index t = node.child[c]; t < node.child[c] + node.count[c]; ++t) meet(s.bvh.order[t]);
+      limit = wide.limit(range);
+    }
+    for (int i = n - 1; i >= 0; --i) {
+      const int c = order[i];
+      if (node.count[c] == 0 && enter[c] <= limit) stack[top++] = {enter[c], node.child[c]};
     }
   }
   if (best.triangle < 0) return std::nullopt;

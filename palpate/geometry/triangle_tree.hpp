@@ -45,8 +45,8 @@ class TriangleTree {
   bool within(const Vec3& point_m, double squared_distance_m2, Index hint = -1) const;
 
   /// First hit of a ray, both sides of a triangle count. `direction` need not have unit length; range is in its units.
-  /// No ray slips between two triangles that share an edge (Woop, Benthin, Wald 2013).
-  std::optional<RayHit> cast(const Vec3& origin_m, const Vec3& direction, double max_range = 1e300) const;
+  /// No ray slips between two triangles that share an edge (Woop, Benthin, Wald 2013). `hint` as for closest().
+  std::optional<RayHit> cast(const Vec3& origin_m, const Vec3& direction, double max_range = 1e300, Index hint = -1) const;
 
   /// Number of triangles that the endless ray meets (a crossing of an edge counts for both of its triangles).
   int crossings(const Vec3& origin_m, const Vec3& direction) const;

@@ -55,4 +55,41 @@ class WideQuery {
   std::array<Eigen::Array4f, 3> above_, below_;
 };
 
+/// A ray, prepared: lower bounds of where it enters the four boxes of a node, safe against rounding. Ranges are in units of
+/// the direction's largest component, so that neither tiny nor huge directions leave the numbers that a float holds.
+class WideRay {
+ public:
+  WideRay(const WideBvh& wide, const Vec3& origin, const Vec3& direction) : scale_(direction.cwiseAbs().maxCoeff()) {
+    const Vec3 o = origin - wide.centre;
+    const double error = 2.5e-7 * std::max(wide.extent, o.cwiseAbs().maxCoeff());
+    for (int k = 0; k < 3; ++k) {
+      const double along = direction[k] / scale_;
+      forward_[k] = along >= 0;
+      const double inverse = std::min(1 / std::abs(along), 1e30);
+      inverse_[k] = Eigen::Array4f::Constant(static_cast<float>(inverse));
+      above_[k] = Eigen::Array4f::Constant(static_cast<float>(o[k] + error));
+      below_[k] = Eigen::Array4f::Constant(static_cast<float>(o[k] - error));
+    }
+  }
+  /// As a range that `enter` compares with: rounded up.
+  float limit(double range) const { return static_cast<float>(std::min(range * scale_ * (1 + 1e-6), 3e38)); }
+  /// Infinity where the ray does not meet the box before `limit`.
+  Eigen::Array4f enter(const WideNode& n, float limit) const {
+    Eigen::Array4f near = Eigen::Array4f::Zero(), far = Eigen::Array4f::Constant(limit);
+    for (int k = 0; k < 3; ++k) {
+      // A backward ray is a forward one in the mirror.
+      const Eigen::Array4f first = forward_[k] ? n.min[k] - above_[k] : below_[k] - n.max[k];
+      const Eigen::Array4f last = forward_[k] ? n.max[k] - below_[k] : above_[k] - n.min[k];
+      near = near.max(first * inverse_[k] * (1 - 1e-6f));
+      far = far.min(last * inverse_[k] * (1 + 1e-6f));
+    }
+    return (near <= far).select(near, std::numeric_limits<float>::infinity());
+  }
+
+ private:
+  double scale_;
+  std::array<bool, 3> forward_;
+  std::array<Eigen::Array4f, 3> inverse_, above_, below_;
+};
+
 }  // namespace palpate::geometry

@@ -52,7 +52,7 @@ struct Fitted {
       std::map<std::string, int> shared;
       Unknowns none = unknowns;
       const auto term = make_term(markers, {*model, s, none, shared});
-      const VectorX off = term->rows(model->predict(s, truth), truth, true).residual * sigma_m;
+      const VectorX off = term->rows(model->predict(s, truth), truth, {}).residual * sigma_m;
       for (Index m = 0; m < rest_m.rows(); ++m) markers.observed_m.row(m) -= off.segment<3>(3 * m).transpose();
       inputs.push_back({markers});
     }

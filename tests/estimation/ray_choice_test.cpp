@@ -126,7 +126,7 @@ TEST(RayChoice, TheSameRaysCountForEveryPoissonRatio) {
   const double nu = ball.optimum.unknowns(poisson);
   const auto apart = [&](const Loss& loss) { return std::abs(ball.finite_rows(0.15, loss) - ball.finite_rows(0.45, loss)); };
   EXPECT_GE(apart(all), 5) << "the scene has no outline worth a test";
-  EXPECT_LE(apart(ball.loss), 1);  // a facet of the dent's rim may turn away from one ray
+  EXPECT_EQ(apart(ball.loss), 0) << "a ray that counts came or went";
   // The choice leaves out what grazes, not what faces the camera.
   EXPECT_GT(ball.finite_rows(nu, ball.loss), 0.9 * ball.finite_rows(nu, all));
 }
@@ -137,11 +137,9 @@ TEST(RayChoice, TheSearchOverThePoissonRatioAgreesWithTheFit) {
   const Posterior posterior =
       explore_posterior(*ball.objective, ball.optimum, ball.loss, tukey_information_factor(ball.loss.tukey), {});
   ASSERT_TRUE(posterior.quadrature) << "sharper than what is searched";
-  // A single ray that comes or goes at a facet of the dent costs 3.7: the fit's optimum lies where one such step leaves it.
-  constexpr double step_of_a_ray = 0.6;
   const double std_nu = posterior.poisson_std();
-  EXPECT_NEAR(posterior.poisson_quantile(0.5), ball.optimum.unknowns(poisson), step_of_a_ray * std_nu);
-  EXPECT_NEAR(posterior.log_young_quantile(0.5), ball.optimum.unknowns(log_young), step_of_a_ray * posterior.log_young_std_total());
+  EXPECT_NEAR(posterior.poisson_quantile(0.5), ball.optimum.unknowns(poisson), 0.3 * std_nu);
+  EXPECT_NEAR(posterior.log_young_quantile(0.5), ball.optimum.unknowns(log_young), 0.3 * posterior.log_young_std_total());
 }
 
 }  // namespace

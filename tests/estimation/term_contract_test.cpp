@@ -133,7 +133,7 @@ TEST_P(TermContract, JacobianIsTheDerivativeOfTheResidual) {
   const auto term = make_term(input, {model, test.step, unknowns, shared});
   ASSERT_NE(term, nullptr);
   const VectorX at = away_from_rest(unknowns);
-  const TermRows rows = term->rows(model.predict(test.step, at), at, test.along_rays);
+  const TermRows rows = term->rows(model.predict(test.step, at), at, {test.along_rays});
 
   ASSERT_EQ(rows.jacobian.rows(), rows.residual.size());
   ASSERT_EQ(rows.jacobian.cols(), static_cast<Index>(rows.unknowns.size()));
@@ -149,8 +149,8 @@ TEST_P(TermContract, JacobianIsTheDerivativeOfTheResidual) {
     VectorX ahead = at, behind = at;
     ahead(k) += h;
     behind(k) -= h;
-    const VectorX above = term->rows(model.predict(test.step, ahead), ahead, test.along_rays).residual;
-    const VectorX below = term->rows(model.predict(test.step, behind), behind, test.along_rays).residual;
+    const VectorX above = term->rows(model.predict(test.step, ahead), ahead, {test.along_rays}).residual;
+    const VectorX below = term->rows(model.predict(test.step, behind), behind, {test.along_rays}).residual;
     // One scale for all rows of an unknown, but never smaller than what would matter to the fit: a thousandth of sigma when
     // the unknown moves by its prior's standard deviation.
     VectorX measured(rows.residual.size());

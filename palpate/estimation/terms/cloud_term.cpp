@@ -26,14 +26,9 @@ class CloudTerm : public Term {
     }
   }
 
-  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool) const override {
+  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView&) const override {
     tree_.refit(predicted.surface_m);
-    RigidOffset frame;
-    frame.pivot_m = centre_m_;
-    if (pose_ >= 0) {
-      frame.translation_m = unknowns.segment<3>(pose_);
-      frame.rotation_rad = unknowns.segment<3>(pose_ + 3);
-    }
+    const RigidMap frame = frame_pose(unknowns, pose_, centre_m_);
     const Index count = static_cast<Index>(predicted.columns.size());
     TermRows rows;
     rows.unknowns = predicted.columns;
@@ -47,6 +42,8 @@ class CloudTerm : public Term {
     rows.observed_m.resize(points_m_.rows(), 3);
     rows.robust = true;
     rows.unit = "m";
+    const MatrixX slopes = predicted.d_surface.transpose();  // a vertex's in one place
+    VectorX slope(count);
     for (Index i = 0; i < points_m_.rows(); ++i) {
       const Vec3 point = frame.apply(points_m_.row(i));
       const auto hit = tree_.closest(point, hints_[static_cast<std::size_t>(i)]);
@@ -59,12 +56,12 @@ class CloudTerm : public Term {
       // The distance grows along `apart`; on the surface itself that direction is the face's normal.
       if (apart.norm() > 1e-9) normal = side * apart.normalized();
       rows.residual(i) = side * apart.norm() / sigma_m_(i);
-      for (int k = 0; k < 3; ++k) {
-        rows.jacobian.row(i).head(count) -=
-            hit.barycentric(k) / sigma_m_(i) * (normal.transpose() * predicted.d_surface.middleRows<3>(3 * triangle(k)));
-      }
+      slope.setZero();
+      for (int k = 0; k < 3; ++k)
+        slope.noalias() -= slopes.middleCols<3>(3 * triangle(k)) * (hit.barycentric(k) / sigma_m_(i) * normal);
+      rows.jacobian.row(i).head(count) = slope.transpose();
       field.subtract(rows.jacobian, i, triangle, hit.barycentric, normal / sigma_m_(i));
-      if (pose_ >= 0) rows.jacobian.row(i).segment<6>(count) = normal.transpose() * frame.derivative(points_m_.row(i)) / sigma_m_(i);
+      if (pose_ >= 0) rows.jacobian.row(i).segment<6>(count) = frame.slope(normal / sigma_m_(i), points_m_.row(i));
       rows.observed_m.row(i) = point;
     }
     return rows;

@@ -46,7 +46,7 @@ class MarkerTerm : public Term {
     }
   }
 
-  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool) const override {
+  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView&) const override {
     const Points& surface_m = predicted.markers_m();  // a marker's place is measured itself: the seen shape's error is not its
     std::vector<Index> seen;
     for (Index m = 0; m < markers_.rest_m.rows(); ++m) {

@@ -14,6 +14,7 @@ namespace {
 // What the fit makes of a recording hangs on means over wide parts of the picture: a cell must hold most of the neighbours that a
 // point's error is correlated with (a few times the sensor's correlation length, 5 to 20 pixels), or their effect is missed.
 constexpr Index cell_px = 48;
+constexpr double endless = 1e300;
 constexpr double grazing_cosine = 0.17;  // beyond 80 degrees a depth says little and its noise model is void
 
 class RayTerm : public Term {
@@ -24,14 +25,9 @@ class RayTerm : public Term {
     typical_ = rays_.sigma_m.mean();
   }
 
-  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool along_rays) const override {
+  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const override {
     tree_.refit(predicted.surface_m);
-    RigidOffset frame;
-    frame.pivot_m = pivot_m_;
-    if (pose_ >= 0) {
-      frame.translation_m = unknowns.segment<3>(pose_);
-      frame.rotation_rad = unknowns.segment<3>(pose_ + 3);
-    }
+    const RigidMap frame = frame_pose(unknowns, pose_, pivot_m_);
     const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
     const Index count = static_cast<Index>(predicted.columns.size());
     const Index pose_column = count;
@@ -46,41 +42,49 @@ class RayTerm : public Term {
     rows.residual.resize(rays_.range_m.size());
     rows.sigma = rays_.sigma_m;
     rows.observed_m.resize(rays_.range_m.size(), 3);
-    if (along_rays) rows.facing = VectorX::Zero(rays_.range_m.size());
+    if (view.along_rays) rows.facing = VectorX::Zero(rays_.range_m.size());
     rows.robust = true;
     rows.unit = "m";
     rows.cell.resize(static_cast<std::size_t>(rays_.range_m.size()));
 
-    const Mat3 rotation = frame.rotation();
+    const MatrixX slopes = predicted.d_surface.transpose();  // a vertex's in one place
+    VectorX slope(count);
     for (Index i = 0; i < rays_.range_m.size(); ++i) {
       rows.cell[static_cast<std::size_t>(i)] = cell(i);
       // The measured point, with the sensor's common offset taken out, where the corrected camera pose puts it.
       const Vec3 measured = point(i) - bias_m * Vec3(rays_.directions.row(i));
       const Vec3 observed = frame.apply(measured);
-      const Vec3 direction = rotation * rays_.directions.row(i).transpose();
+      const Vec3 direction = frame.rotation() * rays_.directions.row(i).transpose();
       rows.observed_m.row(i) = observed;
 
       Index triangle = -1;
       Vec3 barycentric, gradient;  // residual = (observed - surface) . gradient / sigma
       double residual_m = 0;
       Vec3 lever = measured;                // where the frame's pose acts: the hit, for a ray
-      if (along_rays) {
-        if (const auto hit = tree_.cast(frame.apply(rays_.origins_m.row(i)), direction)) {
+      Index& hint = hints_[static_cast<std::size_t>(i)];
+      const bool chosen = view.chosen != nullptr && (*view.chosen)[static_cast<std::size_t>(i)] != 0;
+      if (view.chosen != nullptr && !chosen) {
+        rows.residual(i) = std::numeric_limits<double>::infinity();
+        continue;
+      }
+      if (view.along_rays) {
+        if (const auto hit = tree_.cast(frame.apply(rays_.origins_m.row(i)), direction, endless, hint)) {
+          hint = hit->triangle;
           const Vec3 normal = face_normal(hit->triangle);
           const double cosine = normal.dot(direction);
           rows.facing(i) = std::abs(cosine);
-          if (std::abs(cosine) > grazing_cosine) {
+          if (chosen || std::abs(cosine) > grazing_cosine) {
             triangle = hit->triangle;
             barycentric = hit->barycentric;
-            gradient = normal / cosine;
+            // A ray that counts may come to a facet that it grazes: its residual goes on without a jump, its say is bounded.
+            gradient = normal / std::copysign(std::max(std::abs(cosine), grazing_cosine), cosine);
             residual_m = rays_.range_m(i) - bias_m - hit->range_m;
             lever = measured - residual_m * Vec3(rays_.directions.row(i));
           }
         }
       } else {
-        const auto hit = tree_.closest(observed, hints_[static_cast<std::size_t>(i)]);
-        hints_[static_cast<std::size_t>(i)] = hit.triangle;
-        triangle = hit.triangle;
+        const auto hit = tree_.closest(observed, hint);
+        triangle = hint = hit.triangle;
         barycentric = hit.barycentric;
         const Vec3 apart = observed - hit.point_m;
         gradient = apart.norm() > 1e-9 ? Vec3(apart.normalized()) : face_normal(hit.triangle);
@@ -92,14 +96,14 @@ class RayTerm : public Term {
       }
       const double sigma_m = rays_.sigma_m(i);
       rows.residual(i) = residual_m / sigma_m;
+      slope.setZero();
       for (int k = 0; k < 3; ++k) {
-        rows.jacobian.row(i).head(count) -=
-            barycentric(k) / sigma_m *
-            (gradient.transpose() * predicted.d_surface.middleRows<3>(3 * tree_.mesh().triangles(triangle, k)));
+        slope.noalias() -= slopes.middleCols<3>(3 * tree_.mesh().triangles(triangle, k)) * (barycentric(k) / sigma_m * gradient);
       }
+      rows.jacobian.row(i).head(count) = slope.transpose();
       field.subtract(rows.jacobian, i, tree_.mesh().triangles.row(triangle), barycentric, gradient / sigma_m);
       if (pose_ >= 0) {
-        rows.jacobian.block<1, 6>(i, pose_column) = gradient.transpose() * frame.derivative(lever) / sigma_m;
+        rows.jacobian.block<1, 6>(i, pose_column) = frame.slope(gradient / sigma_m, lever);
       }
       if (bias_ >= 0) rows.jacobian(i, bias_column) = -gradient.dot(direction) / sigma_m;
     }

@@ -20,6 +20,9 @@ std::string step_suffix(const TermContext& context);
 /// Six unknowns of a frame's pose, or -1 when it is exactly known.
 int add_frame_pose(const TermContext& context, double pose_std_m, double pose_std_rad);
 
+/// The frame's pose at these unknowns, ready for many points. @param pose  of add_frame_pose
+RigidMap frame_pose(const VectorX& unknowns, int pose, const Vec3& pivot_m);
+
 /// Columns of the rest surface's slow error at the end of a term's jacobian; none where the recording states no such error.
 class FieldColumns {
  public:

@@ -56,4 +56,14 @@ int add_frame_pose(const TermContext& context, double pose_std_m, double pose_st
   return first;
 }
 
+RigidMap frame_pose(const VectorX& unknowns, int pose, const Vec3& pivot_m) {
+  RigidOffset frame;
+  frame.pivot_m = pivot_m;
+  if (pose >= 0) {
+    frame.translation_m = unknowns.segment<3>(pose);
+    frame.rotation_rad = unknowns.segment<3>(pose + 3);
+  }
+  return RigidMap(frame);
+}
+
 }  // namespace palpate::estimation

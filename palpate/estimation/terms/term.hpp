@@ -24,6 +24,14 @@ struct RayObservation {
 
 using TermInput = std::variant<RayObservation, PointCloud, Markers, ToolTravel, Wrench>;
 
+/// How a term looks at what it observed.
+struct TermView {
+  bool along_rays = true;  ///< false while the surface may still be far away: closest points are used instead of rays
+  /// Rays that count, whatever they meet and how they graze it; the others are not asked about. nullptr: all that meet the
+  /// surface at less than 80 degrees
+  const std::vector<char>* chosen = nullptr;
+};
+
 /// Rows of one term: residual = (observed - predicted) / sigma, jacobian = d residual / d unknowns.
 struct TermRows {
   std::vector<int> unknowns;  ///< columns of the jacobian
@@ -40,8 +48,7 @@ struct TermRows {
 class Term {
  public:
   virtual ~Term() = default;
-  /// @param along_rays  false while the surface may still be far away: closest points are used instead of rays
-  virtual TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool along_rays) const = 0;
+  virtual TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const = 0;
   /// Standard deviation that residuals are divided by, a typical one (for the annealing of the robust loss).
   virtual double typical_sigma() const = 0;
 };

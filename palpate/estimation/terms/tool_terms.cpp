@@ -13,7 +13,7 @@ class TravelTerm : public Term {
   TravelTerm(double travel_m, double sigma_m, Index load, int offset)
       : travel_m_(travel_m), sigma_m_(sigma_m), load_(load), offset_(offset) {}
 
-  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, bool) const override {
+  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView&) const override {
     TermRows rows;
     rows.unknowns = predicted.columns;
     rows.jacobian = -predicted.d_travel.row(load_) / sigma_m_;
@@ -46,7 +46,7 @@ class WrenchTerm : public Term {
     }
   }
 
-  TermRows rows(const StepPrediction& predicted, const VectorX&, bool) const override {
+  TermRows rows(const StepPrediction& predicted, const VectorX&, const TermView&) const override {
     TermRows rows;
     const Index count = static_cast<Index>(axes_.size());
     rows.unknowns = predicted.columns;
