@@ -44,10 +44,9 @@ SurfaceSamples sample_surface(const Solid& solid, int count) {
     if (v + w > 1) v = 1 - v, w = 1 - w;
     const auto id = static_cast<Index>(t);
     const Vec3 p = (1 - v - w) * corner(id, 0) + v * corner(id, 1) + w * corner(id, 2);
-    if (!solid.separates(p, id)) {
-      out.buried_m3 += out.area_each_m2 / 3 * solid.normal(id).dot(p - middle);
-      continue;
-    }
+    const double share = solid.boundary_share(p, id);
+    out.buried_m3 += (1 - share) * out.area_each_m2 / 3 * solid.normal(id).dot(p - middle);
+    if (share == 0) continue;
     out.point.push_back(p);
     out.normal.push_back(solid.normal(id));
   }
@@ -56,7 +55,7 @@ SurfaceSamples sample_surface(const Solid& solid, int count) {
   const Index stride = std::max<Index>(1, static_cast<Index>(m.triangles.rows()) / count);
   for (Index id = 0; id < m.triangles.rows(); id += stride) {
     const Vec3 p = (corner(id, 0) + corner(id, 1) + corner(id, 2)) / 3;
-    if (!solid.separates(p, id)) continue;
+    if (solid.boundary_share(p, id) == 0) continue;
     out.point.push_back(p);
     out.normal.push_back(solid.normal(id));
   }
@@ -223,7 +222,7 @@ bool Lattice::misses(Index tet) const {
   return n > 0 && solid_.closest(sum / n).squared_distance_m2 > tolerance_m_ * tolerance_m_;
 }
 
-void Lattice::refine_to_surface(const SurfaceSamples& samples, double tolerance_m, double smallest_edge_m) {
+bool Lattice::refine_to_surface(const SurfaceSamples& samples, double tolerance_m, double smallest_edge_m, std::size_t most) {
   sample_set_ = &samples;
   tolerance_m_ = tolerance_m;
   // into the tetrahedra: the cubes of the lattice's corners are searched over their middles' four by three tetrahedra
@@ -251,12 +250,12 @@ void Lattice::refine_to_surface(const SurfaceSamples& samples, double tolerance_
   }
   for (Index s = 0; s < static_cast<Index>(samples.point.size()); ++s) {
     Index best = -1;
-    double most = -1e-6;
+    double largest = -1e-6;
     for (const Index t : bins[bin(samples.point[s])]) {
       std::array<Vec3, 4> x;
       for (int k = 0; k < 4; ++k) x[k] = points_[tets_[t][k]];
       const double least = barycentric(samples.point[s], x).minCoeff();
-      if (least > most) most = least, best = t;
+      if (least > largest) largest = least, best = t;
       if (least >= 0) break;
     }
     if (best >= 0) samples_[best].push_back(s);
@@ -265,10 +264,13 @@ void Lattice::refine_to_surface(const SurfaceSamples& samples, double tolerance_
     if (!alive_[t]) continue;
     const auto [i, j] = longest_edge(tets_[t]);
     if (0.5 * unit_m_ * std::sqrt(double(edge2(tets_[t][i], tets_[t][j]))) < smallest_edge_m) continue;
-    if (misses(t)) bisect(t);
+    if (!misses(t)) continue;
+    if (points_.size() > most / 5) return false;  // five to six tetrahedra a point
+    bisect(t);
   }
   sample_set_ = nullptr;
   for (auto& s : samples_) s.clear();
+  return true;
 }
 
 void Lattice::refine_to_size(const std::function<double(const Vec3&)>& longest_edge_m) {

@@ -17,7 +17,7 @@ struct SurfaceSamples {
   std::vector<Vec3> point, normal;
   std::size_t evenly = 0;  ///< that many are spread by area, the rest lies in the middle of triangles
   double area_each_m2 = 0;
-  double buried_m3 = 0;  ///< what hidden parts add to the solid's signed volume
+  double buried_m3 = 0;  ///< what hidden parts, and copies of visible ones, add to the solid's signed volume
 };
 SurfaceSamples sample_surface(const Solid& solid, int count);
 
@@ -31,8 +31,8 @@ class Lattice {
   Lattice(const Solid& solid, double cell_m);
 
   /// Bisects every tetrahedron in which the linear interpolation of the signed distance misses a surface sample by more than
-  /// `tolerance_m`, down to edges of `smallest_edge_m`.
-  void refine_to_surface(const SurfaceSamples& samples, double tolerance_m, double smallest_edge_m);
+  /// `tolerance_m`, down to edges of `smallest_edge_m`. False when that takes more than `most` tetrahedra.
+  bool refine_to_surface(const SurfaceSamples& samples, double tolerance_m, double smallest_edge_m, std::size_t most);
 
   /// Bisects until no tetrahedron's longest edge exceeds `longest_edge_m` of its middle.
   void refine_to_size(const std::function<double(const Vec3&)>& longest_edge_m);

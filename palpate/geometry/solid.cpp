@@ -198,7 +198,9 @@ Solid::Solid(const TriMesh& soup)
   for (Index i = 0; i < m.triangles.rows(); ++i) {
     const Vec3 a = m.vertices_m.row(m.triangles(i, 0)).transpose(), b = m.vertices_m.row(m.triangles(i, 1)).transpose(),
                c = m.vertices_m.row(m.triangles(i, 2)).transpose();
-    normals_.row(i) = (b - a).cross(c - a).normalized().transpose();
+    const Vec3 n = (b - a).cross(c - a);
+    normals_.row(i) = n.normalized().transpose();
+    area_m2_ += 0.5 * n.norm();
     min_m_ = min_m_.cwiseMin(a).cwiseMin(b).cwiseMin(c);
     max_m_ = max_m_.cwiseMax(a).cwiseMax(b).cwiseMax(c);
   }
@@ -226,9 +228,13 @@ double Solid::leaves(const Vec3& from, const Vec3& to) const {
   return 0.5 * (a + b);
 }
 
-bool Solid::separates(const Vec3& p, Index triangle) const {
+double Solid::boundary_share(const Vec3& p, Index triangle) const {
   const double mean = winding_.without(p, triangle);
-  return mean > 0 && mean < 1;
+  if (!watertight_ || std::abs(mean - 0.5) < 0.25) return mean > 0 && mean < 1 ? 1 : 0;
+  // hidden, or a triangle in the same plane adds one half to either side: the sides themselves tell
+  const double step = 1e-5 * diagonal_m_;
+  const double behind = winding_(p - step * normal(triangle)), before = winding_(p + step * normal(triangle));
+  return behind > 0.5 && before < 0.5 ? 1 / std::max(1.0, std::round(behind - before)) : 0;
 }
 
 }  // namespace palpate::geometry

@@ -41,8 +41,9 @@ class Solid {
   Vec3 normal(Index triangle) const { return normals_.row(triangle).transpose(); }
   /// Where the segment from an inside to an outside point leaves the solid, as a share of its length.
   double leaves(const Vec3& inside_m, const Vec3& outside_m) const;
-  /// False for a triangle that does not part inside from outside at that point (hidden within another piece).
-  bool separates(const Vec3& point_on_triangle_m, Index triangle) const;
+  /// How much of the solid's boundary a triangle is there: 0 where it is hidden within another part, one half where two
+  /// parts have a face in common, otherwise 1.
+  double boundary_share(const Vec3& point_on_triangle_m, Index triangle) const;
 
   const TriMesh& surface() const { return tree_.mesh(); }
   const TriangleTree& tree() const { return tree_; }
@@ -55,6 +56,7 @@ class Solid {
   }
   /// Of watertight surfaces: what lies within several parts of the soup counts several times.
   double signed_volume_m3() const { return volume_m3_; }
+  double area_m2() const { return area_m2_; }
   double diagonal_m() const { return diagonal_m_; }
   const Vec3& min_m() const { return min_m_; }
   const Vec3& max_m() const { return max_m_; }
@@ -65,7 +67,7 @@ class Solid {
   WindingNumber winding_;
   Points normals_;
   bool watertight_ = false;
-  double volume_m3_ = 0;
+  double volume_m3_ = 0, area_m2_ = 0;
   double diagonal_m_ = 0;
   Vec3 min_m_, max_m_;
 };

@@ -63,8 +63,11 @@ class Coarsener {
 
   void run() {
     double limit = o_.tolerance_m;
-    for (int pass = 0; pass < 6 && m_.count() > o_.tetrahedra; ++pass, limit *= 1.5)
-      while (m_.count() > o_.tetrahedra)
+    const double most = 11.4 * limit;  // six times 1.5
+    volume_m3_ = m_.volume_m3();
+    limit = std::min(limit, 0.1 * thickness());
+    for (; limit < most && m_.count() > o_.tetrahedra && keeps_volume(); limit *= 1.5)
+      while (m_.count() > o_.tetrahedra && keeps_volume())
         if (sweep(limit) < m_.count() / 100 + 1) break;
   }
 
@@ -79,6 +82,15 @@ class Coarsener {
   };
 
   Vec3 at(Index v) const { return m_.x[v] - origin_; }
+
+  bool keeps_volume() const { return std::abs(m_.volume_m3() / volume_m3_ - 1) < 0.03; }
+
+  /// Of a wall with this volume and surface.
+  double thickness() const {
+    double area = 0;
+    for (const auto& t : m_.all_boundary_triangles()) area += 0.5 * (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).norm();
+    return 2 * volume_m3_ / area;
+  }
 
   double cost(Index gone, Index kept) const {
     const double length2 = (m_.x[gone] - m_.x[kept]).squaredNorm();
@@ -162,6 +174,7 @@ class Coarsener {
   const Solid& solid_;
   CoarsenOptions o_;
   Vec3 origin_;
+  double volume_m3_ = 0;  ///< at first
   std::vector<Quadric> quadric_;
   std::vector<std::uint32_t> stamp_;
   std::priority_queue<Entry> heap_;
@@ -171,15 +184,7 @@ class Coarsener {
 
 void coarsen(TetEditor& mesh, const Solid& solid, const SurfaceSamples& samples, const CoarsenOptions& options) {
   Coarsener(mesh, solid, samples, options).run();
-  // what follows measures itself by the edges that are there now
-  for (std::size_t v = 0; v < mesh.x.size(); ++v) {
-    if (mesh.star[v].empty()) continue;
-    const auto around = mesh.neighbours(static_cast<Index>(v));
-    double sum = 0;
-    for (const Index w : around) sum += (mesh.x[v] - mesh.x[w]).norm();
-    mesh.size_m[v] = sum / double(around.size());
-    mesh.drift_m[v] = 0;
-  }
+  mesh.measure_sizes();  // what follows measures itself by the edges that are there now
 }
 
 }  // namespace palpate::geometry

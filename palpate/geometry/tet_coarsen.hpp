@@ -16,7 +16,7 @@ struct CoarsenOptions {
 
 /// Inside of tetrahedralise. Merges edges, those first that cost the surface least (quadrics of Garland, Heckbert 1997, and
 /// what a tip loses), until the wished number is left. What is curved or thin keeps short edges, flat and inner parts get
-/// long ones.
+/// long ones. Before the volume changes by more than 3 %, as where walls would fold together, the number is given up.
 void coarsen(TetEditor& mesh, const Solid& solid, const SurfaceSamples& samples, const CoarsenOptions& options);
 
 }  // namespace palpate::geometry

@@ -35,6 +35,27 @@ TetEditor::TetEditor(std::vector<Vec3> points, const std::vector<Tet>& list) : x
     for (const Index v : t) boundary[v] = 1;
 }
 
+double TetEditor::volume_m3() const {
+  double six = 0;
+  for (std::size_t i = 0; i < tets.size(); ++i) {
+    if (!alive[i]) continue;
+    const Vec3& a = x[tets[i][0]];
+    six += (x[tets[i][1]] - a).cross(x[tets[i][2]] - a).dot(x[tets[i][3]] - a);
+  }
+  return six / 6;
+}
+
+void TetEditor::measure_sizes() {
+  for (std::size_t v = 0; v < x.size(); ++v) {
+    if (star[v].empty()) continue;
+    const auto around = neighbours(static_cast<Index>(v));
+    double sum = 0;
+    for (const Index w : around) sum += (x[v] - x[w]).norm();
+    size_m[v] = sum / double(around.size());
+    drift_m[v] = 0;
+  }
+}
+
 double TetEditor::quality_of(const Tet& t) const { return tet_quality(x[t[0]], x[t[1]], x[t[2]], x[t[3]]); }
 
 Index TetEditor::add(const Tet& t) {

@@ -29,6 +29,9 @@ class TetEditor {
   std::vector<std::vector<Index>> star;  ///< vertex -> its tetrahedra
 
   Index count() const { return count_; }
+  double volume_m3() const;
+  /// Makes the mean of the edges at a vertex its wished length, and forgets what merges cut off.
+  void measure_sizes();
   double quality_of(const Tet& t) const;
   double star_quality(Index v) const;
   /// Smallest quality of the star with v at another place; stops early when it falls to `enough` or below.

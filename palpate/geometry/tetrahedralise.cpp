@@ -20,60 +20,72 @@
 namespace palpate::geometry {
 namespace {
 
-/// Volume within the winding number's one half, by counting points; good to some percent, which is all a first guess needs.
+/// Volume within the winding number's one half, by counting points: to some five percent.
 double counted_volume(const Solid& solid) {
-  constexpr int count = 3000;
+  constexpr int enough = 400, most = 40000;
   std::mt19937 rng(3);
   std::uniform_real_distribution<double> u;
   const Vec3 extent = solid.max_m() - solid.min_m();
-  int inside = 0;
-  for (int i = 0; i < count; ++i) inside += solid.inside(solid.min_m() + extent.cwiseProduct(Vec3(u(rng), u(rng), u(rng))));
+  int inside = 0, count = 0;
+  for (; count < most && inside < enough; ++count)
+    inside += solid.inside(solid.min_m() + extent.cwiseProduct(Vec3(u(rng), u(rng), u(rng))));
   return extent.prod() * inside / count;
 }
 
-/// Is there an inside at all, right behind the surface?
-bool encloses_something(const Solid& solid, const SurfaceSamples& samples) {
-  std::size_t behind = 0;
+/// Is there an inside at all, right behind the surface? An open sheet has one behind its hollow sides only.
+bool encloses_something(const Solid& solid, const SurfaceSamples& samples, int asked_for) {
+  if (!solid.watertight() && double(samples.evenly) < 0.6 * asked_for) return false;
+  std::size_t behind = 0, asked = 0;
   const double step = 1e-4 * solid.diagonal_m();
-  for (std::size_t i = 0; i < samples.evenly; i += 7) behind += solid.inside(samples.point[i] - step * samples.normal[i]);
-  return behind > samples.evenly / 7 / 20;
+  for (std::size_t i = 0; i < samples.evenly; i += 7, ++asked)
+    behind += solid.inside(samples.point[i] - step * samples.normal[i]);
+  return double(behind) > 0.6 * double(asked);
 }
 
 struct Draft {
   TetEditor mesh;
   Index dropped = 0;
   double dropped_share = 0;
+  double volume_m3 = 0;
 };
 
-bool is_small(const TetEditor::Pieces& pieces, Index id, double share) {
-  const auto& v = pieces.volume_m3;
-  const double largest = *std::max_element(v.begin(), v.end());
-  return v[id] < largest && v[id] < share * std::accumulate(v.begin(), v.end(), 0.0);
-}
+/// Pieces of a mesh that hold less than a share of its volume.
+struct SmallPieces {
+  TetEditor::Pieces pieces;
+  double all_m3 = 0, largest_m3 = 0, share = 0;
+
+  SmallPieces(const TetEditor& mesh, double most_share) : pieces(mesh.pieces()), share(most_share) {
+    const auto& v = pieces.volume_m3;
+    all_m3 = std::accumulate(v.begin(), v.end(), 0.0);
+    largest_m3 = *std::max_element(v.begin(), v.end());
+  }
+  bool contain(Index piece) const {
+    return pieces.volume_m3[piece] < largest_m3 && pieces.volume_m3[piece] < share * all_m3;
+  }
+};
 
 /// Corners of small pieces, with the edge length there. Specks are not worth being tied to the rest.
 std::vector<std::pair<Vec3, double>> loose_points(const TetEditor& mesh, double share) {
   constexpr double speck = 1e-5;
-  const auto pieces = mesh.pieces();
-  const double all = std::accumulate(pieces.volume_m3.begin(), pieces.volume_m3.end(), 0.0);
+  const SmallPieces small(mesh, share);
   std::vector<std::pair<Vec3, double>> out;
   std::vector<char> done(mesh.x.size(), 0);
   for (std::size_t t = 0; t < mesh.tets.size(); ++t)
-    if (mesh.alive[t] && pieces.volume_m3[pieces.of[t]] > speck * all && is_small(pieces, pieces.of[t], share))
+    if (mesh.alive[t] && small.contain(small.pieces.of[t]) && small.pieces.volume_m3[small.pieces.of[t]] > speck * small.all_m3)
       for (const Index v : mesh.tets[t])
         if (!std::exchange(done[v], 1)) out.emplace_back(mesh.x[v], mesh.size_m[v]);
   return out;
 }
 
-std::pair<Index, double> drop_small_pieces(TetEditor& mesh, double share) {
-  const auto pieces = mesh.pieces();
-  std::pair<Index, double> dropped{0, 0.0};
-  for (Index id = 0; id < static_cast<Index>(pieces.volume_m3.size()); ++id)
-    if (is_small(pieces, id, share)) ++dropped.first, dropped.second += pieces.volume_m3[id];
-  for (Index t = 0; t < static_cast<Index>(mesh.tets.size()); ++t)
-    if (mesh.alive[t] && is_small(pieces, pieces.of[t], share)) mesh.remove_tet(t);
-  dropped.second /= std::accumulate(pieces.volume_m3.begin(), pieces.volume_m3.end(), 0.0);
-  return dropped;
+void drop_small_pieces(Draft& draft, double share) {
+  const SmallPieces small(draft.mesh, share);
+  double lost = 0;
+  for (Index id = 0; id < static_cast<Index>(small.pieces.volume_m3.size()); ++id)
+    if (small.contain(id)) ++draft.dropped, lost += small.pieces.volume_m3[id];
+  for (Index t = 0; t < static_cast<Index>(draft.mesh.tets.size()); ++t)
+    if (draft.mesh.alive[t] && small.contain(small.pieces.of[t])) draft.mesh.remove_tet(t);
+  draft.dropped_share = lost / small.all_m3;
+  draft.volume_m3 = small.all_m3 - lost;
 }
 
 /// Longest edge that the caller wants at a place.
@@ -84,11 +96,15 @@ double finest_near(const TetrahedraliseOptions& o, const Vec3& p) {
   return edge;
 }
 
-std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, const TetrahedraliseOptions& o, double cell) {
+/// Empty where the lattice catches nothing of the solid, or takes too many tetrahedra to follow it: `unaffordable` then.
+std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, const TetrahedraliseOptions& o, double cell,
+                           bool& unaffordable) {
   Lattice lattice(solid, cell);
-  lattice.refine_to_surface(samples, o.detail * cell, cell / o.finest);
+  const std::size_t affordable = o.edge_m > 0 ? 20000000 : 100000 + 30 * std::size_t(o.tetrahedra);
+  unaffordable = !lattice.refine_to_surface(samples, o.detail * cell, cell / o.finest, affordable);
+  if (unaffordable) return std::nullopt;
   if (!o.finer.empty()) lattice.refine_to_size([&](const Vec3& p) { return finest_near(o, p); });
-  Draft out{cut_lattice(lattice, solid), 0, 0};
+  Draft out{cut_lattice(lattice, solid), 0, 0, 0};
   if (out.mesh.count() == 0) return std::nullopt;
   // thin parts that the lattice tears into pieces get a finer one around the pieces, as long as that brings them together
   constexpr double small = 0.01;
@@ -104,10 +120,31 @@ std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, co
     });
     out.mesh = cut_lattice(lattice, solid);
   }
-  std::tie(out.dropped, out.dropped_share) = drop_small_pieces(out.mesh, small);
+  drop_small_pieces(out, small);
   out.mesh.coarse_m = cell;
   if (o.improve) merge_short_edges(out.mesh, solid, 0.5, 0.05);
   return out;
+}
+
+/// Improvement may leave the surface by some share of an edge. Where the solid is thinner than an edge is long, its width
+/// counts instead: walls would swell otherwise.
+void mind_walls(TetEditor& mesh, const Solid& solid, double mean_wall_m) {
+  mesh.coarse_m = std::min(mesh.coarse_m, 2 * mean_wall_m);
+  for (std::size_t v = 0; v < mesh.x.size(); ++v) {
+    if (!mesh.boundary[v] || mesh.star[v].empty()) continue;
+    const ClosestPoint foot = solid.closest(mesh.x[v]);
+    const Vec3 inward = -solid.normal(foot.triangle);
+    const double skin = 1e-3 * mesh.size_m[v];
+    if (const auto other = solid.tree().cast(foot.point_m + skin * inward, inward, mesh.size_m[v]))
+      mesh.size_m[v] = std::max(0.5 * mesh.size_m[v], other->range_m + skin);
+  }
+}
+
+double worst_quality(const TetEditor& mesh) {
+  double q = 1;
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    if (mesh.alive[t]) q = std::min(q, mesh.quality[t]);
+  return q;
 }
 
 /// Share of the boundary's area that lies far from every input triangle.
@@ -159,8 +196,9 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   out.flipped_triangles = solid.orientation().flipped;
   out.warnings = out.surface.findings;
 
-  const SurfaceSamples samples = sample_surface(solid, 10000);
-  if (!encloses_something(solid, samples))
+  constexpr int sample_count = 10000;
+  const SurfaceSamples samples = sample_surface(solid, sample_count);
+  if (!encloses_something(solid, samples, sample_count))
     throw Error("the surface encloses nothing: there is no inside to fill. Close it, or complete it first", "surface");
   const double reference = solid.watertight() ? solid.signed_volume_m3() - samples.buried_m3 : counted_volume(solid);
   const double volume = std::max(reference, 1e-4 * (solid.max_m() - solid.min_m()).prod());
@@ -169,28 +207,54 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   double cell = o.edge_m > 0 ? o.edge_m / 0.93 : std::cbrt(12 * volume / o.tetrahedra) * 1.2;
   const double shrinks = 0.95;  // improvement merges some more
   constexpr int attempts = 5;
+  // walls that a lattice tears cost volume, which is known of closed surfaces and guessed of others
+  const auto torn = [&](double volume_m3, double share) {
+    return reference > 0 && std::abs(volume_m3 / reference - 1) > (solid.watertight() ? share : share + 0.2);
+  };
   std::optional<Draft> best;
-  double best_ratio = 0;
+  double best_ratio = 0, intact_cell = cell;
   for (int attempt = 0; attempt < attempts; ++attempt) {
     if (progress && !progress("lattice", double(attempt) / attempts)) out.cancelled = true;
-    auto fresh = draft(solid, samples, o, cell);
+    bool unaffordable = false;
+    auto fresh = draft(solid, samples, o, cell, unaffordable);
+    if (o.edge_m > 0) {
+      best = std::move(fresh);
+      break;
+    }
+    if (fresh && torn(fresh->volume_m3, 0.05)) fresh.reset();
+    if (unaffordable || (!fresh && best)) break;  // nothing finer can be had, nothing coarser holds together
     const double ratio = fresh ? shrinks * fresh->mesh.count() / o.tetrahedra : 0.2;
-    if (fresh && (best_ratio < 1 ? ratio > best_ratio : ratio >= 1)) best = std::move(fresh), best_ratio = ratio;
-    if ((best && o.edge_m > 0) || (ratio > 0.95 && ratio < 5) || out.cancelled) break;
+    if (fresh && (best_ratio < 1 ? ratio > best_ratio : ratio >= 1))
+      best = std::move(fresh), best_ratio = ratio, intact_cell = cell;
+    if ((ratio > 0.95 && ratio < 5) || out.cancelled) break;
     cell *= std::pow(std::clamp(ratio / 1.25, 0.2, 3.0), 0.43);
   }
-  if (!best)
-    throw Error(fmt::format("the object is thinner everywhere than {} tetrahedra can show; ask for more", o.tetrahedra),
-                "surface");
+  const double wall = 2 * std::max(reference, 1e-9 * volume) / solid.area_m2();
+  const auto too_thin = [&] {
+    return Error(fmt::format("its walls, {:.2g} m thick on average, are too thin for {} tetrahedra; walls of that width and size "
+                             "take some {:.1g}",
+                             wall, o.tetrahedra, std::max(2.0 * o.tetrahedra, 0.4 * solid.area_m2() / (wall * wall))),
+                 "surface");
+  };
+  if (!best) throw too_thin();
   if (best_ratio > 1.05 && o.edge_m == 0 && o.improve && !out.cancelled) {
-    CoarsenOptions fewer{static_cast<Index>(o.tetrahedra / shrinks), 0.1 * cell, {}};
+    CoarsenOptions fewer{static_cast<Index>(o.tetrahedra / shrinks), 0.1 * intact_cell, {}};
     if (!o.finer.empty()) fewer.edge_m = [&](const Vec3& p) { return finest_near(o, p); };
     fit_to_surface(best->mesh, solid, samples, 0.1);  // sharp edges are cut off by the lattice: first find them again
     coarsen(best->mesh, solid, samples, fewer);
+    if (best->mesh.count() > 4 * o.tetrahedra) throw too_thin();
   }
+  if (o.improve && reference > 0 && wall < 0.5 * intact_cell) mind_walls(best->mesh, solid, wall);  // a shell
   if (o.improve && !out.cancelled) out.cancelled = !improve(best->mesh, solid, samples, {}, progress);
 
   constexpr double usable = 0.3;  // 17 to 134 degrees
+  if (o.improve && !out.cancelled && worst_quality(best->mesh) < usable) {  // walls that swell are the lesser evil
+    best->mesh.coarse_m = intact_cell;
+    best->mesh.measure_sizes();
+    ImproveOptions last;
+    last.most_rounds = 0;
+    out.cancelled = !improve(best->mesh, solid, samples, last, progress);
+  }
   if (o.improve && !out.cancelled && meet_sharp_edges(best->mesh, solid, usable)) {
     fit_to_surface(best->mesh, solid, samples, usable);  // faces had bulged in place of the edges
     meet_sharp_edges(best->mesh, solid, usable);
@@ -198,6 +262,8 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
 
   out.mesh = best->mesh.compact();
   out.check = check_volume(out.mesh);
+  if (o.edge_m == 0 && !out.cancelled && (torn(out.check.volume_m3, 0.1) || out.check.tetrahedra > 4 * o.tetrahedra))
+    throw too_thin();
   const TriMesh boundary = boundary_surface(out.mesh).surface;
   if (known_volume) out.volume_error = out.check.volume_m3 / reference - 1;
   const CountedPoints seen = not_buried(surface, solid);
@@ -223,6 +289,9 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     warn("dropped_pieces",
          fmt::format("{} small piece{} ({:.2g} % of the volume), cut off by thin or open parts, {} left out", best->dropped,
                      best->dropped == 1 ? "" : "s", 100 * best->dropped_share, best->dropped == 1 ? "was" : "were"));
+  if (o.edge_m == 0 && out.check.tetrahedra > 1.5 * o.tetrahedra)
+    warn("more_than_asked", fmt::format("{} tetrahedra and not {}: with fewer the thin parts would lose their shape",
+                                        out.check.tetrahedra, o.tetrahedra));
   for (const Finding& f : out.check.findings)
     if (f.code != "units") out.warnings.push_back(f);
   if (out.volume_error && std::abs(*out.volume_error) > 0.03)

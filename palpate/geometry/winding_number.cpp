@@ -15,6 +15,8 @@ double solid_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double la = a.norm(), lb = b.norm(), lc = c.norm();
   const double numerator = a.dot(b.cross(c));
   const double denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+  // on the triangle itself: half a turn to either side, their mean
+  if (denominator < 0 && std::abs(numerator) < 1e-12 * la * lb * lc) return 0;
   return std::atan2(numerator, denominator) / (2 * M_PI);
 }
 

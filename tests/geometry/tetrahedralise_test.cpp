@@ -216,6 +216,32 @@ TEST(Tetrahedralise, overlapping_pieces_become_their_union) {
   EXPECT_LT(std::abs(*r.volume_error), 0.01);
 }
 
+TEST(Tetrahedralise, parts_with_faces_in_one_plane_are_counted_once) {
+  // an L of two bars that overlap in the corner and have four faces there in common
+  const auto r = with(shapes::join(shapes::box(Vec3(0.1, 0.02, 0.02)), shapes::box(Vec3(0.02, 0.1, 0.02))), 2000);
+  expect_usable(r);
+  EXPECT_NEAR(r.check.volume_m3, 7.2e-5, 0.01 * 7.2e-5);
+  ASSERT_TRUE(r.volume_error);
+  EXPECT_LT(std::abs(*r.volume_error), 0.01);
+}
+
+/// A ball of 5 cm with a wall.
+TriMesh hollow_ball(double wall) {
+  TriMesh inner = shapes::sphere(0.05 - wall, 4);
+  inner.triangles.col(1).swap(inner.triangles.col(2));
+  return shapes::join(shapes::sphere(0.05, 4), inner);
+}
+
+TEST(Tetrahedralise, thin_walls_stay_whole_or_are_refused) {
+  const auto r = with(hollow_ball(0.003), 4000);  // more than asked where it takes more
+  expect_usable(r);
+  EXPECT_EQ(r.check.components, 1);
+  EXPECT_LT(std::abs(*r.volume_error), 0.1);
+  EXPECT_LT(r.hausdorff_m, 0.02 * r.surface.diagonal_m());
+  EXPECT_THAT(message_of([] { with(hollow_ball(0.00005), 3000); }), HasSubstr("too thin for 3000 tetrahedra"));
+  EXPECT_THAT(message_of([] { with(shapes::box(Vec3(0.2, 0.2, 0.0001)), 3000); }), HasSubstr("too thin for 3000 tetrahedra"));
+}
+
 TEST(Tetrahedralise, an_inner_shell_that_faces_inward_is_a_cavity_and_all_inside_out_is_turned) {
   TriMesh inner = shapes::sphere(0.03, 3);
   inner.triangles.col(0).swap(inner.triangles.col(1));
@@ -253,6 +279,16 @@ TEST(Tetrahedralise, is_finer_where_asked) {
 TEST(Tetrahedralise, refuses_what_has_no_inside) {
   const TriMesh plane = shapes::make({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}});
   EXPECT_THAT(message_of([&] { tetrahedralise(plane); }), HasSubstr("encloses nothing"));
+  std::vector<Vec3> waves;  // hollow on both sides here and there
+  std::vector<std::array<Index, 3>> sheet;
+  constexpr Index n = 30;
+  for (Index i = 0; i < n; ++i)
+    for (Index j = 0; j < n; ++j) {
+      waves.emplace_back(0.1 * i / n, 0.1 * j / n, 0.02 * std::sin(6.0 * i / n) * std::cos(5.0 * j / n));
+      const Index a = n * i + j;
+      if (i + 1 < n && j + 1 < n) sheet.insert(sheet.end(), {{a, a + n, a + 1}, {a + 1, a + n, a + n + 1}});
+    }
+  EXPECT_THAT(message_of([&] { tetrahedralise(shapes::make(waves, sheet)); }), HasSubstr("encloses nothing"));
   EXPECT_THAT(message_of([&] {
                 tetrahedralise(shapes::make({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}));
               }),
