@@ -58,6 +58,7 @@ reconstruction::BuiltObject build(const Options& o, Session& session) {
   reconstruction::BuildOptions options;
   if (o.tetrahedra > 0) options.mesh.tetrahedra = o.tetrahedra;
   options.mesh.edge_m = o.edge_m;
+  options.fine_surface = true;
   if (!o.finer.empty()) options.mesh.finer = {{Vec3(o.finer[0], o.finer[1], o.finer[2]), o.finer[3], o.finer[4]}};
   if (std::filesystem::is_directory(o.input)) return build_from_recording(o, options, session);
   io::MeshData data = io::read_mesh(o.input);
@@ -83,7 +84,8 @@ int run(const Options& o, Session& session) {
   const std::filesystem::path folder = o.output;
   std::filesystem::create_directories(folder);
   for (const char* name : {"model.vtu", "model.msh", "model.vtk"}) io::write_mesh(folder / name, built.model.volume);
-  io::write_mesh(folder / "surface.ply", built.model.surface);
+  const TriMesh& surface = built.fine_surface.triangles.rows() > 0 ? built.fine_surface : built.model.surface;
+  io::write_mesh(folder / "surface.ply", surface);
   io::write_file(folder / "model.png", report::encode_png(report::draw_mesh(built.model.volume, 1200, 600)));
 
   const auto& c = built.check;
@@ -122,7 +124,8 @@ Run verbs::model(CLI::App& app) {
                  "mesh file: a surface (OBJ, STL, PLY, ...), however broken, or a volume (MSH, VTK, VTU); or a recording")
       ->required();
   app.add_option("-o,--out,--output", o->output,
-                 "folder for model.vtu, model.msh, model.vtk, model.png (a picture) and surface.ply")
+                 "folder for model.vtu, model.msh, model.vtk, model.png (a picture) and surface.ply (of views: fused, watertight and "
+                 "finer than the tetrahedra)")
       ->required();
   app.add_option("--tetrahedra", o->tetrahedra, "wished number of tetrahedra; 0 keeps those of a volume as they are")
       ->type_name("N")

@@ -11,6 +11,7 @@
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/reconstruction/fused_surface.hpp"
 #include "palpate/registration/views.hpp"
 
 namespace palpate::reconstruction {
@@ -204,6 +205,14 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   out.model.surface = geometry::boundary_surface(out.model.volume).surface;
   out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
   hand_on_uncertainty(out, fused);
+  if (options.fine_surface) {
+    const geometry::TriangleTree boundary(out.model.surface);
+    SurfaceOptions fine;
+    if (floating > 0)
+      fine.belongs = [&](const Vec3& p) { return boundary.within(p, std::pow(2 * fused.cell_m, 2)); };
+    out.fine_surface = fused_surface(fused, fine);
+    out.fine_embedding = geometry::embed(out.fine_surface.vertices_m, out.model.volume);
+  }
   out.view_correction = std::move(correction);
   // the plane's share was not seen either
   const double all = fused.seen_area_m2 + fused.support_area_m2;

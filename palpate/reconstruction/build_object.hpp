@@ -11,6 +11,7 @@ namespace palpate::reconstruction {
 struct BuildOptions {
   geometry::TetrahedraliseOptions mesh;  ///< of a surface that has to be filled
   bool align_views = true;  ///< correct the poses of views that have a prior spread (PointCloud::pose_std_*), all at once
+  bool fine_surface = false;  ///< of views: also make BuiltObject::fine_surface (half a second)
 };
 
 struct BuiltObject {
@@ -23,6 +24,10 @@ struct BuiltObject {
   /// surface was given. Where nothing was seen: half of the distance to the nearest part that was, for the completion may be
   /// anywhere up to there.
   VectorX surface_sigma_m;
+  /// Watertight, finer than the boundary of the volume and nearer to what was seen (see fused_surface), and how the volume
+  /// carries it along.
+  TriMesh fine_surface;
+  SurfaceEmbedding fine_embedding;
   std::vector<char> seen;  ///< a vertex of model.surface: 1 where a sensor saw it; empty where it was given
   std::vector<Pose>
       view_correction;  ///< applied to each view on the left before fusing; empty when poses were taken as known

@@ -1,0 +1,96 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/reconstruction/fused_surface.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "palpate/core/error.hpp"
+#include "palpate/geometry/embedding.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/reconstruction/build_object.hpp"
+
+namespace palpate::reconstruction {
+namespace {
+
+/// Points of a ball with normals, evenly spread; noise along the normals. Those with `z` above the limit only.
+PointCloud ball(double radius, const Vec3& centre, int count, double sigma, double above = -1) {
+  std::mt19937 rng(3);
+  std::normal_distribution<double> g;
+  PointCloud c;
+  c.points_m.resize(count, 3);
+  c.normals.resize(count, 3);
+  for (int i = 0; i < count; ++i) {
+    const double z = above + (1 - above) * (i + 0.5) / count, turn = 2.399963 * i, r = std::sqrt(1 - z * z);
+    const Vec3 n(r * std::cos(turn), r * std::sin(turn), z);
+    c.points_m.row(i) = (centre + (radius + sigma * g(rng)) * n).transpose();
+    c.normals.row(i) = n.transpose();
+  }
+  c.sigma_m = VectorX::Constant(1, sigma);
+  return c;
+}
+
+/// Largest and root-mean-square distance of the vertices from the ball.
+std::pair<double, double> off_ball(const TriMesh& m, double radius) {
+  const Eigen::ArrayXd d = m.vertices_m.rowwise().norm().array() - radius;
+  return {d.abs().maxCoeff(), std::sqrt(d.square().mean())};
+}
+
+TEST(FusedSurface, of_a_ball_is_watertight_and_does_not_bulge) {
+  constexpr double radius = 0.05;
+  FuseOptions o;
+  o.cell_m = 0.006;  // wide for the curvature: means of planes alone would lie 0.1 mm too far out
+  const FusedViews fused = fuse_views({ball(radius, Vec3::Zero(), 40000, 0)}, o);
+  const TriMesh m = fused_surface(fused);
+  const auto check = geometry::check_surface(m);
+  EXPECT_TRUE(check.watertight());
+  EXPECT_EQ(check.components, 1);
+  EXPECT_EQ(check.pinched_vertices, 0);
+  ASSERT_TRUE(check.volume_m3);
+  EXPECT_GT(*check.volume_m3, 0);
+  EXPECT_LT(off_ball(m, radius).second, 5e-5);
+  const double mean = m.vertices_m.rowwise().norm().mean() - radius;
+  EXPECT_LT(std::abs(mean), 3e-5);
+}
+
+TEST(FusedSurface, averages_noise_and_closes_what_nobody_saw) {
+  constexpr double radius = 0.06, sigma = 0.0012;
+  const FusedViews fused = fuse_views({ball(radius, Vec3::Zero(), 40000, sigma, -0.9)});  // a hole of 25 degrees below
+  const TriMesh m = fused_surface(fused);
+  EXPECT_TRUE(geometry::check_surface(m).watertight());
+  double seen = 0;
+  Index count = 0;
+  for (Index v = 0; v < m.vertices_m.rows(); ++v)
+    if (m.vertices_m(v, 2) > -0.8 * radius) seen += std::pow(m.vertices_m.row(v).norm() - radius, 2), ++count;
+  EXPECT_LT(std::sqrt(seen / count), 0.2 * sigma);
+  EXPECT_LT(off_ball(m, radius).first, 0.1 * radius);  // the missing cap is a tenth of the radius high
+}
+
+TEST(FusedSurface, rides_on_the_volume_without_what_floats_beside_it) {
+  BuildOptions o;
+  o.mesh.tetrahedra = 1500;
+  o.fine_surface = true;
+  const auto built =
+      build_object({ball(0.05, Vec3::Zero(), 20000, 0.0003), ball(0.02, Vec3(0.1, 0, 0), 5000, 0.0003)}, {}, {}, o);
+  const auto check = geometry::check_surface(built.fine_surface);
+  EXPECT_TRUE(check.watertight());
+  EXPECT_EQ(check.components, 1);
+  EXPECT_LT(off_ball(built.fine_surface, 0.05).second, 0.0002);
+  EXPECT_GT(built.fine_surface.triangles.rows(), 3 * built.model.surface.triangles.rows());
+  ASSERT_EQ(built.fine_embedding.element.size(), built.fine_surface.vertices_m.rows());
+  const Points stretched = 1.1 * built.model.volume.nodes_m;
+  const Eigen::MatrixXd carried = geometry::embedded_points(built.fine_embedding, built.model.volume, stretched);
+  EXPECT_LT((carried - 1.1 * built.fine_surface.vertices_m).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST(FusedSurface, says_what_is_missing) {
+  EXPECT_THROW(fused_surface({}), Error);
+  const FusedViews fused = fuse_views({ball(0.05, Vec3::Zero(), 20000, 0)});
+  EXPECT_THROW(fused_surface(fused, {-1, {}}), Error);
+  EXPECT_THROW(fused_surface(fused, {0.005, [](const Vec3&) { return false; }}), Error);
+}
+
+}  // namespace
+}  // namespace palpate::reconstruction
