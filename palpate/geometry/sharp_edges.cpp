@@ -81,6 +81,34 @@ std::optional<Vec3> place_of(const Vec3& at, const std::set<Index>& between, con
   return best;
 }
 
+/// Puts into every corner where large parts meet the vertex near it that takes it best.
+bool meet_corners(TetEditor& mesh, const Parts& parts, double floor_quality) {
+  std::vector<Index> outer;
+  for (std::size_t v = 0; v < mesh.x.size(); ++v)
+    if (mesh.boundary[v] && !mesh.star[v].empty()) outer.push_back(static_cast<Index>(v));
+  bool any = false;
+  for (const auto& [corner, meeting] : parts.corners) {
+    Index best = -1;
+    double quality = 0;
+    bool taken = false;
+    for (const Index v : outer) {
+      const double size = mesh.size_m[v], far = (mesh.x[v] - corner).norm();
+      taken = far < 1e-9 * size;
+      if (taken) break;
+      const bool large = std::all_of(meeting.begin(), meeting.end(),
+                                     [&](Index part) { return parts.area_m2[part] > 4 * size * size; });
+      if (far > reach * size || !large) continue;
+      const double least = std::min(mesh.star_quality(v), floor_quality) - 1e-12;
+      const double fresh = mesh.star_quality_at(v, corner, std::max(least, quality));
+      if (fresh > std::max(least, quality)) best = v, quality = fresh;
+    }
+    if (taken || best < 0) continue;
+    mesh.move(best, corner);
+    any = true;
+  }
+  return any;
+}
+
 }  // namespace
 
 bool meet_sharp_edges(TetEditor& mesh, const Solid& solid, double floor_quality) {
@@ -100,7 +128,7 @@ bool meet_sharp_edges(TetEditor& mesh, const Solid& solid, double floor_quality)
       const bool near = q.squared_distance_m2 < 0.25 * size * size, large = parts.area_m2[parts.of[q.triangle]] > 4 * size * size;
       for (const Index v : t) between[v].insert(along && near && large ? parts.of[q.triangle] : none);
     }
-    bool moved = false;
+    bool moved = meet_corners(mesh, parts, floor_quality);
     for (std::size_t v = 0; v < mesh.x.size(); ++v) {
       if (between[v].size() < 2 || between[v].count(none) > 0) continue;
       const auto id = static_cast<Index>(v);

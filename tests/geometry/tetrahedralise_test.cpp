@@ -107,6 +107,17 @@ TEST(Tetrahedralise, boxes_keep_their_edges_where_the_mesh_is_coarse) {
   }
 }
 
+TEST(Tetrahedralise, corners_of_boxes_are_nodes) {
+  for (const Vec3& size : {Vec3(0.1, 0.1, 0.1), Vec3(0.2, 0.1, 0.1), Vec3(0.3, 0.2, 0.1), Vec3(1, 1, 0.1)}) {
+    const TriMesh box = shapes::box(size);
+    const auto r = with(box, 1000);
+    expect_usable(r);
+    for (Index v = 0; v < 8; ++v)
+      EXPECT_LT((r.mesh.nodes_m.rowwise() - box.vertices_m.row(v)).rowwise().norm().minCoeff(), 1e-12)
+          << size.transpose() << ", corner " << v;
+  }
+}
+
 TEST(Tetrahedralise, thin_spikes_and_sharp_edges_survive_with_few_elements) {
   // a star of twelve arms: its edges are sharper than the elements that its volume alone would get
   std::vector<Vec3> v;
