@@ -222,7 +222,8 @@ bool Lattice::misses(Index tet) const {
   return n > 0 && solid_.closest(sum / n).squared_distance_m2 > tolerance_m_ * tolerance_m_;
 }
 
-bool Lattice::refine_to_surface(const SurfaceSamples& samples, double tolerance_m, double smallest_edge_m, std::size_t most) {
+bool Lattice::refine_to_surface(const SurfaceSamples& samples, double tolerance_m, double smallest_edge_m,
+                                std::size_t most) {
   sample_set_ = &samples;
   tolerance_m_ = tolerance_m;
   // into the tetrahedra: the cubes of the lattice's corners are searched over their middles' four by three tetrahedra

@@ -17,8 +17,8 @@ constexpr double reach = 0.7;     // of the wished edge: further a vertex does n
 
 /// Smooth parts of a surface, and the edges between them.
 struct Parts {
-  std::vector<Index> of;       // a triangle
-  std::vector<double> area_m2;  // a part
+  std::vector<Index> of;                                                        // a triangle
+  std::vector<double> area_m2;                                                  // a part
   std::map<std::pair<Index, Index>, std::vector<std::pair<Vec3, Vec3>>> edges;  // of two parts, the lower first
   std::vector<std::pair<Vec3, std::set<Index>>> corners;                        // where three or more meet
 };
@@ -28,7 +28,8 @@ Parts parts_of(const Solid& solid) {
   const auto triangles = static_cast<Index>(surface.triangles.rows());
   std::map<std::pair<Index, Index>, std::vector<Index>> at_edge;
   for (Index t = 0; t < triangles; ++t)
-    for (int k = 0; k < 3; ++k) at_edge[std::minmax<Index>(surface.triangles(t, k), surface.triangles(t, (k + 1) % 3))].push_back(t);
+    for (int k = 0; k < 3; ++k)
+      at_edge[std::minmax<Index>(surface.triangles(t, k), surface.triangles(t, (k + 1) % 3))].push_back(t);
 
   std::vector<Index> up(static_cast<std::size_t>(triangles));
   std::iota(up.begin(), up.end(), 0);
@@ -52,7 +53,8 @@ Parts parts_of(const Solid& solid) {
   for (const auto& [edge, both] : at_edge) {
     if (both.size() != 2 || parts.of[both[0]] == parts.of[both[1]]) continue;
     const auto pair = std::minmax(parts.of[both[0]], parts.of[both[1]]);
-    parts.edges[pair].emplace_back(surface.vertices_m.row(edge.first).transpose(), surface.vertices_m.row(edge.second).transpose());
+    parts.edges[pair].emplace_back(surface.vertices_m.row(edge.first).transpose(),
+                                   surface.vertices_m.row(edge.second).transpose());
     for (const Index v : {edge.first, edge.second}) at_vertex[v].insert({pair.first, pair.second});
   }
   for (const auto& [v, meeting] : at_vertex)
@@ -95,8 +97,8 @@ bool meet_corners(TetEditor& mesh, const Parts& parts, double floor_quality) {
       const double size = mesh.size_m[v], far = (mesh.x[v] - corner).norm();
       taken = far < 1e-9 * size;
       if (taken) break;
-      const bool large = std::all_of(meeting.begin(), meeting.end(),
-                                     [&](Index part) { return parts.area_m2[part] > 4 * size * size; });
+      const bool large =
+          std::all_of(meeting.begin(), meeting.end(), [&](Index part) { return parts.area_m2[part] > 4 * size * size; });
       if (far > reach * size || !large) continue;
       const double least = std::min(mesh.star_quality(v), floor_quality) - 1e-12;
       const double fresh = mesh.star_quality_at(v, corner, std::max(least, quality));
@@ -125,7 +127,8 @@ bool meet_sharp_edges(TetEditor& mesh, const Solid& solid, double floor_quality)
       const ClosestPoint q = solid.closest((a + b + c) / 3, hint);
       hint = q.triangle;
       const bool along = (b - a).cross(c - a).normalized().dot(solid.normal(q.triangle)) > 0.5;
-      const bool near = q.squared_distance_m2 < 0.25 * size * size, large = parts.area_m2[parts.of[q.triangle]] > 4 * size * size;
+      const bool near =
+          q.squared_distance_m2<0.25 * size * size, large = parts.area_m2[parts.of[q.triangle]]> 4 * size * size;
       for (const Index v : t) between[v].insert(along && near && large ? parts.of[q.triangle] : none);
     }
     bool moved = meet_corners(mesh, parts, floor_quality);

@@ -15,10 +15,10 @@ namespace palpate::geometry {
 /// A triangle soup with all triangles turned outward: welded, without copies and triangles without area.
 struct OrientedSurface {
   TriMesh mesh;
-  Index flipped = 0;  ///< triangles that were turned round
-  Index dropped = 0;  ///< copies and triangles without area
-  Index patches = 0;  ///< pieces across whose edges the orientation could be carried
-  bool closed = false;  ///< triangles run along every edge as often in one direction as in the other
+  Index flipped = 0;                  ///< triangles that were turned round
+  Index dropped = 0;                  ///< copies and triangles without area
+  Index patches = 0;                  ///< pieces across whose edges the orientation could be carried
+  bool closed = false;                ///< triangles run along every edge as often in one direction as in the other
   std::vector<double> cover_width_m;  ///< of the mesh's last triangles, which close small holes: the width of the hole
 };
 
@@ -37,7 +37,9 @@ class Solid {
   /// Distance to the nearest triangle, negative inside.
   double signed_distance(const Vec3& point_m) const;
   ClosestPoint closest(const Vec3& point_m, Index hint = -1) const { return tree_.closest(point_m, hint); }
-  bool within(const Vec3& point_m, double squared_m2, Index hint = -1) const { return tree_.within(point_m, squared_m2, hint); }
+  bool within(const Vec3& point_m, double squared_m2, Index hint = -1) const {
+    return tree_.within(point_m, squared_m2, hint);
+  }
   Vec3 normal(Index triangle) const { return normals_.row(triangle).transpose(); }
   /// Where the segment from an inside to an outside point leaves the solid, as a share of its length.
   double leaves(const Vec3& inside_m, const Vec3& outside_m) const;
@@ -48,7 +50,7 @@ class Solid {
   const TriMesh& surface() const { return tree_.mesh(); }
   const TriangleTree& tree() const { return tree_; }
   const OrientedSurface& orientation() const { return oriented_; }  ///< without its mesh
-  bool watertight() const { return watertight_; }  ///< once small holes are closed
+  bool watertight() const { return watertight_; }                   ///< once small holes are closed
   /// Width of the hole that this triangle closes; 0 for a given one.
   double hole_width_m(Index triangle) const {
     const auto first = static_cast<Index>(normals_.rows()) - static_cast<Index>(oriented_.cover_width_m.size());

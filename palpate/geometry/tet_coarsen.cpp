@@ -65,7 +65,7 @@ class Coarsener {
     double limit = o_.tolerance_m;
     const double most = 11.4 * limit;  // six times 1.5
     volume_m3_ = m_.volume_m3();
-    limit = std::min(limit, 0.1 * thickness());
+    if (o_.wall_m > 0) limit = std::min(limit, 0.2 * o_.wall_m);
     for (; limit < most && m_.count() > o_.tetrahedra && keeps_volume(); limit *= 1.5)
       while (m_.count() > o_.tetrahedra && keeps_volume())
         if (sweep(limit) < m_.count() / 100 + 1) break;
@@ -83,14 +83,7 @@ class Coarsener {
 
   Vec3 at(Index v) const { return m_.x[v] - origin_; }
 
-  bool keeps_volume() const { return std::abs(m_.volume_m3() / volume_m3_ - 1) < 0.03; }
-
-  /// Of a wall with this volume and surface.
-  double thickness() const {
-    double area = 0;
-    for (const auto& t : m_.all_boundary_triangles()) area += 0.5 * (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).norm();
-    return 2 * volume_m3_ / area;
-  }
+  bool keeps_volume() const { return o_.wall_m <= 0 || std::abs(m_.volume_m3() / volume_m3_ - 1) < 0.03; }
 
   double cost(Index gone, Index kept) const {
     const double length2 = (m_.x[gone] - m_.x[kept]).squaredNorm();

@@ -71,7 +71,8 @@ std::vector<std::pair<Vec3, double>> loose_points(const TetEditor& mesh, double 
   std::vector<std::pair<Vec3, double>> out;
   std::vector<char> done(mesh.x.size(), 0);
   for (std::size_t t = 0; t < mesh.tets.size(); ++t)
-    if (mesh.alive[t] && small.contain(small.pieces.of[t]) && small.pieces.volume_m3[small.pieces.of[t]] > speck * small.all_m3)
+    if (mesh.alive[t] && small.contain(small.pieces.of[t]) &&
+        small.pieces.volume_m3[small.pieces.of[t]] > speck * small.all_m3)
       for (const Index v : mesh.tets[t])
         if (!std::exchange(done[v], 1)) out.emplace_back(mesh.x[v], mesh.size_m[v]);
   return out;
@@ -221,7 +222,7 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
       best = std::move(fresh);
       break;
     }
-    if (fresh && torn(fresh->volume_m3, 0.05)) fresh.reset();
+    if (fresh && torn(fresh->volume_m3, 0.12)) fresh.reset();
     if (unaffordable || (!fresh && best)) break;  // nothing finer can be had, nothing coarser holds together
     const double ratio = fresh ? shrinks * fresh->mesh.count() / o.tetrahedra : 0.2;
     if (fresh && (best_ratio < 1 ? ratio > best_ratio : ratio >= 1))
@@ -231,23 +232,25 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   }
   const double wall = 2 * std::max(reference, 1e-9 * volume) / solid.area_m2();
   const auto too_thin = [&] {
-    return Error(fmt::format("its walls, {:.2g} m thick on average, are too thin for {} tetrahedra; walls of that width and size "
-                             "take some {:.1g}",
-                             wall, o.tetrahedra, std::max(2.0 * o.tetrahedra, 0.4 * solid.area_m2() / (wall * wall))),
-                 "surface");
+    return Error(
+        fmt::format("its walls, {:.2g} m thick on average, are too thin for {} tetrahedra; walls of that width and size "
+                    "take some {:.1g}",
+                    wall, o.tetrahedra, std::max(2.0 * o.tetrahedra, 0.4 * solid.area_m2() / (wall * wall))),
+        "surface");
   };
   if (!best) throw too_thin();
+  const bool shell = reference > 0 && wall < 0.4 * intact_cell;
   if (best_ratio > 1.05 && o.edge_m == 0 && o.improve && !out.cancelled) {
-    CoarsenOptions fewer{static_cast<Index>(o.tetrahedra / shrinks), 0.1 * intact_cell, {}};
+    CoarsenOptions fewer{static_cast<Index>(o.tetrahedra / shrinks), 0.1 * intact_cell, {}, shell ? wall : 0};
     if (!o.finer.empty()) fewer.edge_m = [&](const Vec3& p) { return finest_near(o, p); };
     fit_to_surface(best->mesh, solid, samples, 0.1);  // sharp edges are cut off by the lattice: first find them again
     coarsen(best->mesh, solid, samples, fewer);
     if (best->mesh.count() > 4 * o.tetrahedra) throw too_thin();
   }
-  if (o.improve && reference > 0 && wall < 0.5 * intact_cell) mind_walls(best->mesh, solid, wall);  // a shell
+  if (o.improve && shell) mind_walls(best->mesh, solid, wall);
   if (o.improve && !out.cancelled) out.cancelled = !improve(best->mesh, solid, samples, {}, progress);
 
-  constexpr double usable = 0.3;  // 17 to 134 degrees
+  constexpr double usable = 0.3;                                            // 17 to 134 degrees
   if (o.improve && !out.cancelled && worst_quality(best->mesh) < usable) {  // walls that swell are the lesser evil
     best->mesh.coarse_m = intact_cell;
     best->mesh.measure_sizes();
@@ -262,14 +265,16 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
 
   out.mesh = best->mesh.compact();
   out.check = check_volume(out.mesh);
-  if (o.edge_m == 0 && !out.cancelled && (torn(out.check.volume_m3, 0.1) || out.check.tetrahedra > 4 * o.tetrahedra))
+  const bool flat = out.check.min_dihedral_deg < 15 || out.check.max_dihedral_deg > 150;
+  if (o.edge_m == 0 && o.improve && !out.cancelled &&
+      (torn(out.check.volume_m3, 0.1) || out.check.tetrahedra > 4 * o.tetrahedra || (shell && flat)))
     throw too_thin();
   const TriMesh boundary = boundary_surface(out.mesh).surface;
   if (known_volume) out.volume_error = out.check.volume_m3 / reference - 1;
   const CountedPoints seen = not_buried(surface, solid);
   constexpr int points = 20000;
-  const auto distance = known_volume ? surface_distance(surface, boundary, points, seen)
-                                     : one_sided_distance(surface, boundary, points, seen);
+  const auto distance =
+      known_volume ? surface_distance(surface, boundary, points, seen) : one_sided_distance(surface, boundary, points, seen);
   out.surface_rms_m = distance.rms_m;
   out.hausdorff_m = distance.hausdorff_m;
   if (!known_volume) out.unseen_share = share_over_holes(boundary, solid);
