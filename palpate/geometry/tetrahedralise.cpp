@@ -208,7 +208,9 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   double cell = o.edge_m > 0 ? o.edge_m / 0.93 : std::cbrt(12 * volume / o.tetrahedra) * 1.2;
   const double shrinks = 0.95;  // improvement merges some more
   constexpr int attempts = 5;
-  // walls that a lattice tears cost volume, which is known of closed surfaces and guessed of others
+  const double wall = 2 * std::max(reference, 1e-9 * volume) / solid.area_m2();
+  // walls that a lattice tears cost volume, which is known of closed surfaces and guessed of others; it cuts edges of
+  // slender bars, too
   const auto torn = [&](double volume_m3, double share) {
     return reference > 0 && std::abs(volume_m3 / reference - 1) > (solid.watertight() ? share : share + 0.2);
   };
@@ -222,7 +224,7 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
       best = std::move(fresh);
       break;
     }
-    if (fresh && torn(fresh->volume_m3, 0.12)) fresh.reset();
+    if (fresh && torn(fresh->volume_m3, wall < 0.4 * cell ? 0.05 : 0.12)) fresh.reset();
     if (unaffordable || (!fresh && best)) break;  // nothing finer can be had, nothing coarser holds together
     const double ratio = fresh ? shrinks * fresh->mesh.count() / o.tetrahedra : 0.2;
     if (fresh && (best_ratio < 1 ? ratio > best_ratio : ratio >= 1))
@@ -230,7 +232,6 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     if ((ratio > 0.95 && ratio < 5) || out.cancelled) break;
     cell *= std::pow(std::clamp(ratio / 1.25, 0.2, 3.0), 0.43);
   }
-  const double wall = 2 * std::max(reference, 1e-9 * volume) / solid.area_m2();
   const auto too_thin = [&] {
     return Error(
         fmt::format("its walls, {:.2g} m thick on average, are too thin for {} tetrahedra; walls of that width and size "
