@@ -74,6 +74,8 @@ void check(const FitOptions& options) {
 fem::StaticsOptions statics_options(const Recording& recording, const SimulatedObject& object, const FitOptions& options) {
   fem::StaticsOptions statics;
   statics.threads = options.threads;
+  // A search that comes to a modulus which hardly bears the load does better to turn back than to follow it to the end.
+  statics.max_load_steps = 16;
   // Quadratic tetrahedra lock mildly towards nu = 0.5 (a few per cent of E at 0.49); linear ones are left as they are, since
   // who asks for them has a reason.
   const double largest_nu = recording.model.poisson_fixed.value_or(recording.model.poisson_upper);

@@ -108,18 +108,17 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
     const double moved_m = (start - from->displacement_m).lpNorm<Eigen::Infinity>();
     if (moved_m > 0.2 * from->displacement_m.lpNorm<Eigen::Infinity>()) start = from->displacement_m;
   } else if (s > first_step_of(worker) && steps_[s - 1].push == steps_[s].push && memory_[s - 1].valid) {
-    start = memory_[s - 1].displacement_m;
+    // Little of the load is left after a retreat: nearer to rest than to the step before.
+    const Coefficients before = coefficients(s - 1, body, unknowns);
+    if (!(c.force.norm() <= 0.25 * before.force.norm() && c.motion.norm() <= 0.25 * before.motion.norm()))
+      start = memory_[s - 1].displacement_m;
   }
 
   set_ratios(body, unknowns);
   const double young_pa = std::exp(unknowns(log_young));
-  const auto solve = [&](const VectorX* guess) {
-    auto at = body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion, guess);
-    ++solves_[worker];
-    return at;
-  };
-  fem::Equilibrium at = solve(start.size() > 0 ? &start : nullptr);
-  if (!at.converged && start.size() > 0) at = solve(nullptr);
+  const fem::Equilibrium at =
+      body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion, start.size() > 0 ? &start : nullptr);
+  ++solves_[worker];
   out.converged = at.converged;
   out.reason = at.reason;
   out.inverted_elements = at.inverted_elements;

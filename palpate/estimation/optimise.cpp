@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/fem/materials.hpp"
+
 namespace palpate::estimation {
 namespace {
 
 constexpr double far_prior = 12;         // standard deviations of its prior that no nuisance leaves: the search must come back
-constexpr std::size_t rough_steps = 8;  // of a long recording are enough to come near the optimum
+constexpr double bends_more = 0.25;  // of log E: what linear theory takes a soft body for softer that bends away under its load
+constexpr std::size_t rough_steps = 5;  // of a long recording are enough to come near the optimum
 
 MatrixX pick(const MatrixX& matrix, const std::vector<int>& which) {
   MatrixX out(static_cast<Index>(which.size()), static_cast<Index>(which.size()));
@@ -162,7 +165,13 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
   loss.tukey = 1e6;
   Optimum at;
   at.unknowns = start;
-  const Evaluation first = objective.evaluate(start, loss, progress);
+  Evaluation first = objective.evaluate(start, loss, progress);
+  // Too soft a start does not bear the load.
+  for (int stiffer = 0; !first.usable && first.reason != "cancelled" && stiffer < 4; ++stiffer) {
+    at.unknowns(log_young) = std::min(at.unknowns(log_young) + std::log(2.0), objective.unknowns()[log_young].upper);
+    objective.model().forget();
+    first = objective.evaluate(at.unknowns, loss, progress);
+  }
   if (!first.usable) {
     at.message = first.reason;
     at.termination = first.reason == "cancelled" ? Termination::cancelled : Termination::failed;
@@ -260,14 +269,36 @@ Loss fitting_loss(const Objective& objective, const Loss& loss) {
 
 namespace {
 
+bool is_linear(const ForwardModel& model) { return fem::material_law(model.object().material).is_linear(); }
+
+double force_of(const ForwardModel& model, std::size_t s) {
+  double force_n = 0;
+  for (const Load& load : model.step(s).loads) force_n = std::max(force_n, load.force_n.value_or(Vec3::Zero()).norm());
+  return force_n;
+}
+
 /// A modulus at which the body hardly moves: non-linear materials are then linear too. Not stiffer than that: what a table presses into
 /// the body must stay far above the last digit of its nodes' places.
-double stiff_young_pa(const ForwardModel& model, double size_m) {
+double stiff_young_pa(double force_n, double size_m) {
   constexpr double over_pressure = 1e5;
-  double force_n = 0;
-  for (std::size_t s = 0; s < model.step_count(); ++s)
-    for (const Load& load : model.step(s).loads) force_n = std::max(force_n, load.force_n.value_or(Vec3::Zero()).norm());
   return force_n > 0 ? std::clamp(over_pressure * force_n / (size_m * size_m), 1e6, 1e9) : 1e9;
+}
+
+/// Steps that linear theory is asked about: a few of a long recording say enough. A non-linear body may bulge or dodge under its
+/// full load, and a start that is too soft for it may end on another equilibrium: there, those of up to half the highest force.
+std::vector<std::size_t> steps_to_start_with(const ForwardModel& model, double highest_n) {
+  constexpr double light = 0.55;  // half, and what a controller misses it by
+  std::vector<std::size_t> all, lighter;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    all.push_back(s);
+    const double force_n = force_of(model, s);
+    if (force_n > 0.1 * highest_n && force_n < light * highest_n) lighter.push_back(s);
+  }
+  const auto& chosen = is_linear(model) || lighter.empty() ? all : lighter;
+  const std::size_t stride = std::max<std::size_t>(1, chosen.size() / 24);
+  std::vector<std::size_t> some;
+  for (std::size_t k = 0; k < chosen.size(); k += stride) some.push_back(chosen[k]);
+  return some;
 }
 
 }  // namespace
@@ -280,10 +311,11 @@ VectorX find_start(Objective& objective, double poisson_start) {
 
   const auto& rest = model.object().surface.rest().vertices_m;
   const double size_m = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
-  guess(log_young) = std::log(stiff_young_pa(model, size_m));
+  double highest_n = 0;
+  for (std::size_t s = 0; s < model.step_count(); ++s) highest_n = std::max(highest_n, force_of(model, s));
+  guess(log_young) = std::log(stiff_young_pa(highest_n, size_m));
   std::vector<StepPrediction> stiff(model.step_count());
-  const std::size_t stride = std::max<std::size_t>(1, model.step_count() / 24);  // a few steps of a long recording say enough
-  for (std::size_t s = 0; s < model.step_count(); s += stride) {
+  for (std::size_t s : steps_to_start_with(model, highest_n)) {
     stiff[s] = model.predict(s, guess);
     if (!stiff[s].converged) stiff[s] = {};
   }
@@ -293,10 +325,9 @@ VectorX find_start(Objective& objective, double poisson_start) {
   wide.tukey = 1e3;
   wide.along_rays = false;
   double best_cost = std::numeric_limits<double>::infinity();
-  double best = std::log(1e5);
-  for (double decade = 1.5; decade <= 11.5; decade += 0.125) {
-    const double log_e = decade * std::log(10.0);
-    const double ratio = std::exp(guess(log_young) - log_e);
+  double best_decade = 5;
+  const auto try_at = [&](double decade) {
+    const double ratio = std::exp(guess(log_young) - decade * std::log(10.0));
     std::vector<StepPrediction> scaled = stiff;
     bool sensible = true;
     for (auto& prediction : scaled) {
@@ -312,14 +343,21 @@ VectorX find_start(Objective& objective, double poisson_start) {
         prediction.travel_m(static_cast<Index>(l)) -= (ratio - 1) * prediction.d_travel(static_cast<Index>(l), 0);
       }
     }
-    if (!sensible) continue;
+    if (!sensible) return;
     const double cost = objective.cost_of(scaled, guess, wide);
     if (cost < best_cost) {
       best_cost = cost;
-      best = log_e;
+      best_decade = decade;
     }
-  }
-  guess(log_young) = best;
+  };
+  // Half decades first: at the worst of them the displacement is 0.8 of itself off, still less than no displacement is.
+  for (double decade = 1.5; decade <= 11.5; decade += 0.5) try_at(decade);
+  const double rough = best_decade;
+  for (double off : {-0.375, -0.25, -0.125, 0.125, 0.25, 0.375}) try_at(rough + off);
+  const double fine = best_decade;
+  for (double off : {-0.0625, 0.0625}) try_at(fine + off);
+  guess(log_young) = best_decade * std::log(10.0);
+  if (!is_linear(model)) guess(log_young) += bends_more;
   return guess;
 }
 

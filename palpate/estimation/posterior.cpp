@@ -9,6 +9,7 @@ namespace palpate::estimation {
 namespace {
 
 constexpr int grid_size = 401;
+constexpr double negligible = 8;  // of the cost above its least: e^-8 of the density, four standard deviations
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
@@ -251,10 +252,19 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   };
   note(nearest, at);
   Index first = nearest, last = nearest;  // that have an equilibrium
-  Optimum walk = optimum;
-  while (last + 1 < nodes && visit(last + 1, walk)) ++last;
-  walk = optimum;
-  while (!posterior.cancelled && first > 0 && visit(first - 1, walk)) --first;
+  // Outwards until so little of the posterior is left that no quantile asks for it.
+  const auto outwards = [&](Index& edge, Index by) {
+    Optimum walk = optimum;
+    double rise = 0;
+    while (rise < negligible && edge + by >= 0 && edge + by < nodes && visit(edge + by, walk)) {
+      const Index next = edge + by;
+      rise += 0.5 * (cost_slope(edge) + cost_slope(next)) * (node(next) - node(edge)) +
+              0.5 * (log_determinant(next) - log_determinant(edge));
+      edge = next;
+    }
+  };
+  outwards(last, 1);
+  if (!posterior.cancelled) outwards(first, -1);
   if (posterior.cancelled) return posterior;
   const Index count = last - first + 1;
   if (count < 2) {  // no neighbour could be solved: what the optimum alone says

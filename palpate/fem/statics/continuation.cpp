@@ -2,6 +2,7 @@
 // What is done where Newton's method fails from the start: loads in steps, and near-incompressible bodies by way of
 // compressible ones.
 #include <cmath>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/statics/static_system.hpp"
@@ -10,6 +11,9 @@ namespace palpate::fem {
 namespace {
 
 constexpr double kCompressible = 0.45;  // Poisson ratio by way of which hard cases are solved
+// Where so many steps in a row, failed ones too, gain less than this share of the load, it is the most that the body bears.
+constexpr int kPatience = 12;
+constexpr double kLeastGain = 0.005;
 
 }  // namespace
 
@@ -24,7 +28,10 @@ std::string StaticSystem::continuation(const StaticProblem& p, StaticState& s, E
   VectorX before_last = s.u;
   double t = 0, last_t = 0, dt = 0.25;
   std::string reason;
+  std::vector<double> reached;
   for (int step = 0; step < options.max_load_steps; ++step) {
+    reached.push_back(t);
+    if (step >= kPatience && t - reached[static_cast<std::size_t>(step - kPatience)] < kLeastGain) break;
     const double next = std::min(1.0, t + dt);
     part.external = next * target.external;
     part.prescribed = next * target.prescribed;
