@@ -18,7 +18,7 @@ namespace {
 constexpr double reuse = 0.3;   // standard deviations: equations that are moved along this far are right to some hundredths
 constexpr double search_reuse = 0.2;  // the same, for the search over nu, which adds up slopes over its whole range
 constexpr double anew = 1e-9;   // keep, but evaluate every step that has moved at all
-constexpr double floor = 3;     // of the cost: less is not to be had for certain where rays change triangles
+constexpr double least_gain = 3;  // of the cost: less is not to be had for certain where rays change triangles
 constexpr double misfit = 1.5;  // robust spread of the residuals in standard deviations: the start was far off
 
 /// Unknowns that share a name (two cameras in a step) are told apart by their order, which steps to come do not change.
@@ -79,8 +79,8 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
     // Which rays of a new step count is chosen where the steps before it say that it should be.
     if (objective.evaluate(start, *loss_, progress).usable) loss_ = objective.with_chosen_rays(*loss_);
     optimum = optimise(objective, start, *loss_, optimiser, progress);
-    const auto may_gain = [&] { return newton_step(optimum.evaluation, free_unknowns(unknowns)).gain; };
-    if (optimum.termination == Termination::no_progress && may_gain() < floor) {
+    if (optimum.termination == Termination::no_progress &&
+        newton_step(optimum.evaluation, free_unknowns(unknowns)).gain < least_gain) {
       optimum.termination = Termination::converged;
       optimum.message = "converged";
     }

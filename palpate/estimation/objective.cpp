@@ -13,7 +13,7 @@
 namespace palpate::estimation {
 namespace {
 
-// 75 degrees: a sphere's ray there is a thirtieth of the radius inside the outline, and a grazing ray stops counting at 80.
+// 75 degrees: a sphere's ray there is a thirtieth of the radius inside the outline.
 constexpr double well_inside = 0.26;
 
 constexpr std::size_t places_kept = 16;  // a step: the optimum, and those of a search over nu

@@ -219,13 +219,7 @@ ClosestPoint TriangleTree::closest(const Vec3& p, Index hint) const {
     const WideNode& node = s.wide.nodes[visit.node];
     const Eigen::Array4f d = query.squared(node);
     std::array<int, 4> order;
-    int n = 0;
-    for (int i = 0; i < 4; ++i) {
-      if (!(d[i] <= limit) || node.child[i] < 0) continue;
-      int at = n++;
-      for (; at > 0 && d[order[at - 1]] > d[i]; --at) order[at] = order[at - 1];
-      order[at] = i;
-    }
+    const int n = nearest_first(node, d, limit, order);
     for (int i = 0; i < n; ++i) {  // leaves first, nearest first: they shrink the limit
       const int c = order[i];
       if (node.count[c] == 0 || d[c] > limit) continue;
@@ -302,13 +296,7 @@ std::optional<RayHit> TriangleTree::cast(const Vec3& origin, const Vec3& directi
     const WideNode& node = s.wide.nodes[visit.node];
     const Eigen::Array4f enter = wide.enter(node, limit);
     std::array<int, 4> order;
-    int n = 0;
-    for (int i = 0; i < 4; ++i) {
-      if (!(enter[i] <= limit) || node.child[i] < 0) continue;
-      int at = n++;
-      for (; at > 0 && enter[order[at - 1]] > enter[i]; --at) order[at] = order[at - 1];
-      order[at] = i;
-    }
+    const int n = nearest_first(node, enter, limit, order);
     for (int i = 0; i < n; ++i) {  // leaves first, nearest first: they shrink the limit
       const int c = order[i];
       if (node.count[c] == 0 || enter[c] > limit) continue;

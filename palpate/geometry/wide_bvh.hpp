@@ -31,6 +31,18 @@ WideBvh widen(const Bvh& bvh);
 /// Takes the boxes of the refitted binary hierarchy.
 void copy_boxes(WideBvh& wide, const Bvh& bvh);
 
+/// Children within `limit` by their lower bounds, nearest first. @returns how many
+inline int nearest_first(const WideNode& node, const Eigen::Array4f& bound, float limit, std::array<int, 4>& order) {
+  int n = 0;
+  for (int i = 0; i < 4; ++i) {
+    if (!(bound[i] <= limit) || node.child[i] < 0) continue;
+    int at = n++;
+    for (; at > 0 && bound[order[at - 1]] > bound[i]; --at) order[at] = order[at - 1];
+    order[at] = i;
+  }
+  return n;
+}
+
 /// A query point, prepared: lower bounds of squared distances to the four boxes of a node, safe against rounding.
 class WideQuery {
  public:
