@@ -36,16 +36,17 @@ class TriangleTree {
   /// @throws Error when the number of rows differs or a vertex is not finite; the tree is then as before.
   void refit(const Points& vertices_m);
 
-  /// Closest point of the surface. `hint`: a triangle that is likely near (the last answer), or -1; it changes the speed
-  /// and, between triangles that are equally near, which one is named. A point that is not finite gets triangle -1 and a
-  /// squared distance of NaN.
+  /// Closest point of the surface; of triangles that are equally near the one with the smallest number. `hint`: a triangle
+  /// that is likely near (the last answer), or -1; it changes nothing but the speed. A point that is not finite gets
+  /// triangle -1 and a squared distance of NaN.
   ClosestPoint closest(const Vec3& point_m, Index hint = -1) const;
 
   /// Is the surface within this distance? Several times as fast as closest() where it is.
   bool within(const Vec3& point_m, double squared_distance_m2, Index hint = -1) const;
 
   /// First hit of a ray, both sides of a triangle count. `direction` need not have unit length; range is in its units.
-  /// No ray slips between two triangles that share an edge (Woop, Benthin, Wald 2013). `hint` as for closest().
+  /// No ray slips between two triangles that share an edge (Woop, Benthin, Wald 2013). `hint`: a triangle that is likely
+  /// hit, or -1; between triangles that are hit at the same range it may change which one is named.
   std::optional<RayHit> cast(const Vec3& origin_m, const Vec3& direction, double max_range = 1e300, Index hint = -1) const;
 
   /// Number of triangles that the endless ray meets (a crossing of an edge counts for both of its triangles).

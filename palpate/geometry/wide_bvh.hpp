@@ -43,30 +43,6 @@ inline int nearest_first(const WideNode& node, const Eigen::Array4f& bound, floa
   return n;
 }
 
-/// A query point, prepared: lower bounds of squared distances to the four boxes of a node, safe against rounding.
-class WideQuery {
- public:
-  WideQuery(const WideBvh& wide, const Vec3& point) {
-    const Vec3 p = point - wide.centre;
-    // of rounding the point to float, and of the subtraction
-    const double error = 2.5e-7 * std::max(wide.extent, p.cwiseAbs().maxCoeff());
-    for (int k = 0; k < 3; ++k) {
-      above_[k] = Eigen::Array4f::Constant(static_cast<float>(p[k] + error));
-      below_[k] = Eigen::Array4f::Constant(static_cast<float>(p[k] - error));
-    }
-  }
-  Eigen::Array4f squared(const WideNode& n) const {
-    const Eigen::Array4f zero = Eigen::Array4f::Zero();
-    const Eigen::Array4f x = (n.min[0] - above_[0]).max(below_[0] - n.max[0]).max(zero);
-    const Eigen::Array4f y = (n.min[1] - above_[1]).max(below_[1] - n.max[1]).max(zero);
-    const Eigen::Array4f z = (n.min[2] - above_[2]).max(below_[2] - n.max[2]).max(zero);
-    return (x * x + y * y + z * z) * (1 - 1e-6f);
-  }
-
- private:
-  std::array<Eigen::Array4f, 3> above_, below_;
-};
-
 /// A ray, prepared: lower bounds of where it enters the four boxes of a node, safe against rounding. Ranges are in units of
 /// the direction's largest component, so that neither tiny nor huge directions leave the numbers that a float holds.
 class WideRay {

@@ -56,6 +56,45 @@ void expect_exact(const TriangleTree& tree, const Vec3& p, Index hint) {
   EXPECT_NEAR((p - q).norm(), exact, 1e-13 * (1 + exact));
 }
 
+/// Triangles of all sizes and shapes, needles and points too, in a box that one far triangle makes a thousand times as
+/// large.
+TriMesh all_sizes(int count, int seed, double far) {
+  TriMesh m;
+  m.vertices_m.resize(3 * count, 3);
+  m.triangles.resize(count, 3);
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> g;
+  std::uniform_real_distribution<double> u;
+  const auto any = [&] { return Vec3(g(rng), g(rng), g(rng)); };
+  for (Index i = 0; i < count; ++i) {
+    const double size = std::exp2(-16 * u(rng)), thinness = i % 2 == 0 ? 1 : std::exp2(-40 * u(rng));
+    const Vec3 a = i == 0 ? Vec3(far, far, far) : Vec3(any()), along = size * any();
+    m.vertices_m.row(3 * i) = a;
+    m.vertices_m.row(3 * i + 1) = a + along;
+    m.vertices_m.row(3 * i + 2) = a + u(rng) * along + (i % 11 == 10 ? 0.0 : thinness * size) * any();
+    m.triangles.row(i) << 3 * i, 3 * i + 1, 3 * i + 2;
+  }
+  return m;
+}
+
+/// A sheaf of long needles, whose normals floats cannot tell.
+TriMesh sheaf(int count) {
+  TriMesh m;
+  m.vertices_m.resize(3 * count, 3);
+  m.triangles.resize(count, 3);
+  std::mt19937 rng(7);
+  std::normal_distribution<double> g;
+  const auto any = [&](double size) { return Vec3(size * g(rng), size * g(rng), size * g(rng)); };
+  for (Index i = 0; i < count; ++i) {
+    const Vec3 start = any(1e-4), along = Vec3(1, 0.7, 0.4) + any(1e-4);
+    m.vertices_m.row(3 * i) = start;
+    m.vertices_m.row(3 * i + 1) = start + along;
+    m.vertices_m.row(3 * i + 2) = start + 0.9 * along + any(2e-4);
+    m.triangles.row(i) << 3 * i, 3 * i + 1, 3 * i + 2;
+  }
+  return m;
+}
+
 class ClosestPointOf : public testing::TestWithParam<TriMesh> {};
 
 TEST_P(ClosestPointOf, equals_brute_force_near_and_far_with_and_without_hint) {
@@ -79,6 +118,9 @@ TEST_P(ClosestPointOf, equals_brute_force_near_and_far_with_and_without_hint) {
     if (c.squared_distance_m2 > 0) {
       EXPECT_FALSE(tree.within(p, 0.999 * c.squared_distance_m2, last));
     }
+    const ClosestPoint hinted = tree.closest(p, pick(rng));
+    EXPECT_EQ(hinted.triangle, c.triangle);
+    EXPECT_EQ(hinted.point_m, c.point_m);
     last = c.triangle;
     if (HasFatalFailure()) return;
   }
@@ -131,7 +173,7 @@ TEST_P(ClosestPointOf, first_ray_hit_is_the_nearest_of_all_triangles) {
 
 INSTANTIATE_TEST_SUITE_P(Shapes, ClosestPointOf,
                          testing::Values(shapes::box(Vec3::Ones()), shapes::sphere(0.8, 3), shapes::torus(0.7, 0.2, 40, 20),
-                                         shapes::soup(300, 1),
+                                         shapes::soup(300, 1), all_sizes(400, 3, 1), all_sizes(400, 4, 1e3),
                                          shapes::make({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}})));
 
 TEST(TriangleTree, rays_along_edges_and_through_corners_do_not_slip_through) {
@@ -147,12 +189,55 @@ TEST(TriangleTree, rays_along_edges_and_through_corners_do_not_slip_through) {
     }
 }
 
+TEST(TriangleTree, is_exact_in_a_sheaf_of_needles) {
+  const TriangleTree tree(sheaf(1000));
+  std::mt19937 rng(3);
+  std::normal_distribution<double> g;
+  std::uniform_real_distribution<double> u;
+  for (int i = 0; i < 3000; ++i) {
+    const Vec3 p = u(rng) * Vec3(1, 0.7, 0.4) + std::exp2(-14 * u(rng)) * Vec3(g(rng), g(rng), g(rng));
+    // needles cost double up to seven digits
+    EXPECT_NEAR(std::sqrt(tree.closest(p).squared_distance_m2), double(std::sqrt(brute_force(tree.mesh(), p))), 5e-9);
+  }
+}
+
+TEST(TriangleTree, of_triangles_that_are_equally_near_the_first_one_is_named) {
+  // above every vertex of a convex surface all triangles around it are equally near
+  const TriMesh m = shapes::sphere(1, 3);
+  TriangleTree tree(m);
+  const auto check = [&](const TriMesh& surface) {
+    int ties = 0;
+    for (Eigen::Index v = 0; v < surface.vertices_m.rows(); ++v) {
+      const Vec3 p = 1.25 * surface.vertices_m.row(v).transpose();
+      const ClosestPoint c = tree.closest(p);
+      for (Index t = 0; t < surface.triangles.rows(); ++t) {
+        if ((surface.triangles.row(t).array() != static_cast<Index>(v)).all()) continue;
+        const ClosestPoint other = tree.closest(p, t);
+        EXPECT_EQ(other.triangle, c.triangle) << "vertex " << v;
+        EXPECT_EQ(other.squared_distance_m2, c.squared_distance_m2);
+        const Vec3 corner = surface.vertices_m.row(v).transpose();
+        if ((p - corner).squaredNorm() == c.squared_distance_m2) {
+          EXPECT_GE(t, c.triangle);
+          ties += t > c.triangle;
+        }
+      }
+    }
+    EXPECT_GT(ties, 100);
+  };
+  check(m);
+  TriMesh longer = m;
+  longer.vertices_m.col(0) *= 1.5;
+  tree.refit(longer.vertices_m);
+  check(longer);
+}
+
 TEST(TriangleTree, copies_at_one_place_and_a_single_point_build) {
   TriMesh m = shapes::make({{1, 2, 3}, {1, 2, 3}, {1, 2, 3}}, {});
   m.triangles.resize(5000, 3);
   m.triangles.rowwise() = Eigen::Matrix<Index, 1, 3>(0, 1, 2);
   const TriangleTree tree(m);
   EXPECT_NEAR(tree.closest(Vec3(1, 2, 5)).squared_distance_m2, 4, 1e-14);
+  EXPECT_EQ(tree.closest(Vec3(1, 2, 5), 77).triangle, 0);
   EXPECT_FALSE(tree.cast(Vec3(1, 2, 5), Vec3(0, 0, -1)));
 }
 
