@@ -20,23 +20,37 @@ struct Corner {
   double u, v, inverse_depth;
 };
 
+/// First and last of the whole numbers 0 .. count - 1 within [from, to]. Without std::ceil and std::floor, which are calls
+/// where the processor is not known to have instructions for them.
+struct Whole {
+  int first, last;
+  Whole(double from, double to, int count) {
+    const double low = std::clamp(from, 0.0, double(count)), high = std::clamp(to, -1.0, double(count - 1));
+    first = int(low);
+    first += first < low;
+    last = int(high);
+    last -= last > high;
+  }
+  bool none() const { return first > last; }
+};
+
 class Buffer {
  public:
-  Buffer(int width, int height) : width_(width), height_(height), nearest_(std::size_t(width) * height, 0.0F) {}
+  Buffer(int width, int height) : width_(width), height_(height), nearest_(DepthImage::Zero(height, width)) {}
 
   void draw(const Corner& a, const Corner& b, const Corner& c) {
+    // Most triangles of a fine mesh lie between the pixels' centres.
+    const Whole rows(std::min({a.v, b.v, c.v}), std::max({a.v, b.v, c.v}), height_);
+    if (rows.none() || Whole(std::min({a.u, b.u, c.u}), std::max({a.u, b.u, c.u}), width_).none()) return;
     const double area = (b.u - a.u) * (c.v - a.v) - (c.u - a.u) * (b.v - a.v);
     if (std::abs(area) < 1e-12) return;
-    const double top = std::min({a.v, b.v, c.v}), bottom = std::max({a.v, b.v, c.v});
-    const int first_row = std::max(0, int(std::ceil(std::max(top, -1.0))));
-    const int last_row = std::min(height_ - 1, int(std::floor(std::min(bottom, double(height_)))));
     // Inverse depth as an affine function of the pixel.
     const double slope_u =
         ((b.inverse_depth - a.inverse_depth) * (c.v - a.v) - (c.inverse_depth - a.inverse_depth) * (b.v - a.v)) / area;
     const double slope_v =
         ((c.inverse_depth - a.inverse_depth) * (b.u - a.u) - (b.inverse_depth - a.inverse_depth) * (c.u - a.u)) / area;
     const std::array<const Corner*, 4> loop{&a, &b, &c, &a};
-    for (int row = first_row; row <= last_row; ++row) {
+    for (int row = rows.first; row <= rows.last; ++row) {
       double left = 1e300, right = -1e300;
       for (int e = 0; e < 3; ++e) {  // where the row cuts the edges
         const Corner &p = *loop[e], &q = *loop[e + 1];
@@ -51,8 +65,7 @@ class Buffer {
         right = std::max(right, u);
       }
       if (!(left <= right)) continue;
-      const int first = std::max(0, int(std::ceil(std::max(left, -1.0))));
-      const int last = std::min(width_ - 1, int(std::floor(std::min(right, double(width_)))));
+      const auto [first, last] = Whole(left, right, width_);
       float* line = nearest_.data() + std::size_t(row) * width_;
       const auto start = float(a.inverse_depth + slope_u * (first - a.u) + slope_v * (row - a.v));
       for (int column = first; column <= last; ++column) {
@@ -62,18 +75,16 @@ class Buffer {
     }
   }
 
-  DepthImage depth() const {
-    DepthImage image(height_, width_);
-    for (Eigen::Index i = 0; i < image.size(); ++i) {
-      const float inverse = nearest_[std::size_t(i)];
-      image.data()[i] = inverse > 0 ? 1 / inverse : 0;
-    }
-    return image;
+  /// Ends the drawing.
+  DepthImage depth() {
+    float* const values = nearest_.data();
+    for (Eigen::Index i = 0; i < nearest_.size(); ++i) values[i] = values[i] > 0 ? 1 / values[i] : 0;
+    return std::move(nearest_);
   }
 
  private:
   int width_, height_;
-  std::vector<float> nearest_;
+  DepthImage nearest_;  // inverse depths
 };
 
 }  // namespace
@@ -134,7 +145,7 @@ void check(const RenderMaskOptions& o) {
   if (!(o.lateral_margin_px >= 0)) bad("lateral_margin_px");
 }
 
-MaskImage mask_rendered(const DepthFrame& frame, const DepthImage& rendered_m, const RenderMaskOptions& options) {
+MaskImage mask_rendered(const DepthFrame& frame, DepthImage rendered_m, const RenderMaskOptions& options) {
   check(options);
   if (rendered_m.rows() != frame.depth_m.rows() || rendered_m.cols() != frame.depth_m.cols())
     throw Error("must have the size of the frame's image", "rendered_m");
@@ -142,26 +153,31 @@ MaskImage mask_rendered(const DepthFrame& frame, const DepthImage& rendered_m, c
   const double focal = std::min(frame.camera.fx_px, frame.camera.fy_px);
 
   // Widen the outline: every pixel at the body's border (also against a part of it that lies farther back) stamps a disc.
-  DepthImage wide = rendered_m;
-  const auto farther = [&](int row, int column, float z) {
-    if (row < 0 || row >= rows || column < 0 || column >= columns) return false;
-    const float other = rendered_m(row, column);
-    return other == 0 || other > z + float(options.depth_margin_m + 0.01);
+  struct Stamp {
+    int row, column;
+    float z;
   };
-  for (int row = 0; row < rows; ++row)
+  std::vector<Stamp> border;
+  const auto step = float(options.depth_margin_m + 0.01);
+  for (int row = 0; row < rows; ++row) {
+    const float* const here = rendered_m.data() + std::ptrdiff_t(row) * columns;
     for (int column = 0; column < columns; ++column) {
-      const float z = rendered_m(row, column);
+      const float z = here[column];
       if (z == 0) continue;
-      if (!farther(row, column - 1, z) && !farther(row, column + 1, z) && !farther(row - 1, column, z) &&
-          !farther(row + 1, column, z))
-        continue;
-      const double reach = options.lateral_margin_px + options.lateral_margin_m * focal / z;
-      const int whole = int(reach);
-      for (int r = std::max(0, row - whole); r <= std::min(rows - 1, row + whole); ++r)
-        for (int c = std::max(0, column - whole); c <= std::min(columns - 1, column + whole); ++c)
-          if ((r - row) * (r - row) + (c - column) * (c - column) <= reach * reach)
-            if (wide(r, c) == 0 || wide(r, c) > z) wide(r, c) = z;
+      const auto farther = [z, step](float other) { return other == 0 || other > z + step; };
+      if ((column > 0 && farther(here[column - 1])) || (column + 1 < columns && farther(here[column + 1])) ||
+          (row > 0 && farther(here[column - columns])) || (row + 1 < rows && farther(here[column + columns])))
+        border.push_back({row, column, z});
     }
+  }
+  for (const auto& [row, column, z] : border) {
+    const double reach = options.lateral_margin_px + options.lateral_margin_m * focal / z;
+    const int whole = int(reach);
+    for (int r = std::max(0, row - whole); r <= std::min(rows - 1, row + whole); ++r)
+      for (int c = std::max(0, column - whole); c <= std::min(columns - 1, column + whole); ++c)
+        if ((r - row) * (r - row) + (c - column) * (c - column) <= reach * reach)
+          if (float& wide = rendered_m(r, c); wide == 0 || wide > z) wide = z;
+  }
 
   // The model is looked up once, not by name for every pixel.
   axial_sigma_m(frame.noise, {1.0, 0.0, frame.camera.fx_px});  // throws when it cannot be told
@@ -169,8 +185,10 @@ MaskImage mask_rendered(const DepthFrame& frame, const DepthImage& rendered_m, c
   MaskImage mask = MaskImage::Zero(rows, columns);
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column) {
-      const double body = wide(row, column), seen = frame.depth_m(row, column);
-      if (body == 0 || !(seen > 0)) continue;
+      const double body = rendered_m(row, column);
+      if (body == 0) continue;
+      const double seen = frame.depth_m(row, column);
+      if (!(seen > 0)) continue;
       const double sigma = model ? model({body, 0.0, frame.camera.fx_px}) : frame.noise.sigma_m;
       mask(row, column) = seen > body - options.depth_margin_m - options.depth_sigmas * sigma;
     }

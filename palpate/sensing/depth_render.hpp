@@ -33,6 +33,6 @@ void check(const RenderMaskOptions& options);
 /// Pixels that show the rendered body or what it hides from view: 1 where a measurement lies at or behind the rendered
 /// depth, less the margins. A pixel in front of the body (something covers it) stays valid, and so does one without data.
 /// @throws Error when the images differ in size.
-MaskImage mask_rendered(const DepthFrame& frame, const DepthImage& rendered_m, const RenderMaskOptions& options = {});
+MaskImage mask_rendered(const DepthFrame& frame, DepthImage rendered_m, const RenderMaskOptions& options = {});
 
 }  // namespace palpate::sensing

@@ -84,6 +84,20 @@ TEST(DepthRender, ClipsWhatReachesBehindTheCamera) {
   EXPECT_EQ(image(50, 79), 0);
 }
 
+TEST(DepthRender, WhatLiesFarBesideTheImageIsNotDrawn) {
+  // pixels beyond what an int holds, to the right of the image, to the left, above and below
+  for (const Vec3& aside : {Vec3(1e5, 0, 0), Vec3(-1e5, 0, 0), Vec3(0, 1e5, 0), Vec3(0, -1e5, 0)}) {
+    TriMesh wall;
+    wall.vertices_m.resize(3, 3);
+    wall.vertices_m << -1, -1, 2e-3, 2, -1, 2e-3, -1, 2, 2e-3;
+    wall.triangles.resize(1, 3);
+    wall.triangles << 0, 1, 2;
+    EXPECT_GT(render_depth({{&wall, Pose::Identity()}}, small_camera(), Pose::Identity()).minCoeff(), 0);
+    wall.vertices_m.rowwise() += aside.transpose();
+    EXPECT_EQ(render_depth({{&wall, Pose::Identity()}}, small_camera(), Pose::Identity()).maxCoeff(), 0);
+  }
+}
+
 TEST(DepthRender, NearestBodyWins) {
   const TriMesh ball = lumpy_ball();
   Pose near = Pose::Identity(), far = Pose::Identity();
