@@ -37,30 +37,34 @@ struct Builder {
     int best_axis = -1, best_bin = 0;
     double best_cost = std::numeric_limits<double>::infinity();
     if (depth < deepest_sah) {
+      std::array<std::array<Box, bins>, 3> box;
+      std::array<std::array<Index, bins>, 3> count{};
+      Vec3 scale;
+      for (int axis = 0; axis < 3; ++axis) scale[axis] = extent[axis] > 0 ? bins / extent[axis] : 0;
+      for (Index i = first; i < last; ++i) {  // all axes at once: items lie scattered over the memory
+        const Index id = out.order[i];
+        const Box& item = boxes[id];
+        for (int axis = 0; axis < 3; ++axis) {
+          const int b = std::min(bins - 1, static_cast<int>((centres[id][axis] - spread.min[axis]) * scale[axis]));
+          box[axis][b].add(item);
+          ++count[axis][b];
+        }
+      }
       for (int axis = 0; axis < 3; ++axis) {
         if (!(extent[axis] > 0)) continue;
-        std::array<Box, bins> box;
-        std::array<Index, bins> count{};
-        const double scale = bins / extent[axis];
-        for (Index i = first; i < last; ++i) {
-          const Index id = out.order[i];
-          const int b = std::min(bins - 1, static_cast<int>((centres[id][axis] - spread.min[axis]) * scale));
-          box[b].add(boxes[id]);
-          ++count[b];
-        }
         std::array<double, bins> right{};
         Box sum;
         Index c = 0;
         for (int b = bins - 1; b > 0; --b) {
-          sum.add(box[b]);
-          c += count[b];
+          sum.add(box[axis][b]);
+          c += count[axis][b];
           right[b] = c > 0 ? sum.half_area() * c : 0;
         }
         sum = Box();
         c = 0;
         for (int b = 0; b + 1 < bins; ++b) {
-          sum.add(box[b]);
-          c += count[b];
+          sum.add(box[axis][b]);
+          c += count[axis][b];
           if (c == 0 || c == n) continue;
           const double cost = sum.half_area() * c + right[b + 1];
           if (cost < best_cost) best_cost = cost, best_axis = axis, best_bin = b;

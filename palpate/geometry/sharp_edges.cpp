@@ -6,6 +6,8 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -15,21 +17,58 @@ namespace {
 constexpr double smooth = 0.766;  // cosine of 40 degrees between neighbouring triangles
 constexpr double reach = 0.7;     // of the wished edge: further a vertex does not go
 
+/// The triangles at every edge of a surface, edges in the order of their vertices.
+class EdgeUses {
+ public:
+  struct Use {
+    Index to, triangle;
+    bool operator<(const Use& other) const { return std::tie(to, triangle) < std::tie(other.to, other.triangle); }
+  };
+  explicit EdgeUses(const TriMesh& surface) : first_(surface.vertices_m.rows() + 1, 0), uses_(3 * surface.triangles.rows()) {
+    const auto each = [&](const auto& use) {
+      for (Index t = 0; t < surface.triangles.rows(); ++t)
+        for (int k = 0; k < 3; ++k) {
+          const Index a = surface.triangles(t, k), b = surface.triangles(t, (k + 1) % 3);
+          use(std::min(a, b), Use{std::max(a, b), t});
+        }
+    };
+    each([&](Index from, const Use&) { ++first_[from + 1]; });
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    std::vector<Index> next(first_.begin(), first_.end() - 1);
+    each([&](Index from, const Use& use) { uses_[next[from]++] = use; });
+    for (std::size_t v = 0; v + 1 < first_.size(); ++v) std::sort(uses_.begin() + first_[v], uses_.begin() + first_[v + 1]);
+  }
+  void for_each(const auto& visit) const {
+    for (std::size_t v = 0; v + 1 < first_.size(); ++v)
+      for (Index begin = first_[v], end = begin; begin < first_[v + 1]; begin = end) {
+        while (end < first_[v + 1] && uses_[end].to == uses_[begin].to) ++end;
+        visit(static_cast<Index>(v), uses_[begin].to, std::span(uses_.begin() + begin, uses_.begin() + end));
+      }
+  }
+
+ private:
+  std::vector<Index> first_;  // use of a vertex that is the lower one of its edges
+  std::vector<Use> uses_;
+};
+
+}  // namespace
+
 /// Smooth parts of a surface, and the edges between them.
-struct Parts {
+struct SharpEdges::Parts {
   std::vector<Index> of;                                                        // a triangle
   std::vector<double> area_m2;                                                  // a part
   std::map<std::pair<Index, Index>, std::vector<std::pair<Vec3, Vec3>>> edges;  // of two parts, the lower first
   std::vector<std::pair<Vec3, std::set<Index>>> corners;                        // where three or more meet
 };
 
+namespace {
+
+using Parts = SharpEdges::Parts;
+
 Parts parts_of(const Solid& solid) {
   const TriMesh& surface = solid.surface();
   const auto triangles = static_cast<Index>(surface.triangles.rows());
-  std::map<std::pair<Index, Index>, std::vector<Index>> at_edge;
-  for (Index t = 0; t < triangles; ++t)
-    for (int k = 0; k < 3; ++k)
-      at_edge[std::minmax<Index>(surface.triangles(t, k), surface.triangles(t, (k + 1) % 3))].push_back(t);
+  const EdgeUses at_edge(surface);
 
   std::vector<Index> up(static_cast<std::size_t>(triangles));
   std::iota(up.begin(), up.end(), 0);
@@ -37,8 +76,10 @@ Parts parts_of(const Solid& solid) {
     while (up[t] != t) t = up[t] = up[up[t]];
     return t;
   };
-  for (const auto& [edge, both] : at_edge)
-    if (both.size() == 2 && solid.normal(both[0]).dot(solid.normal(both[1])) > smooth) up[root(both[0])] = root(both[1]);
+  at_edge.for_each([&](Index, Index, std::span<const EdgeUses::Use> both) {
+    if (both.size() == 2 && solid.normal(both[0].triangle).dot(solid.normal(both[1].triangle)) > smooth)
+      up[root(both[0].triangle)] = root(both[1].triangle);
+  });
 
   Parts parts;
   std::map<Index, Index> number;
@@ -50,13 +91,12 @@ Parts parts_of(const Solid& solid) {
     parts.area_m2[own->second] += 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
   }
   std::map<Index, std::set<Index>> at_vertex;
-  for (const auto& [edge, both] : at_edge) {
-    if (both.size() != 2 || parts.of[both[0]] == parts.of[both[1]]) continue;
-    const auto pair = std::minmax(parts.of[both[0]], parts.of[both[1]]);
-    parts.edges[pair].emplace_back(surface.vertices_m.row(edge.first).transpose(),
-                                   surface.vertices_m.row(edge.second).transpose());
-    for (const Index v : {edge.first, edge.second}) at_vertex[v].insert({pair.first, pair.second});
-  }
+  at_edge.for_each([&](Index from, Index to, std::span<const EdgeUses::Use> both) {
+    if (both.size() != 2 || parts.of[both[0].triangle] == parts.of[both[1].triangle]) return;
+    const auto pair = std::minmax(parts.of[both[0].triangle], parts.of[both[1].triangle]);
+    parts.edges[pair].emplace_back(surface.vertices_m.row(from).transpose(), surface.vertices_m.row(to).transpose());
+    for (const Index v : {from, to}) at_vertex[v].insert({pair.first, pair.second});
+  });
   for (const auto& [v, meeting] : at_vertex)
     if (meeting.size() > 2) parts.corners.emplace_back(surface.vertices_m.row(v).transpose(), meeting);
   return parts;
@@ -113,8 +153,12 @@ bool meet_corners(TetEditor& mesh, const Parts& parts, double floor_quality) {
 
 }  // namespace
 
-bool meet_sharp_edges(TetEditor& mesh, const Solid& solid, double floor_quality) {
-  const Parts parts = parts_of(solid);
+SharpEdges::SharpEdges(const Solid& solid) : solid_(solid), parts_(std::make_unique<const Parts>(parts_of(solid))) {}
+SharpEdges::~SharpEdges() = default;
+
+bool SharpEdges::meet(TetEditor& mesh, double floor_quality) const {
+  const Parts& parts = *parts_;
+  const Solid& solid = solid_;
   if (parts.edges.empty()) return false;
   bool any = false;
   constexpr Index none = -1;

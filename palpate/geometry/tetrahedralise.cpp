@@ -259,9 +259,12 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     last.most_rounds = 0;
     out.cancelled = !improve(best->mesh, solid, samples, last, progress);
   }
-  if (o.improve && !out.cancelled && meet_sharp_edges(best->mesh, solid, usable)) {
-    fit_to_surface(best->mesh, solid, samples, usable);  // faces had bulged in place of the edges
-    meet_sharp_edges(best->mesh, solid, usable);
+  if (o.improve && !out.cancelled) {
+    const SharpEdges edges(solid);
+    if (edges.meet(best->mesh, usable)) {
+      fit_to_surface(best->mesh, solid, samples, usable);  // faces had bulged in place of the edges
+      edges.meet(best->mesh, usable);
+    }
   }
 
   out.mesh = best->mesh.compact();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "palpate/core/mesh.hpp"
@@ -15,21 +16,26 @@ class WindingNumber {
  public:
   explicit WindingNumber(const TriMesh& mesh);
   /// `bvh`: over the mesh's triangles.
-  WindingNumber(const TriMesh& mesh, Bvh bvh);
+  WindingNumber(const TriMesh& mesh, const Bvh& bvh);
   double operator()(const Vec3& point_m) const;
   /// Without one triangle: on that triangle the mean of its two sides.
   double without(const Vec3& point_m, Index triangle) const;
 
  private:
+  /// What a subtree amounts to from afar.
   struct Dipole {
     Vec3 centre = Vec3::Zero(), area = Vec3::Zero();  ///< area: sum of normals times areas
-    double radius = 0;
+    double near2 = 0;                                 ///< squared distance up to which its parts are asked instead
+  };
+  /// All that a query asks of a node in two lines of the cache. `child`, `count`: as in BvhNode.
+  struct alignas(64) Node {
+    std::array<Dipole, 2> dipole;
+    std::array<Index, 2> child{-1, -1}, count{0, 0};
   };
   double sum(const Vec3& p, Index skip) const;
-  Points vertices_;
-  Triangles triangles_;
-  Bvh bvh_;
-  std::vector<Dipole> dipoles_;  ///< two a node
+  std::vector<Node> nodes_;
+  std::vector<std::array<Vec3, 3>> corners_;  ///< of the triangles, leaf after leaf
+  std::vector<Index> slot_;                   ///< of a triangle in `corners_`
 };
 
 }  // namespace palpate::geometry
