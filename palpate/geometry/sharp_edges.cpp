@@ -102,23 +102,27 @@ Parts parts_of(const Solid& solid) {
   return parts;
 }
 
+struct Place {
+  Vec3 at, along;  ///< and the direction of the edge there; zero in corners
+};
+
 /// Where a vertex between these parts belongs.
-std::optional<Vec3> place_of(const Vec3& at, const std::set<Index>& between, const Parts& parts, double within) {
-  std::optional<Vec3> best;
-  const auto offer = [&](const Vec3& p) {
-    const double limit = best ? (*best - at).norm() : within;
-    if ((p - at).norm() < limit) best = p;
+std::optional<Place> place_of(const Vec3& at, const std::set<Index>& between, const Parts& parts, double within) {
+  std::optional<Place> best;
+  const auto offer = [&](const Vec3& p, const Vec3& along) {
+    const double limit = best ? (best->at - at).norm() : within;
+    if ((p - at).norm() < limit) best = Place{p, along};
   };
   if (between.size() > 2) {
     for (const auto& [corner, meeting] : parts.corners)
-      if (std::includes(meeting.begin(), meeting.end(), between.begin(), between.end())) offer(corner);
+      if (std::includes(meeting.begin(), meeting.end(), between.begin(), between.end())) offer(corner, Vec3::Zero());
     return best;
   }
   const auto shared = parts.edges.find({*between.begin(), *between.rbegin()});
   if (shared == parts.edges.end()) return best;
   for (const auto& [a, b] : shared->second) {
     const double length2 = (b - a).squaredNorm();
-    offer(length2 > 0 ? Vec3(a + std::clamp((at - a).dot(b - a) / length2, 0.0, 1.0) * (b - a)) : a);
+    offer(length2 > 0 ? Vec3(a + std::clamp((at - a).dot(b - a) / length2, 0.0, 1.0) * (b - a)) : a, (b - a).normalized());
   }
   return best;
 }
@@ -179,16 +183,33 @@ bool SharpEdges::meet(TetEditor& mesh, double floor_quality) const {
     for (std::size_t v = 0; v < mesh.x.size(); ++v) {
       if (between[v].size() < 2 || between[v].count(none) > 0) continue;
       const auto id = static_cast<Index>(v);
-      const auto to = place_of(mesh.x[v], between[v], parts, reach * mesh.size_m[v]);
-      if (!to || (*to - mesh.x[v]).norm() < 1e-3 * mesh.size_m[v]) continue;
+      const double size = mesh.size_m[v];
+      const auto place = place_of(mesh.x[v], between[v], parts, reach * size);
+      if (!place || (place->at - mesh.x[v]).norm() < 1e-3 * size) continue;
       const double least = std::min(mesh.star_quality(id), floor_quality) - 1e-12;
-      for (const double share : {1.0, 0.75, 0.5, 0.25, 0.12}) {
-        const Vec3 there = share == 1 ? *to : Vec3(mesh.x[v] + share * (*to - mesh.x[v]));
-        if (!(mesh.star_quality_at(id, there, least) > least)) continue;
+      const auto move = [&](const Vec3& there) {
         mesh.move(id, there);
         moved = true;
-        break;
+      };
+      if (mesh.star_quality_at(id, place->at, least) > least) {
+        move(place->at);
+        continue;
       }
+      // Neighbours on the edge may stand in the way: there is room further along it, or part of the way.
+      std::optional<Vec3> best;
+      double quality = least;
+      for (const double slide : {-0.15, 0.15, -0.3, 0.3, -0.45, 0.45}) {
+        const auto other = place_of(place->at + slide * size * place->along, between[v], parts, 0.1 * size);
+        if (!other) continue;
+        const double fresh = mesh.star_quality_at(id, other->at, quality);
+        if (fresh > quality) best = other->at, quality = fresh;
+      }
+      for (const double share : {0.75, 0.5, 0.25, 0.12}) {
+        if (best) break;
+        const Vec3 there = mesh.x[v] + share * (place->at - mesh.x[v]);
+        if (mesh.star_quality_at(id, there, least) > least) best = there;
+      }
+      if (best) move(*best);
     }
     if (!moved) break;
     any = true;
