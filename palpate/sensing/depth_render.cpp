@@ -39,7 +39,7 @@ class Buffer {
   Buffer(int width, int height) : width_(width), height_(height), nearest_(DepthImage::Zero(height, width)) {}
 
   void draw(const Corner& a, const Corner& b, const Corner& c) {
-    // Most triangles of a fine mesh lie between the pixels' centres.
+    // Triangles that lie between the pixels' centres end here.
     const Whole rows(std::min({a.v, b.v, c.v}), std::max({a.v, b.v, c.v}), height_);
     if (rows.none() || Whole(std::min({a.u, b.u, c.u}), std::max({a.u, b.u, c.u}), width_).none()) return;
     const double area = (b.u - a.u) * (c.v - a.v) - (c.u - a.u) * (b.v - a.v);
