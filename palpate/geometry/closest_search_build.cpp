@@ -41,6 +41,7 @@ class Packing {
   Children children(Index node) const {
     Children out;
     const Source left = 2 * node, right = left + 1;
+    if (count_[left] == 0) return {right};  // a surface of one leaf
     if (count_[right] == 0) return {left};
     const int share = best_split(node, width_).second;
     gather(left, share, out);
