@@ -53,7 +53,8 @@ void compare_with_truth(Session& session, const nlohmann::json& truth, const nlo
   }
 }
 
-int demonstrate(Session& session, const fs::path& out) {
+int demonstrate(Session& session, fs::path out) {
+  if (out.string().starts_with('-')) out = "." / out;  // the verbs below would take it for an option
   const fs::path recording = out / "recording", truth = out / "truth.json";
   must_take_files(out);
   // A demonstration that was made here before is replaced; anything else of that name is not ours to remove.

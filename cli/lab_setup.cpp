@@ -5,12 +5,25 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/materials.hpp"
 #include "palpate/io/mesh_file.hpp"
 
 namespace palpate::cli {
+
+void add_mesh_file_options(CLI::App& app, MeshFileArguments& arguments) {
+  app.add_option("--object-up", arguments.up, "which axis of a mesh file points upwards")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, int>{{"x", 0}, {"y", 1}, {"z", 2}}))
+      ->option_text("x|y|z [z]");
+  app.add_option("--object-size", arguments.size_m, "scale a mesh file to this longest extent, m (default: it is in metres)")
+      ->check(CLI::Range(0.02, 0.5));
+}
+
+TriMesh read_object(const std::string& file, const MeshFileArguments& arguments) {
+  return lab::turned_and_scaled(io::read_tri_mesh(file), arguments.up, arguments.size_m);
+}
 
 void add_lab_options(CLI::App& app, LabArguments& arguments) {
   std::string objects;
@@ -20,6 +33,7 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
   app.add_option("--object", arguments.object,
                  "what the lab's robot pushes: a mesh file (closed, metres), or one of" + objects)
       ->capture_default_str();
+  add_mesh_file_options(app, arguments.file);
   app.add_option("--material", arguments.material, "law of the true object: " + laws + " (default neo_hookean)");
   const auto rows = [](const auto& table) {
     std::string text;
@@ -36,6 +50,14 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
       ->check(CLI::PositiveNumber);
   app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
+  app.add_option("--stands", arguments.stands, "how the object stands on the table (and at the wall): glued, rough or smooth; what is not glued can lift off and slide")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ContactLaw>{
+          {"glued", ContactLaw::bonded}, {"rough", ContactLaw::friction}, {"smooth", ContactLaw::frictionless}}))
+      ->option_text("glued|rough|smooth [glued]");
+  app.add_option("--friction", arguments.friction_coefficient, "Coulomb's coefficient of a rough table and wall")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_flag("--wall", arguments.wall, "an upright wall behind the object, and a push towards it");
   lab::LabOptions& lab = arguments.lab;
   app.add_option("--compliance", lab.compliance_m_per_n, "of the lab's stick and arm, m/N (0.0001: a tenth of a millimetre a newton)")
       ->check(CLI::NonNegativeNumber);
@@ -57,11 +79,13 @@ lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
   if (arguments.young_modulus_pa != 0) options.young_modulus_pa = arguments.young_modulus_pa;
   if (arguments.poisson_ratio >= 0) options.poisson_ratio = arguments.poisson_ratio;
   options.region_ratio = arguments.region_ratio;
+  options.stands = arguments.stands;
+  options.friction_coefficient = arguments.friction_coefficient;
+  options.wall = arguments.wall;
   const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),
                                     [&](const lab::BuiltInObject& row) { return row.name == arguments.object; });
   if (built_in || !std::filesystem::exists(arguments.object)) return lab::make_object(arguments.object, options);
-  return lab::object_from_surface(io::read_tri_mesh(arguments.object),
-                                  std::filesystem::path(arguments.object).filename().string(), options);
+  return lab::object_from_surface(read_object(arguments.object, arguments.file), std::filesystem::path(arguments.object).filename().string(), options);
 }
 
 lab::LabOptions lab_options(const LabArguments& arguments, std::uint64_t seed) {
@@ -78,6 +102,7 @@ nlohmann::json truth_json(const lab::LabRobot& robot) {
                          {"young_modulus_pa", object.young_modulus_pa},
                          {"poisson_ratio", object.poisson_ratio},
                          {"material", object.material},
+                         {"stands", object.description},
                          {"extra", object.extra},
                          {"force_scale", robot.true_force_scale()},
                          {"steps", nlohmann::json::array()}};

@@ -2,12 +2,15 @@
 // `palpate paper -o OUT`: the experiments of the founding paper in the lab, by its own method and by ours, side by side.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
+#include "cli/lab_setup.hpp"
 #include "cli/paper_json.hpp"
 #include "cli/paper_page.hpp"
 #include "cli/verbs.hpp"
+#include "palpate/core/error.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/report/words.hpp"
 
@@ -21,20 +24,33 @@ struct PaperArguments {
   bool quick = false;
   int seeds = 0;  // 0 = by mode
   std::vector<std::string> scenes;
+  std::string object;  // a mesh file; empty: the lab's animal
+  MeshFileArguments file;
 };
 
 std::string line_of(const lab::PaperScene& scene, const TrialAnswer& trial) {
   std::string line = fmt::format("{} seed {}: ", scene.name, trial.seed);
   if (!scene.apparent) line += fmt::format("truth {}, {:.3f}; ", report::quantity(trial.young_modulus_pa, "Pa"), trial.poisson_ratio);
-  return line + fmt::format("paper's method {}, {:.3f} ({} solves); palpate {} ({}), {:.3f} ({} solves)",
+  return line + fmt::format("paper's method {}, {:.3f} ({} simulations); palpate {} ({}), {:.3f} ({} solved)",
                             report::quantity(trial.paper.young_modulus_pa, "Pa"), trial.paper.poisson_ratio, trial.paper.solves,
                             report::quantity(trial.palpate.young_modulus_pa, "Pa"),
                             report::interval(trial.palpate.lower_95_pa, trial.palpate.upper_95_pa, "Pa"), trial.palpate.poisson_ratio,
-                            trial.palpate.solves);
+                            trial.palpate.load_cases);
 }
 
 int remake(Session& session, const PaperArguments& arguments) {
   std::vector<const lab::PaperScene*> scenes;
+  TriMesh surface;
+  lab::PaperScene own = lab::paper_scene("cow");
+  const std::string own_name = fs::path(arguments.object).filename().string();
+  if (!arguments.object.empty()) {
+    surface = read_object(arguments.object, arguments.file);
+    own.object = own_name;
+    own.title = "Simulated test on a mesh of the user's";
+    own.differs = "The object is the mesh file that was given, glued at its foot and pressed at its top; the pad is soft, the paper pushed at a point.";
+    own.surface = &surface;
+    own.unused.reset();  // at the same place, with other forces
+  }
   std::vector<const Study*> chosen_studies;
   for (const std::string& name : arguments.scenes) {
     if (const Study* study = study_of(name)) {
@@ -47,10 +63,17 @@ int remake(Session& session, const PaperArguments& arguments) {
     for (const lab::PaperScene& scene : lab::paper_scenes()) scenes.push_back(&scene);
     for (const Study& study : studies()) chosen_studies.push_back(&study);
   }
+  if (own.surface != nullptr) {
+    for (const lab::PaperScene*& scene : scenes)
+      if (scene->name == own.name) scene = &own;
+    if (std::find(scenes.begin(), scenes.end(), &own) == scenes.end())
+      throw Error("takes the place of the cow, which is not among the scenes: add --scene cow", "--object " + arguments.object);
+  }
   const int seeds = arguments.seeds > 0 ? arguments.seeds : arguments.quick ? 1 : 100;
   fs::create_directories(arguments.output);
   std::string command = fmt::format("palpate paper -o OUT{} --seeds {} --seed {}", arguments.quick ? " --quick" : "", seeds, session.seed);
   for (const std::string& name : arguments.scenes) command += " --scene " + name;
+  if (own.surface != nullptr) command += " --object " + own_name;
 
   std::vector<SceneAnswers> answers;
   std::vector<StudyAnswer> study_answers;
@@ -107,6 +130,8 @@ Run verbs::paper(CLI::App& app) {
   app.add_flag("--quick", arguments->quick, "one seed a scene and a coarse error surface: minutes a scene in place of many hours");
   app.add_option("--seeds", arguments->seeds, "seeds a scene, from --seed on (default: 100, with --quick 1)")->check(CLI::PositiveNumber);
   app.add_option("--scene", arguments->scenes, "only this one; may be given several times" + scenes);
+  app.add_option("--object", arguments->object, "a closed mesh file that takes the place of the cow (fig. 3, 4)")->check(CLI::ExistingFile);
+  add_mesh_file_options(app, arguments->file);
   return [arguments](Session& session) { return remake(session, *arguments); };
 }
 

@@ -7,7 +7,9 @@ namespace {
 nlohmann::json json_of(const MethodAnswer& answer) {
   return {{"young_modulus_pa", answer.young_modulus_pa}, {"lower_95_pa", answer.lower_95_pa}, {"upper_95_pa", answer.upper_95_pa},
           {"poisson_ratio", answer.poisson_ratio},       {"solves", answer.solves},           {"iterations", answer.iterations},
-          {"seconds", answer.seconds},                   {"converged", answer.converged},     {"verdicts", answer.verdicts}};
+          {"seconds", answer.seconds},                   {"converged", answer.converged},     {"verdicts", answer.verdicts},
+          {"poisson_lower_95", answer.poisson_lower_95}, {"poisson_upper_95", answer.poisson_upper_95},
+          {"load_cases", answer.load_cases}};
 }
 
 nlohmann::json json_of(const TrialAnswer& trial) {
@@ -54,8 +56,8 @@ nlohmann::json json_of(const TrialAnswer& trial) {
 nlohmann::json json_of(const Score& score) {
   return {{"bias_percent", score.bias_percent}, {"rms_percent", score.rms_percent}, {"poisson_bias", score.poisson_bias},
           {"poisson_rms", score.poisson_rms},   {"inside_95", score.inside_95},     {"with_interval", score.with_interval},
-          {"without_answer", score.without},
-          {"solves", score.solves},             {"seconds", score.seconds}};
+          {"poisson_inside_95", score.poisson_inside_95}, {"without_answer", score.without},
+          {"solves", score.solves},             {"seconds", score.seconds},         {"most_load_cases", score.most_load_cases}};
 }
 
 }  // namespace

@@ -17,13 +17,15 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 
 MethodAnswer no_answer() {
   MethodAnswer out;
-  out.young_modulus_pa = out.poisson_ratio = out.lower_95_pa = out.upper_95_pa = std::numeric_limits<double>::quiet_NaN();
+  out.young_modulus_pa = out.poisson_ratio = out.lower_95_pa = out.upper_95_pa = out.poisson_lower_95 = out.poisson_upper_95 =
+      std::numeric_limits<double>::quiet_NaN();
   return out;
 }
 
 MethodAnswer summary(const Identification& answer, double seconds) {
   MethodAnswer out = no_answer();
   out.solves = answer.fit.solves;
+  out.load_cases = answer.fit.load_cases;
   out.iterations = answer.fit.iterations;
   out.seconds = seconds;
   for (const Verdict& verdict : answer.verdicts) out.verdicts.push_back(verdict.code);
@@ -34,6 +36,8 @@ MethodAnswer summary(const Identification& answer, double seconds) {
   out.poisson_ratio = poisson.value;
   out.lower_95_pa = young.lower_95;
   out.upper_95_pa = young.upper_95;
+  out.poisson_lower_95 = poisson.lower_95;
+  out.poisson_upper_95 = poisson.upper_95;
   out.converged = answer.termination == Termination::converged;
   out.path = answer.trace;
   return out;

@@ -13,7 +13,8 @@ namespace palpate::cli {
 struct MethodAnswer {
   double young_modulus_pa = 0, poisson_ratio = 0;  ///< NaN: it has none
   double lower_95_pa = 0, upper_95_pa = 0;         ///< NaN: the method has none
-  int solves = 0, iterations = 0;
+  double poisson_lower_95 = 0, poisson_upper_95 = 0;
+  int solves = 0, load_cases = 0, iterations = 0;  ///< FitSummary
   double seconds = 0;
   bool converged = false;
   std::vector<FitIteration> path;

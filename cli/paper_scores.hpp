@@ -16,10 +16,11 @@ struct SceneAnswers {
 
 /// Of a method over the trials of a scene. Trials without an answer count as such and are in no mean.
 struct Score {
-  int answers = 0, without = 0, with_interval = 0, inside_95 = 0;
+  int answers = 0, without = 0, with_interval = 0, inside_95 = 0, poisson_inside_95 = 0;
   double bias_percent = 0, rms_percent = 0;  ///< of log E; NaN: no answer at all
   double poisson_bias = 0, poisson_rms = 0;
   double solves = 0, seconds = 0;            ///< means
+  int most_load_cases = 0;
 };
 struct SceneScores {
   Score paper, paper_coarse, palpate, other;

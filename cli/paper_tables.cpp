@@ -24,11 +24,13 @@ std::string interval(const MethodAnswer& answer) {
 std::string number(double value, const char* format) { return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "none"; }
 
 std::string score_row(const std::string& method, const Score& score, bool with_intervals) {
-  const std::string held = with_intervals ? fmt::format("{} of {}", score.inside_95, score.with_interval) : "none";
-  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                     method, number(score.bias_percent, "{:+.1f} %"), number(score.rms_percent, "{:.1f} %"),
-                     number(score.poisson_bias, "{:+.3f}"), number(score.poisson_rms, "{:.3f}"), held, score.without,
-                     number(score.solves, "{:.0f}"), number(score.seconds, "{:.1f}"));
+  const auto held = [&](int inside) { return with_intervals ? fmt::format("{} of {}", inside, score.with_interval) : "none"; };
+  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+                     "<td>{}</td></tr>\n",
+                     method, number(score.bias_percent, "{:+.1f} %"), number(score.rms_percent, "{:.1f} %"), held(score.inside_95),
+                     number(score.poisson_bias, "{:+.3f}"), number(score.poisson_rms, "{:.3f}"), held(score.poisson_inside_95),
+                     score.without, number(score.solves, "{:.0f}"), with_intervals ? fmt::format("{}", score.most_load_cases) : "",
+                     number(score.seconds, "{:.1f}"));
 }
 
 /// Of one method over the samples alone.
@@ -94,7 +96,7 @@ std::string site_table(const TrialAnswer& trial) {
 std::string sample_table(const TrialAnswer& trial, bool truth_known) {
   if (trial.samples.empty()) return {};
   std::string html = "<table><tr><th>a sample alone</th><th>samples</th><th>mean E</th><th>standard deviation</th><th>iterations</th>"
-                     "<th>solves</th><th>s</th></tr>\n";
+                     "<th>simulated</th><th>s</th></tr>\n";
   const auto line = [&](const char* name, const Spread& spread) {
     if (spread.answers == 0) return fmt::format("<tr><td>{}</td><td>0</td></tr>\n", name);
     return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.1f} %</td><td>{:.1f}</td><td>{:.0f}</td><td>{:.1f}</td></tr>\n", name,
@@ -137,16 +139,19 @@ std::string score_table(const lab::PaperScene& scene, const std::vector<TrialAns
   if (scene.apparent)
     return "<p class=\"small\">An apparent modulus has no truth: no errors are given, and the claims on top leave this scene out.</p>\n";
   const bool by_site = !trials.front().sites.empty();
-  std::string html = "<table><tr><th>method</th><th>bias of E</th><th>rms of E</th><th>bias of &nu;</th><th>rms of &nu;</th><th>truth in "
-                     "95 %</th><th>no answer</th><th>solves</th><th>s</th></tr>\n";
+  std::string html = "<table><tr><th>method</th><th>bias of E</th><th>rms of E</th><th>E in 95 %</th><th>bias of &nu;</th><th>rms of "
+                     "&nu;</th><th>&nu; in 95 %</th><th>no answer</th><th>simulated</th><th>solved</th><th>s</th></tr>\n";
   const SceneScores scores = scores_of(trials);
   if (!by_site && scores.paper_coarse.answers > 0) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
   html += score_row(by_site ? "the paper's method on palpate's mesh, by site" : "the paper's method on palpate's mesh", scores.paper, false);
   html += score_row("palpate", scores.palpate, true);
   if (!trials.front().other_law.empty()) html += score_row("palpate with the " + trials.front().other_law + " law", scores.other, true);
   return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm. Seeds share what was "
-                            "solved for where the object is the same: seconds are of what was left to do. A solve is one sample simulated "
-                            "at one (E, &nu;); in small strains both methods make it up of unit responses.</p>\n",
+                            "solved for where the object is the same: seconds are of what was left to do. Simulated: samples "
+                            "at one (E, &nu;) that the method asks for. Solved: load cases that the finite elements had to be solved for, "
+                            "at most in a seed. In small strains palpate makes every sample up of unit loads solved at a few &nu;, those of "
+                            "its finer mesh included. The paper's method runs a simulation each time; its seconds here are with palpate's "
+                            "unit loads all the same, so that the machine is not what tells them apart.</p>\n",
                             trials.size(), trials.size() == 1 ? "" : "s");
 }
 

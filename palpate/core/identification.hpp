@@ -41,7 +41,10 @@ struct FitSummary {
   std::size_t pushes = 0;
   std::size_t steps = 0;
   int iterations = 0;
-  int solves = 0;  ///< static equilibria that were solved
+  int solves = 0;  ///< static equilibria that were asked for
+  /// Load cases that the finite elements were solved for. In small strains equilibria are put together of unit loads, solved
+  /// with their slopes at a few Poisson ratios (none where an earlier fit did so); else as many as `solves`.
+  int load_cases = 0;
 };
 
 struct HeldOut {

@@ -127,6 +127,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     so_far.steps = step_fits(objective);
     so_far.fit.iterations = static_cast<int>(answer.trace.size());
     so_far.fit.solves = model.solves();
+    so_far.fit.load_cases = model.load_cases();
     options.on_estimate(so_far);
   };
   Optimum optimum = optimise_from_several(objective, start, loss, optimiser, progress);
@@ -136,6 +137,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   answer.message = optimum.message;
   if (!optimum.evaluation.usable) {
     answer.fit.solves = model.solves();
+    answer.fit.load_cases = model.load_cases();
     answer.verdicts.push_back({"not_converged", "The simulation found no equilibrium (" + optimum.message +
                                                     "): check the loads, the supports and the material."});
     return answer;
@@ -225,6 +227,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     }
   }
   answer.fit.solves = model.solves();
+  answer.fit.load_cases = model.load_cases() + (mesh ? mesh->load_cases : 0);
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts});
   if (doubt != nullptr) answer.verdicts.push_back(partly_seen(*doubt));
   answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);

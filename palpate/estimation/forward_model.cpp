@@ -192,6 +192,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     }
   }
   solves_.assign(workers_, 0);
+  load_cases_before_ = unit_load_cases();
   for (std::size_t s = 0; s < steps_.size(); ++s) body_of(push(s), worker_of(s));
 }
 
@@ -212,6 +213,16 @@ int ForwardModel::solves() const {
   for (int n : solves_) sum += n;
   return sum;
 }
+
+int ForwardModel::unit_load_cases() const {
+  int sum = 0;
+  for (const auto& bodies : solved_->bodies)
+    for (const auto& [tools, body] : bodies)
+      if (body->response) sum += body->response->load_cases();
+  return sum;
+}
+
+int ForwardModel::load_cases() const { return linear_ ? unit_load_cases() - load_cases_before_ : solves(); }
 
 const Step& ForwardModel::step(std::size_t s) const { return push(s).steps[steps_[s].step]; }
 const Push& ForwardModel::push(std::size_t s) const { return recording_->pushes[steps_[s].push]; }

@@ -110,7 +110,10 @@ class ForwardModel {
   /// Forgets warm starts, so that the next answer does not depend on what was asked before.
   void forget();
 
+  /// Equilibria that were asked for.
   int solves() const;
+  /// Load cases that the finite elements were solved for (FitSummary::load_cases), here and not by an earlier model.
+  int load_cases() const;
 
  private:
   struct Body;          // one Statics: a set of platens and its columns of loads
@@ -120,6 +123,7 @@ class ForwardModel {
   struct ContactState;
   using ContactStatePtr = std::shared_ptr<const ContactState>;
 
+  int unit_load_cases() const;
   /// False: no equilibrium, and `out` says why.
   bool solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
                   Watched& watched, StepPrediction& out);
@@ -177,7 +181,8 @@ class ForwardModel {
   int parameters_ = first_ratio;  ///< log E, nu and the regions' ratios: the first columns of every derivative
   const SurfaceField* field_ = nullptr;  // of solved_; nullptr: none
   int field_unknown_ = -1;
-  std::vector<int> solves_;  // a worker
+  std::vector<int> solves_;    // a worker
+  int load_cases_before_ = 0;  // of unit responses taken over
 };
 
 /// Sets how far solutions are reused, for as long as it lives.

@@ -115,6 +115,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   answer.fit.iterations = optimum.iterations;
   const auto done = [&] {
     answer.fit.solves = model.solves();
+    answer.fit.load_cases = model.load_cases();
     steps_evaluated_ = objective.steps_evaluated();
     return answer;
   };

@@ -49,6 +49,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
   const bool linear = fem::material_law(objective.model().object().material).is_linear() &&
                       std::none_of(recording.supports.begin(), recording.supports.end(), lifts_off);
   const bool kept = solved != nullptr && linear;
+  int load_cases = 0;
   const auto small_strains = [&](Recording copy, SimulatedObject object) {
     // Both meshes integrate alike: as the fit did, or as this ratio alone asks for.
     auto statics = statics_options(copy, object, options);
@@ -68,6 +69,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
     for (std::size_t s = 0; s < model.step_count(); ++s) {
       if (highest.steps[s] != 0) predicted[s] = model.predict(s, optimum.unknowns);
     }
+    load_cases += model.load_cases();
     return predicted;
   };
   if (progress && !progress("mesh error", 0)) return std::nullopt;
@@ -94,6 +96,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
   if (!change.allFinite()) return std::nullopt;
   const double whole = 1 / (1 - std::pow(2.0, -order));
   AnswerShift shift;
+  shift.load_cases = load_cases;
   shift.region_log_young = VectorX::Zero(objective.unknowns().ratio_count());
   for (std::size_t k = 0; k < moving.size(); ++k) {
     const double moved = whole * change(static_cast<Index>(k));

@@ -15,7 +15,8 @@ namespace palpate::estimation {
 struct AnswerShift {
   double log_young = 0, poisson = 0;
   VectorX region_log_young;  ///< of further regions
-  AnswerShift of_region(Index region) const { return {region == 0 ? log_young : region_log_young(region - 1), poisson, {}}; }
+  int load_cases = 0;        ///< that were solved to find it
+  AnswerShift of_region(Index region) const { return {region == 0 ? log_young : region_log_young(region - 1), poisson, {}, 0}; }
 };
 
 /// What the change of the simulated surfaces and travels between the two meshes, at the highest loads, does to the optimum: one

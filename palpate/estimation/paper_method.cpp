@@ -115,6 +115,8 @@ std::size_t PaperError::samples() const { return impl_->steps.size(); }
 std::size_t PaperError::points() const { return impl_->count; }
 int PaperError::solves() const { return impl_->model->solves(); }
 
+int PaperError::load_cases() const { return impl_->model->load_cases(); }
+
 double PaperError::operator()(double young_modulus_pa, double poisson_ratio) {
   VectorX at = impl_->unknowns.prior_mean();
   at(log_young) = std::log(young_modulus_pa);
@@ -225,6 +227,7 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
   }
   answer.fit.iterations = iteration;
   answer.fit.solves = error.solves();
+  answer.fit.load_cases = error.load_cases();
   answer.fit.rms_m = std::sqrt(here);
   answer.fit.points_used = error.points();
   answer.fit.steps = error.samples();

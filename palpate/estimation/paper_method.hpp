@@ -28,6 +28,7 @@ class PaperError {
   std::size_t samples() const;
   std::size_t points() const;
   int solves() const;
+  int load_cases() const;  ///< FitSummary::load_cases: the method itself knows no unit loads
 
  private:
   struct Impl;

@@ -77,6 +77,18 @@ int LinearResponse::factorisations() const {
   return factorisations_;
 }
 
+int LinearResponse::load_cases() const {
+  const std::lock_guard lock(mutex_);
+  return load_cases_;
+}
+
+UnitResponses LinearResponse::solve(double poisson_ratio) const {
+  UnitResponses solved = statics_.unit_responses(poisson_ratio, watched_);
+  ++factorisations_;
+  load_cases_ += 2 * static_cast<int>(solved.force.cols() + solved.motion.cols());  // values and slopes
+  return solved;
+}
+
 std::shared_ptr<const UnitResponses> LinearResponse::at(double poisson_ratio) const {
   const std::lock_guard lock(mutex_);
   for (auto& known : recent_)
@@ -87,8 +99,7 @@ std::shared_ptr<const UnitResponses> LinearResponse::at(double poisson_ratio) co
   if (inside && !coefficients_.empty()) {
     answer = std::make_shared<UnitResponses>(interpolate(poisson_ratio));
   } else {
-    answer = std::make_shared<UnitResponses>(statics_.unit_responses(poisson_ratio, watched_));
-    ++factorisations_;
+    answer = std::make_shared<UnitResponses>(solve(poisson_ratio));
   }
   // A search that is refused a step comes back to where it was.
   recent_.push_back(answer);
@@ -114,8 +125,7 @@ void LinearResponse::make_polynomial() const {
     for (int j = 0; j < nodes; ++j) {
       const double x = std::cos(EIGEN_PI * (2 * j + 1) / (2 * nodes));
       const double z = range.middle + range.half * x;
-      const UnitResponses solved = statics_.unit_responses(z_to_poisson(z), watched_);
-      ++factorisations_;
+      const UnitResponses solved = solve(z_to_poisson(z));
       residual = std::max(residual, solved.residual);
       const auto at = static_cast<std::size_t>(j);
       data[at] = stacked(solved, false);

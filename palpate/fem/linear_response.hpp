@@ -33,8 +33,11 @@ class LinearResponse {
   /// Of the polynomial, relative: the larger of its last coefficients and what the solver left over (0: not made).
   double interpolation_error() const;
   int factorisations() const;
+  /// Right-hand sides solved so far: unit loads and their slopes.
+  int load_cases() const;
 
  private:
+  UnitResponses solve(double poisson_ratio) const;
   void make_polynomial() const;
   UnitResponses interpolate(double poisson_ratio) const;
 
@@ -43,7 +46,7 @@ class LinearResponse {
   Options options_;
   mutable std::mutex mutex_;
   mutable std::vector<std::shared_ptr<const UnitResponses>> recent_;  // latest last
-  mutable int factorisations_ = 0;
+  mutable int factorisations_ = 0, load_cases_ = 0;
   mutable bool usable_ = true;                 // false: the polynomial would be too large, or not accurate enough
   mutable std::vector<MatrixX> coefficients_;  // of T_i: [watched; reactions of forces and motions; gradients] x (k + m)
   mutable double error_ = 0, residual_ = 0;

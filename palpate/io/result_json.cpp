@@ -112,7 +112,8 @@ json from(const FitSummary& fit) {
           {"pushes", fit.pushes},
           {"steps", fit.steps},
           {"iterations", fit.iterations},
-          {"solves", fit.solves}};
+          {"solves", fit.solves},
+          {"load_cases", fit.load_cases}};
 }
 FitSummary fit_from(const json& object) {
   FitSummary fit;
@@ -123,6 +124,7 @@ FitSummary fit_from(const json& object) {
   fit.steps = object.at("steps");
   fit.iterations = object.at("iterations");
   fit.solves = object.at("solves");
+  fit.load_cases = object.value("load_cases", fit.solves);  // earlier versions did not say
   return fit;
 }
 

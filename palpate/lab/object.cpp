@@ -27,6 +27,7 @@ LabObject draw(const std::string& name, const ObjectOptions& o, double stiffer =
   };
   need(!o.young_modulus_pa || *o.young_modulus_pa > 0, "young_modulus_pa", "must be positive");
   need(!o.poisson_ratio || (*o.poisson_ratio >= 0 && *o.poisson_ratio < 0.4999), "poisson_ratio", "must be in [0, 0.4999)");
+  need(o.friction_coefficient > 0 && std::isfinite(o.friction_coefficient), "friction_coefficient", "must be positive");
   need(o.region_ratio > 0 && std::isfinite(o.region_ratio), "region_ratio", "must be positive");
   need(o.tetrahedra >= 200, "tetrahedra", "must be at least 200");
   need(o.cells_in_radius >= 1, "cells_in_radius", "must be at least 1");
@@ -46,12 +47,29 @@ LabObject draw(const std::string& name, const ObjectOptions& o, double stiffer =
   return object;
 }
 
-Support table(const Vec3& base_centre_m) {
+Support flat(const ObjectOptions& o, SupportKind kind, const char* name, const Vec3& point_m, const Vec3& normal) {
   Support support;
-  support.kind = SupportKind::plane;
-  support.name = "table";
-  support.plane.point_m = base_centre_m;
+  support.kind = o.stands == ContactLaw::bonded ? SupportKind::plane : kind;
+  support.contact = o.stands;
+  if (o.stands == ContactLaw::friction) support.friction_coefficient = o.friction_coefficient;
+  support.name = name;
+  support.plane = {point_m, normal};
   return support;
+}
+
+std::string standing(const ObjectOptions& o) {
+  const std::string how = o.stands == ContactLaw::bonded     ? "glued to the table"
+                          : o.stands == ContactLaw::friction ? "standing on the table"
+                                                             : "standing on a smooth table";
+  return !o.wall ? how : how + (o.stands == ContactLaw::bonded ? " and to a wall behind it" : ", a wall behind it");
+}
+
+// On the table, and at the wall if there is one.
+void stand(LabObject& object, const ObjectOptions& o) {
+  object.supports.push_back(flat(o, SupportKind::table, "table", o.base_centre_m, Vec3::UnitZ()));
+  const double behind_m = object.surface.vertices_m.col(0).maxCoeff();
+  if (o.wall)
+    object.supports.push_back(flat(o, SupportKind::wall, "wall", Vec3(behind_m, o.base_centre_m.y(), o.base_centre_m.z()), -Vec3::UnitX()));
 }
 
 PushSite site(const LabObject& object, const ObjectOptions& o, const std::string& name, const Vec3& aim_m, const Vec3& direction,
@@ -75,6 +93,10 @@ void size_pushes(LabObject& object, double pad_radius_m) {
 }
 
 void make_pressable(LabObject& object, const ObjectOptions& o) {
+  if (o.wall) {
+    const double height_m = object.surface.vertices_m.col(2).maxCoeff() - o.base_centre_m.z();
+    object.sites.push_back(site(object, o, "to the wall", {0, 0, 0.6 * height_m}, Vec3(0.94, 0, -0.34)));
+  }
   PressedObjectOptions pressed;
   pressed.surface = object.surface;
   pressed.supports = object.supports;
@@ -98,7 +120,7 @@ void make_pressable(LabObject& object, const ObjectOptions& o) {
 // others on one as for any object.
 void make_pressable_block(LabObject& object, const ObjectOptions& o, const Vec3& size_m) {
   make_pressable(object, o);
-  if (!object.regions.empty()) return;
+  if (!object.regions.empty() || o.wall || o.stands != ContactLaw::bonded) return;
   PressedBlockOptions block;
   block.size_m = size_m;
   block.pad_radius_m = object.pad_radius_m;
@@ -142,16 +164,16 @@ LabObject shaped(const std::string& name, const ObjectOptions& o, const Implicit
   LabObject object = draw(name, o, stiffer);
   object.surface = implicit_surface(body, {min_m, max_m, surface_cell_m});
   object.surface.vertices_m.rowwise() += o.base_centre_m.transpose();
-  object.supports.push_back(table(o.base_centre_m));
+  stand(object, o);
   return object;
 }
 
 LabObject cube(const ObjectOptions& o) {
   LabObject object = draw("cube", o);
   constexpr double edge_m = 0.15;
-  object.description = "a foam cube of 150 mm, glued to the table";
+  object.description = "a foam cube of 150 mm, " + standing(o);
   object.surface = box_surface(o.base_centre_m - Vec3(0.5 * edge_m, 0.5 * edge_m, 0), o.base_centre_m + Vec3(0.5 * edge_m, 0.5 * edge_m, edge_m), 30);
-  object.supports.push_back(table(o.base_centre_m));
+  stand(object, o);
   size_pushes(object, 0.025);
   for (const double x : {-0.02, 0.03})
     object.sites.push_back(site(object, o, x < 0 ? "top" : "top aside", {x, 0, edge_m}, -Vec3::UnitZ()));
@@ -162,7 +184,7 @@ LabObject cube(const ObjectOptions& o) {
 LabObject ball(const ObjectOptions& o) {
   const Vec3 centre(0, 0, 0.052);
   LabObject object = shaped("ball", o, [&](const Vec3& p) { return (p - centre).norm() - 0.06; }, {-0.07, -0.07, 0}, {0.07, 0.07, 0.12});
-  object.description = "a ball of 120 mm, flattened and glued to the table at its foot";
+  object.description = "a ball of 120 mm with a flattened foot, " + standing(o);
   size_pushes(object, 0.018);
   object.sites = {site(object, o, "top", centre, -Vec3::UnitZ()), site(object, o, "slanted", centre, {0.5, 0, -0.866})};
   make_pressable(object, o);
@@ -172,9 +194,9 @@ LabObject ball(const ObjectOptions& o) {
 // Stout enough: a pad's dead load of the usual depth on its end is two fifths of what would buckle it.
 LabObject bar(const ObjectOptions& o) {
   LabObject object = draw("bar", o, 10);
-  object.description = "an upright bar of 80 x 80 x 160 mm, glued to the table with one end";
+  object.description = "an upright bar of 80 x 80 x 160 mm, " + standing(o);
   object.surface = box_surface(o.base_centre_m - Vec3(0.04, 0.04, 0), o.base_centre_m + Vec3(0.04, 0.04, 0.16), 20);
-  object.supports.push_back(table(o.base_centre_m));
+  stand(object, o);
   size_pushes(object, 0.015);
   object.sites = {site(object, o, "side", {-0.04, 0, 0.125}, {0.866, 0, -0.5}, 0.12),
                   site(object, o, "end", {0.005, 0, 0.16}, -Vec3::UnitZ(), 0.5)};
@@ -199,7 +221,7 @@ double bear_body(const Vec3& p) {
 
 LabObject bear(const ObjectOptions& o) {
   LabObject object = shaped("bear", o, bear_body, {-0.12, -0.13, 0}, {0.12, 0.08, 0.22});
-  object.description = "a sitting plush bear of 200 mm, glued to the table";
+  object.description = "a sitting plush bear of 200 mm, " + standing(o);
   size_pushes(object, 0.015);
   object.sites = {site(object, o, "head", {0, -0.004, 0.155}, -Vec3::UnitZ(), 0.7),
                   site(object, o, "belly", {0, 0, 0.075}, {0, 0.866, -0.5}),
@@ -225,7 +247,7 @@ double animal_body(const Vec3& p) {
 
 LabObject animal(const ObjectOptions& o) {
   LabObject object = shaped("animal", o, animal_body, {-0.18, -0.07, 0}, {0.13, 0.07, 0.21});
-  object.description = "a soft animal of 280 mm on four legs, glued to the table with its feet";
+  object.description = "a soft animal of 280 mm on four legs, " + standing(o);
   size_pushes(object, 0.015);
   object.sites = {site(object, o, "back", {0.0, 0, 0.1}, -Vec3::UnitZ(), 0.6), site(object, o, "flank", {0.03, 0, 0.1}, {0, 0.5, -0.866}, 0.4)};
   make_pressable(object, o);
@@ -234,6 +256,7 @@ LabObject animal(const ObjectOptions& o) {
 
 // No solid: E is the skin's, and a solid model finds an apparent modulus at most.
 LabObject balloon(const ObjectOptions& o) {
+  if (o.wall || o.stands != ContactLaw::bonded) throw Error("is glued to the table, without a wall", "balloon");
   LabObject object = draw("balloon", o, 60);
   object.description = "a balloon of 150 mm, a skin of 0.3 mm stretched to twice its size, glued to the table at its foot";
   object.state = RestState::under_pressure;
@@ -245,9 +268,9 @@ LabObject balloon(const ObjectOptions& o) {
   balloon.base_centre_m = o.base_centre_m;
   object.pad_radius_m = balloon.pad_radius_m;
   object.travel_limit_m = 0.5 * object.pad_radius_m;
-  object.supports.push_back(table(o.base_centre_m));
   PressedBalloon trial(balloon);
   object.surface = trial.surface();
+  stand(object, o);
   object.sites = {site(object, o, "top", {0, 0, 0.1}, -Vec3::UnitZ())};
   // A short touch says how stiff it is, and the spring is nearly straight.
   const double touch_n = 0.01 * trial.pressure_pa() * EIGEN_PI * object.pad_radius_m * object.pad_radius_m;
@@ -289,6 +312,18 @@ LabObject make_object(std::string_view name, const ObjectOptions& options) {
   throw Error("is no object of the lab (there are: " + names + ") and no mesh file", "object " + std::string(name));
 }
 
+TriMesh turned_and_scaled(TriMesh surface, int up, double size_m) {
+  if (up < 0 || up > 2) throw Error("must be 0, 1 or 2", "up");
+  if (!(size_m >= 0)) throw Error("must not be negative", "size_m");
+  if (up != 2) {  // a cyclic change of axes is a rotation
+    const Points before_m = surface.vertices_m;
+    for (int k = 0; k < 3; ++k) surface.vertices_m.col(k) = before_m.col((up + 1 + k) % 3);
+  }
+  const Vec3 extent_m = (surface.vertices_m.colwise().maxCoeff() - surface.vertices_m.colwise().minCoeff()).transpose();
+  if (size_m > 0 && extent_m.maxCoeff() > 0) surface.vertices_m *= size_m / extent_m.maxCoeff();
+  return surface;
+}
+
 LabObject object_from_surface(const TriMesh& surface, const std::string& name, const ObjectOptions& options) {
   const auto check = geometry::check_surface(surface);
   if (!check.watertight()) throw Error("must be closed and consistently oriented; `palpate model` repairs a surface", name);
@@ -296,16 +331,21 @@ LabObject object_from_surface(const TriMesh& surface, const std::string& name, c
   if (!(extent.minCoeff() > 0.02 && extent.maxCoeff() < 0.5))
     throw Error("must be between 2 cm and 50 cm large; are its units metres?", name);
   LabObject object = draw(name, options);
-  object.description = "the surface " + name + ", glued to the table at its foot";
+  object.description = "the surface " + name + ", " + standing(options);
   object.surface = surface;
   const Vec3 foot(0.5 * (check.min_m.x() + check.max_m.x()), 0.5 * (check.min_m.y() + check.max_m.y()), check.min_m.z());
   object.surface.vertices_m.rowwise() += (options.base_centre_m - foot).transpose();
-  Support glue;  // what lies lower than a fifteenth of its height: few shapes stand on a plane
-  glue.kind = SupportKind::box;
-  glue.name = "table";
-  glue.box_min_m = options.base_centre_m - Vec3(extent.x(), extent.y(), 0.01);
-  glue.box_max_m = options.base_centre_m + Vec3(extent.x(), extent.y(), extent.z() / 15);
-  object.supports.push_back(glue);
+  if (options.stands == ContactLaw::bonded) {
+    Support glue;  // what lies lower than a fifteenth of its height: few shapes stand on a plane
+    glue.kind = SupportKind::box;
+    glue.name = "table";
+    glue.box_min_m = options.base_centre_m - Vec3(extent.x(), extent.y(), 0.01);
+    glue.box_max_m = options.base_centre_m + Vec3(extent.x(), extent.y(), extent.z() / 15);
+    object.supports.push_back(glue);
+    if (options.wall) throw Error("can be glued to the table only: no flat side of it is known", name + ", wall");
+  } else {
+    stand(object, options);
+  }
   size_pushes(object, 0.12 * extent.minCoeff());
   object.sites = {site(object, options, "top", {0, 0, 0.5 * extent.z()}, -Vec3::UnitZ())};
   make_pressable(object, options);

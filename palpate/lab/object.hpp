@@ -33,6 +33,11 @@ struct ObjectOptions {
   std::vector<double> extra;                         ///< its further parameters, in the table's order; empty = their initial values
   double region_ratio = 1;                           ///< of an object with regions: their stiffnesses differ by this factor
   Vec3 base_centre_m = Vec3(0.6, 0.0, 0.0);          ///< of the object's foot on the table, base frame
+  /// How it stands on the table, and at the wall if there is one: glued, or only pushed against them.
+  ContactLaw stands = ContactLaw::bonded;
+  double friction_coefficient = 0.6;                 ///< with ContactLaw::friction
+  /// An upright wall behind the object, at its outermost points along x; a site more pushes towards it.
+  bool wall = false;
   Index tetrahedra = 8000;                           ///< of the true mesh
   int cells_in_radius = 5;                           ///< edges across the pad's radius
 };
@@ -73,8 +78,11 @@ std::span<const BuiltInObject> built_in_objects();
 /// @throws Error listing the names when there is none of that name, or naming the option that is out of range.
 LabObject make_object(std::string_view name, const ObjectOptions& options = {});
 
-/// A user's closed surface (metres), put with its lowest point and middle at the table's place and bonded there where it
-/// touches; pushed from above at its top.
+/// Turned so that what was along `up` (0, 1, 2: x, y, z) is along z, and scaled to this longest extent (0: as it is).
+TriMesh turned_and_scaled(TriMesh surface, int up, double size_m);
+
+/// A user's closed surface (metres), put with its lowest point and middle at the table's place; glued, what lies in the lowest
+/// fifteenth of its height is held. Pushed from above at its top.
 /// @throws Error when it is not closed or not between 2 cm and 50 cm large.
 LabObject object_from_surface(const TriMesh& surface, const std::string& name, const ObjectOptions& options = {});
 

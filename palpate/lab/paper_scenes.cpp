@@ -86,7 +86,9 @@ LabObject object_of(const PaperScene& scene, std::uint64_t seed) {
   if (scene.young_modulus_pa > 0) truth.young_modulus_pa = scene.young_modulus_pa;
   if (scene.poisson_ratio > 0) truth.poisson_ratio = scene.poisson_ratio;
   truth.region_ratio = scene.region_ratio;
-  LabObject object = scene.make != nullptr ? scene.make(truth) : make_object(scene.object, truth);
+  LabObject object = scene.make != nullptr      ? scene.make(truth)
+                     : scene.surface != nullptr ? object_from_surface(*scene.surface, std::string(scene.object), truth)
+                                                : make_object(scene.object, truth);
   if (scene.sites > 0) object.sites.resize(static_cast<std::size_t>(scene.sites));
   return object;
 }

@@ -43,6 +43,7 @@ struct PaperScene {
   std::string_view differs;     ///< where the lab's scene is not the paper's
   std::string_view object = {};      ///< of the lab's table, unless `make` is given
   LabObject (*make)(const ObjectOptions&) = nullptr;
+  const TriMesh* surface = nullptr;  ///< a user's, in place of `object`, which then is its name
   std::string_view depth_sensor, force_sensor;
   double young_modulus_pa = 0, poisson_ratio = 0;  ///< 0: drawn from the seed
   double region_ratio = 1;                         ///< 1: one stiffness everywhere

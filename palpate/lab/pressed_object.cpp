@@ -9,6 +9,8 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/contact/rigid_shape.hpp"
+#include "palpate/fem/contact_statics.hpp"
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 #include "palpate/geometry/embedding.hpp"
@@ -101,6 +103,22 @@ void curve_boundary(TetMesh& mesh, const TriMesh& surface, const std::vector<cha
   }
 }
 
+bool flat(const Support& support) { return support.kind != SupportKind::box; }
+bool pushes_only(const Support& support) { return support.kind == SupportKind::table || support.kind == SupportKind::wall; }
+
+fem::RigidContact contact_of(const Support& support) {
+  fem::RigidContact contact;
+  contact.name = support.name;
+  contact.shape = fem::plane_shape();
+  contact.T_base_tool = fem::tool_pose(support.plane.point_m, support.plane.normal);
+  contact.seat_m = 1e-4;
+  contact.stiffness = 1000;  // of the layer: the foot has no rim that runs through faces
+  const bool rough = support.contact == ContactLaw::friction;
+  contact.law = rough ? fem::Touch::friction : fem::Touch::frictionless;
+  contact.friction_coefficient = support.friction_coefficient;
+  return contact;
+}
+
 // What stands on a plane was laid on it: a wider tolerance would hold what only comes near it, as a ball does around its foot.
 bool holds(const Support& support, const TetMesh& mesh, const Tetrahedra& faces, Index f) {
   const auto corner = [&](int k) { return Vec3(mesh.nodes_m.row(faces(f, k))); };
@@ -131,9 +149,8 @@ struct PressedObject::Impl {
     filling.finer.push_back(
         {options.contact_m, 1.5 * options.pad_radius_m, options.pad_radius_m / options.cells_in_radius});
     if (options.opposed_m) filling.finer.push_back({*options.opposed_m, filling.finer[0].radius_m, filling.finer[0].edge_m});
-    const auto flat = [](const Support& one) { return one.kind == SupportKind::plane; };
     for (const Support& support : options.supports)
-      if (flat(support))
+      if (flat(support) && !pushes_only(support))  // what may slide has no rim where stress is singular
         for (auto near : geometry::finer_at_feet(support.plane, options.surface)) {
           near.edge_m *= 5.0 / 6;
           filling.finer.push_back(near);
@@ -143,18 +160,26 @@ struct PressedObject::Impl {
       if (flat(support)) geometry::stand_on(support.plane, options.surface, linear);
     mesh = fem::to_quadratic(linear);
 
-    std::vector<char> held(std::size_t(mesh.nodes_m.rows()), 0);
+    std::vector<char> stays(std::size_t(mesh.nodes_m.rows()), 0), held = stays;
     fem::Boundary boundary;
+    std::vector<fem::RigidContact> contacts;
     const Tetrahedra faces = fem::boundary_faces(mesh);
-    for (Index f = 0; f < faces.rows(); ++f)
-      for (const Support& support : options.supports)
-        if (holds(support, mesh, faces, f))
-          for (int k = 0; k < 6; ++k) held[std::size_t(faces(f, k))] = 1;
+    for (const Support& support : options.supports) {
+      if (pushes_only(support)) contacts.push_back(contact_of(support));
+      for (Index f = 0; f < faces.rows(); ++f) {
+        if (!holds(support, mesh, faces, f)) continue;
+        for (int k = 0; k < 6; ++k) {
+          stays[std::size_t(faces(f, k))] = 1;
+          if (!pushes_only(support)) held[std::size_t(faces(f, k))] = 1;
+        }
+      }
+    }
     for (Index n = 0; n < Index(held.size()); ++n)
       if (held[std::size_t(n)]) boundary.constraints.push_back({n, Mat3::Identity(), 3});
     boundary.inertia_relief = options.opposed_m.has_value();
-    if (boundary.constraints.empty() && !options.opposed_m) throw Error("no support touches the object", "PressedObjectOptions.supports");
-    curve_boundary(mesh, options.surface, held);
+    if (boundary.constraints.empty() && contacts.empty() && !options.opposed_m)
+      throw Error("no support touches the object", "PressedObjectOptions.supports");
+    curve_boundary(mesh, options.surface, stays);
 
     const Eigen::SparseMatrix<double> columns = fem::spread_over_patch(mesh, options.contact_m, options.pad_radius_m);
     VectorX along = columns * options.direction;  // per newton
@@ -178,7 +203,15 @@ struct PressedObject::Impl {
       }
       statics_options.region = fem::regions_of(mesh, regions);
     }
-    statics = std::make_unique<fem::Statics>(mesh, options.material, std::move(boundary), statics_options);
+    if (contacts.empty()) {
+      statics = std::make_unique<fem::Statics>(mesh, options.material, std::move(boundary), statics_options);
+    } else {
+      fem::ContactOptions contact_options;
+      contact_options.statics = statics_options;
+      contact_options.friction_tolerance = 1e-4;  // as the residual: far below the sensors' errors
+      boundary.motions.resize(3 * Eigen::Index(mesh.nodes_m.rows()), 0);
+      resting = std::make_unique<fem::ContactStatics>(mesh, options.material, std::move(boundary), std::move(contacts), contact_options);
+    }
     TetMesh corners{mesh.nodes_m, mesh.tetrahedra.leftCols(4)};
     embedding = geometry::embed(options.surface.vertices_m, corners);
   }
@@ -192,17 +225,27 @@ struct PressedObject::Impl {
   }
 
   void press(double force_n) {
-    const VectorX coefficient = VectorX::Constant(1, force_n), none(0);
     const VectorX extra = Eigen::Map<const VectorX>(options.extra.data(), Eigen::Index(options.extra.size()));
+    const auto take = [&](const auto& state) {
+      if (!state.converged)
+        throw Error("the true object found no equilibrium under " + std::to_string(force_n) + " N (" + state.reason +
+                        "): press less deep" + (resting ? ", or let more friction hold it" : ""),
+                    "PressedObject");
+      displacement_m = state.displacement_m;
+      at_n = force_n;
+    };
+    if (resting) {
+      fem::ContactLoads loads = resting->no_loads();
+      loads.force_coefficients(0) = force_n;
+      fem::ContactEquilibrium state =
+          resting->solve(options.young_modulus_pa, options.poisson_ratio, loads, lies.converged ? &lies : nullptr, extra);
+      take(state);
+      lies = std::move(state);
+      return;
+    }
+    const VectorX coefficient = VectorX::Constant(1, force_n), none(0);
     const VectorX start = displacement_m.size() ? VectorX(force_n / at_n * displacement_m) : VectorX();
-    fem::Equilibrium state = statics->solve(options.young_modulus_pa, options.poisson_ratio, coefficient, none,
-                                            start.size() ? &start : nullptr, extra);
-    if (!state.converged)
-      throw Error("the true object found no equilibrium under " + std::to_string(force_n) + " N (" + state.reason +
-                      "): press less deep",
-                  "PressedObject");
-    displacement_m = std::move(state.displacement_m);
-    at_n = force_n;
+    take(statics->solve(options.young_modulus_pa, options.poisson_ratio, coefficient, none, start.size() ? &start : nullptr, extra));
   }
 
   double moved_m(const VectorX& shares) const {
@@ -235,7 +278,9 @@ struct PressedObject::Impl {
   VectorX displacement_m;  // empty = at rest
   double at_n = 0;
   SurfaceEmbedding embedding;
-  std::unique_ptr<fem::Statics> statics;
+  std::unique_ptr<fem::Statics> statics;         // held ...
+  std::unique_ptr<fem::ContactStatics> resting;  // ... or on what only pushes
+  fem::ContactEquilibrium lies;                  // there, last
 };
 
 PressedObject::PressedObject(const PressedObjectOptions& options) : impl_(std::make_unique<Impl>(options)) {}

@@ -21,7 +21,9 @@ struct TrueRegion {
 
 struct PressedObjectOptions {
   TriMesh surface;                ///< base frame, closed
-  std::vector<Support> supports;  ///< bonded planes and boxes; their tolerances are the lab's own business
+  /// Bonded planes and boxes; tables and walls that only push, smooth or with friction. Their tolerances are the lab's own
+  /// business. What lies on a table or a wall at rest just touches it there.
+  std::vector<Support> supports;
   Vec3 contact_m = Vec3::Zero();  ///< on the surface
   Vec3 direction = -Vec3::UnitZ();
   double pad_radius_m = 0.02;
@@ -36,6 +38,7 @@ struct PressedObjectOptions {
   int cells_in_radius = 4;                           ///< edges across the pad's radius
 };
 
+/// With friction, what was pressed before counts: forces should rise from state to state, as on a robot's way in.
 class PressedObject : public Pressed {
  public:
   /// @throws Error when the surface cannot be filled, or nothing holds it, or more than the opposed pad.

@@ -141,6 +141,9 @@ struct LabRobot::Impl {
     const Vec3 low = object.surface.vertices_m.colwise().minCoeff().transpose(),
                high = object.surface.vertices_m.colwise().maxCoeff().transpose();
     table.point_m = Vec3(0.5 * (low(0) + high(0)), 0.5 * (low(1) + high(1)), low(2));
+    planes.push_back(table);
+    for (const Support& support : object.supports)
+      if (support.name == "wall") planes.push_back(support.plane);
     T_base_camera = options.T_base_camera.value_or(look_at(table.point_m + Vec3(-0.20, -0.42, 0.42),
                                                            table.point_m + 0.55 * (high(2) - low(2)) * Vec3::UnitZ()));
   }
@@ -199,6 +202,7 @@ struct LabRobot::Impl {
   std::size_t active = 0;
   std::unique_ptr<ForceSensor> wrist;
   Plane table;
+  std::vector<Plane> planes;  // the table, and a wall if there is one
   Random joint_random, force_random, depth_random;
   std::vector<double> commanded, true_joints;
   std::vector<std::pair<std::size_t, TriMesh>> bodies;  // link, mesh in its frame
@@ -278,7 +282,7 @@ DepthFrame LabRobot::take_depth_image() {
     arm_trees.push_back(std::make_unique<geometry::TriangleTree>(std::move(posed)));
     scene.bodies.push_back(arm_trees.back().get());
   }
-  scene.planes.push_back(lab.table);
+  scene.planes = lab.planes;
   frame.depth_m = sense_depth(cast_view(scene, frame.camera, frame.T_base_camera * lab.T_true_stated), frame.camera,
                               lab.options.depth, lab.depth_random);
   frame.mask = lab.mask.mask(frame, names, lab.commanded);
@@ -287,8 +291,10 @@ DepthFrame LabRobot::take_depth_image() {
 
 std::vector<DepthFrame> LabRobot::look_around(int views) const {
   if (views < 1) throw Error("must be at least 1", "views");
+  const bool wall = impl_->planes.size() > 1;  // behind it there is nothing to see: the ring is a half one then
   std::vector<ViewDirection> directions;
-  for (int k = 0; k < views - 1; ++k) directions.push_back({2 * M_PI * k / std::max(1, views - 1) + M_PI / 4, M_PI / 6});
+  for (int k = 0; k < views - 1; ++k)
+    directions.push_back({wall ? M_PI * (k + 0.5) / (views - 1) + M_PI / 2 : 2 * M_PI * k / (views - 1) + M_PI / 4, M_PI / 6});
   directions.push_back({0, std::atan2(1, 0.05)});
   return look_from(directions);
 }
@@ -302,7 +308,7 @@ std::vector<DepthFrame> LabRobot::look_from(const std::vector<ViewDirection>& di
   const geometry::TriangleTree object(lab.object.surface);
   Scene scene;
   scene.bodies.push_back(&object);
-  scene.planes.push_back(lab.table);
+  scene.planes = lab.planes;
   Random random(lab.options.seed, 4);
   std::vector<DepthFrame> frames;
   for (const auto& [around, down] : directions) {
@@ -333,7 +339,7 @@ Recording LabRobot::scene() const {
   recording.rest.state = lab.object.state;
   recording.supports = lab.object.supports;
   for (const TrueRegion& one : lab.object.regions) recording.regions.push_back(one.region);
-  recording.environment.planes.push_back(lab.table);
+  recording.environment.planes = lab.planes;
   recording.force_scale_std = lab.options.force.scale_std;
   Tool pad;
   pad.name = "stick";

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "palpate/core/error.hpp"
@@ -96,6 +97,90 @@ TEST(Regions, AreInTheRecordingWithoutTheirStiffness) {
   EXPECT_TRUE(LabRobot({}, make_object("ball", options)).scene().regions.empty());
   options.region_ratio = 0;
   EXPECT_THROW(make_object("bear", options), Error);
+}
+
+double travel_m(const std::string& object, const std::string& site, const ObjectOptions& options, double force_n) {
+  const LabObject made = make_object(object, options);
+  const auto at = std::find_if(made.sites.begin(), made.sites.end(), [&](const PushSite& one) { return one.name == site; });
+  const auto pressed = made.press(*at);
+  for (const double share : {0.25, 0.5, 0.75, 1.0}) pressed->press(share * force_n);  // with friction, the way there counts
+  return pressed->travel_m();
+}
+
+ObjectOptions coarse(ContactLaw stands, double poisson_ratio) {
+  ObjectOptions options;
+  options.young_modulus_pa = 200e3;
+  options.poisson_ratio = poisson_ratio;
+  options.material = "linear";
+  options.tetrahedra = 1500;
+  options.cells_in_radius = 2;
+  options.region_ratio = 1 + 1e-9;  // the same mesh for all, not the one that a glued bar gets for its pad
+  options.stands = stands;
+  return options;
+}
+
+// Stuff that does not spread feels no difference between glue, a rough and a smooth table, as long as nothing lifts off (the pad
+// is 5 mm beside the axis of 80 mm). What does spread is held back by glue, less by friction, not at all by a smooth table.
+TEST(Standing, CountsForWhatSpreads) {
+  const auto travels = [](double poisson_ratio) {
+    return std::array{travel_m("bar", "end", coarse(ContactLaw::bonded, poisson_ratio), 10),
+                      travel_m("bar", "end", coarse(ContactLaw::friction, poisson_ratio), 10),
+                      travel_m("bar", "end", coarse(ContactLaw::frictionless, poisson_ratio), 10)};
+  };
+  // Rough and smooth share a mesh; the glued one is finer at its rim.
+  const auto still = travels(0), spread = travels(0.45);
+  EXPECT_NEAR(still[1] / still[0], 1, 0.03);
+  EXPECT_NEAR(still[2] / still[1], 1, 1e-4);
+  EXPECT_GT(spread[2] / spread[1], 1.003);
+  EXPECT_GT(spread[2] / spread[0], still[2] / still[0] + 0.003);
+}
+
+// Coulomb: pushed more sideways than friction bears, nothing holds the cube but a wall behind it.
+TEST(Standing, AWallHoldsWhatFrictionDoesNot) {
+  ObjectOptions options = coarse(ContactLaw::friction, 0.3);
+  options.friction_coefficient = 0.3;
+  options.tetrahedra = 300;
+  options.cells_in_radius = 1;
+  options.wall = true;
+  const LabObject walled = make_object("cube", options);
+  ASSERT_EQ(walled.supports.size(), 2u);
+  EXPECT_EQ(walled.supports[1].kind, SupportKind::wall);
+  EXPECT_NEAR(walled.supports[1].plane.point_m.x(), options.base_centre_m.x() + 0.075, 1e-12);
+  const PushSite at = walled.sites.back();
+  EXPECT_EQ(at.name, "to the wall");
+  EXPECT_NEAR(at.contact_m.x(), options.base_centre_m.x() - 0.075, 1e-9);
+  const auto held = walled.press(at);
+  held->press(5);
+  EXPECT_GT(held->travel_m(), 0);
+  EXPECT_LT(held->travel_m(), 0.01);
+  // Nothing goes through the wall.
+  EXPECT_LT(held->surface().vertices_m.col(0).maxCoeff(), walled.supports[1].plane.point_m.x() + 1e-5);
+
+  options.wall = false;
+  const LabObject open = make_object("cube", options);
+  EXPECT_THROW(open.press(at)->press(5), Error);
+
+  const LabRobot robot({}, walled);
+  EXPECT_EQ(robot.scene().environment.planes.size(), 2u);
+  EXPECT_EQ(robot.scene().supports[1].contact, ContactLaw::friction);
+  for (const DepthFrame& frame : robot.look_around(5))  // no view from behind the wall
+    EXPECT_LT(frame.T_base_camera.translation().x(), walled.supports[1].plane.point_m.x() + 0.05);
+  options.wall = true;
+  EXPECT_THROW(make_object("balloon", options), Error);
+}
+
+TEST(Standing, AFilesAxesTurnWithoutMirroring) {
+  const TriMesh box = make_object("cube", {}).surface;
+  for (const int up : {0, 1, 2}) {
+    TriMesh tall = box;
+    tall.vertices_m.col(up) *= 3;
+    const TriMesh turned = turned_and_scaled(tall, up, 0.3);
+    const Vec3 extent_m = (turned.vertices_m.colwise().maxCoeff() - turned.vertices_m.colwise().minCoeff()).transpose();
+    EXPECT_NEAR(extent_m.z(), 0.3, 1e-12) << up;
+    EXPECT_NEAR(extent_m.x(), 0.1, 1e-12) << up;
+    EXPECT_NEAR(*geometry::check_surface(turned).volume_m3, 0.003, 1e-9) << up;
+  }
+  EXPECT_THROW(turned_and_scaled(box, 3, 0), Error);
 }
 
 class Objects : public testing::TestWithParam<std::string> {};
