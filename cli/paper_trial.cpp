@@ -140,6 +140,7 @@ TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const Tr
       estimation::FitOptions from_there = checked;
       from_there.young_start_pa = answer.young_modulus_pa;
       from_there.poisson_start = answer.poisson_ratio;
+      from_there.start_is_answer = true;
       answer.verdicts = by_palpate(what, from_there, &memory, progress).verdicts;
     };
     judged(given, out.palpate, shared->fine.palpate);

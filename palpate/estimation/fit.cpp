@@ -130,7 +130,8 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     so_far.fit.load_cases = model.load_cases();
     options.on_estimate(so_far);
   };
-  Optimum optimum = optimise_from_several(objective, start, loss, optimiser, progress);
+  Optimum optimum = options.start_is_answer ? optimise_annealed(objective, start, loss, optimiser, progress)
+                                            : optimise_from_several(objective, start, loss, optimiser, progress);
   loss = optimum.loss;
 
   answer.termination = optimum.termination;

@@ -25,6 +25,7 @@ struct FitOptions {
   double tukey_cut = 4.685;               ///< standard deviations beyond which a point is an outlier
   std::optional<double> young_start_pa;   ///< nothing: found from the data
   double poisson_start = 0.3;             ///< moved into the prior's range
+  bool start_is_answer = false;           ///< of a coarser mesh, say: a misfit is then no reason to look elsewhere
   bool cross_checks = true;               ///< refit parts of the recording: per push, by load, held-out prediction
   bool stresses = true;                   ///< von Mises stress of every step, for figures
   int threads = 1;

@@ -57,6 +57,7 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
       object = std::move(better->object);
       fit_options.young_start_pa = answer.parameters[0].value;
       fit_options.poisson_start = answer.parameters[1].value;
+      fit_options.start_is_answer = true;
       continue;
     }
     const std::optional<double> error = mesh_error(answer);

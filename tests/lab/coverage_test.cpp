@@ -4,10 +4,12 @@
 // labs by default; PALPATE_LABS=50 lab_coverage_test for figures that mean something, PALPATE_FIRST_SEED to go on elsewhere.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -22,6 +24,7 @@ namespace {
 struct Lab {
   Recording recording;
   double young_modulus_pa = 0, poisson_ratio = 0;
+  std::map<std::string, double> region_pa = {};
 };
 
 struct SceneOfLabs {
@@ -64,20 +67,33 @@ TEST_P(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
   IdentifyOptions options;
   options.fit.threads = from_environment("PALPATE_THREADS", 1);
   Tally young, poisson;
+  std::map<std::string, int> verdicts;
   for (int seed = first; seed < first + labs; ++seed) {
     const Lab lab = scene.make(std::uint64_t(seed));
     const Identification answer = identify(lab.recording, options).answer;
     ASSERT_EQ(answer.termination, Termination::converged) << scene.name << " seed " << seed << ": " << answer.message;
-    const Parameter &e = answer.parameters[0], &nu = answer.parameters[1];
     const auto in = [](const Parameter& p, double truth) { return p.lower_95 <= truth && truth <= p.upper_95; };
-    young.add(std::log(e.value / lab.young_modulus_pa), e.std / e.value, in(e, lab.young_modulus_pa));
-    poisson.add(nu.value - lab.poisson_ratio, nu.std, in(nu, lab.poisson_ratio));
-    std::printf("%s seed %d: E %.0f +- %.0f Pa (truth %.0f, pull %+.2f)  nu %.4f +- %.4f (truth %.4f, pull %+.2f)  chi2 %.3f\n",
-                scene.name.c_str(), seed, e.value, e.std, lab.young_modulus_pa,
-                std::log(e.value / lab.young_modulus_pa) / (e.std / e.value), nu.value, nu.std, lab.poisson_ratio,
-                (nu.value - lab.poisson_ratio) / nu.std, answer.fit.chi2_per_dof);
+    std::printf("%s seed %d:", scene.name.c_str(), seed);
+    for (const Parameter& p : answer.parameters) {
+      if (p.name == "young_modulus") {
+        const double truth = p.region.empty() ? lab.young_modulus_pa : lab.region_pa.at(p.region);
+        const double error = std::log(p.value / truth), std = p.std / p.value;
+        young.add(error, std, in(p, truth));
+        std::printf("  E %s%.0f +- %.0f Pa (truth %.0f, pull %+.2f)", p.region.c_str(), p.value, p.std, truth, error / std);
+      } else if (p.name == "poisson_ratio") {
+        poisson.add(p.value - lab.poisson_ratio, p.std, in(p, lab.poisson_ratio));
+        std::printf("  nu %.4f +- %.4f (truth %.4f, pull %+.2f)", p.value, p.std, lab.poisson_ratio, (p.value - lab.poisson_ratio) / p.std);
+      }
+    }
+    std::printf("  chi2 %.3f ", answer.fit.chi2_per_dof);
+    for (const Verdict& verdict : answer.verdicts) {
+      std::printf(" %s", verdict.code.c_str());
+      ++verdicts[verdict.code];
+    }
+    std::printf("\n");
     std::fflush(stdout);
   }
+  for (const auto& [code, count] : verdicts) std::printf("%s: %s in %d of %d\n", scene.name.c_str(), code.c_str(), count, labs);
   std::printf("| scene          |       | labs | 68 %% | 95 %% | bias (log E in %%, nu) | rms | stated |\n");
   young.print(scene.name.c_str(), "E", 100);
   poisson.print(scene.name.c_str(), "nu", 1);
@@ -96,9 +112,10 @@ Lab cube_on_a_table(std::uint64_t seed) {
 }
 
 // Through the push protocol, one push a site.
-Lab pushed(const std::string& name, std::uint64_t seed) {
+Lab pushed(const std::string& name, std::uint64_t seed, double region_ratio = 1) {
   ObjectOptions truth;
   truth.seed = seed;
+  truth.region_ratio = region_ratio;
   LabOptions options;
   options.seed = seed;
   LabRobot robot(options, make_object(name, truth));
@@ -106,6 +123,7 @@ Lab pushed(const std::string& name, std::uint64_t seed) {
   protocol.travel_limit_m = robot.object().travel_limit_m;
   protocol.unloading_steps = 0;
   Lab lab{robot.scene(), robot.object().young_modulus_pa, robot.object().poisson_ratio};
+  for (const TrueRegion& one : robot.object().regions) lab.region_pa[one.region.name] = one.young_modulus_pa;
   for (std::size_t site = 0; site < robot.object().sites.size(); ++site) {
     std::vector<Step> steps;
     Push push;
@@ -125,7 +143,27 @@ std::vector<SceneOfLabs> scenes() {
   for (const BuiltInObject& row : built_in_objects())
     if (row.name != "balloon")  // no solid: it has no E that an interval could hold
       all.push_back({std::string(row.name), [name = std::string(row.name)](std::uint64_t seed) { return pushed(name, seed); }});
+  all.push_back({"bear_in_regions", [](std::uint64_t seed) { return pushed("bear", seed, 1.4); }});
   return all;
+}
+
+// One who does not know of the regions is told so: head, belly and back differ by a factor of 1.2 each.
+TEST(Homogeneity, OfABearThatIsNotIsDoubted) {
+  const int labs = from_environment("PALPATE_LABS", 3), first = from_environment("PALPATE_FIRST_SEED", 1);
+  IdentifyOptions options;
+  options.fit.threads = from_environment("PALPATE_THREADS", 1);
+  int said = 0;
+  for (int seed = first; seed < first + labs; ++seed) {
+    Lab lab = pushed("bear", std::uint64_t(seed), 1.2);
+    lab.recording.regions.clear();
+    const Identification answer = identify(lab.recording, options).answer;
+    std::printf("bear seed %d:", seed);
+    for (const Verdict& verdict : answer.verdicts) std::printf(" %s", verdict.code.c_str());
+    std::printf("\n");
+    std::fflush(stdout);
+    said += std::any_of(answer.verdicts.begin(), answer.verdicts.end(), [](const Verdict& one) { return one.code == "not_homogeneous"; });
+  }
+  EXPECT_GE(said, 0.9 * labs - 0.5);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Coverage, testing::ValuesIn(scenes()),
