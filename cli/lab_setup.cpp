@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <map>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/materials.hpp"
@@ -15,14 +14,14 @@ namespace palpate::cli {
 
 void add_mesh_file_options(CLI::App& app, MeshFileArguments& arguments) {
   app.add_option("--object-up", arguments.up, "which axis of a mesh file points upwards")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, int>{{"x", 0}, {"y", 1}, {"z", 2}}))
-      ->option_text("x|y|z [z]");
+      ->check(CLI::IsMember({"x", "y", "z"}))
+      ->capture_default_str();
   app.add_option("--object-size", arguments.size_m, "scale a mesh file to this longest extent, m (default: it is in metres)")
       ->check(CLI::Range(0.02, 0.5));
 }
 
 TriMesh read_object(const std::string& file, const MeshFileArguments& arguments) {
-  return lab::turned_and_scaled(io::read_tri_mesh(file), arguments.up, arguments.size_m);
+  return lab::turned_and_scaled(io::read_tri_mesh(file), arguments.up.front() - 'x', arguments.size_m);
 }
 
 void add_lab_options(CLI::App& app, LabArguments& arguments) {
@@ -50,10 +49,9 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
       ->check(CLI::PositiveNumber);
   app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
-  app.add_option("--stands", arguments.stands, "how the object stands on the table (and at the wall): glued, rough or smooth; what is not glued can lift off and slide")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ContactLaw>{
-          {"glued", ContactLaw::bonded}, {"rough", ContactLaw::friction}, {"smooth", ContactLaw::frictionless}}))
-      ->option_text("glued|rough|smooth [glued]");
+  app.add_option("--stands", arguments.stands, "how the object stands on the table (and at the wall); what is not glued can lift off and slide")
+      ->check(CLI::IsMember({"glued", "rough", "smooth"}))
+      ->capture_default_str();
   app.add_option("--friction", arguments.friction_coefficient, "Coulomb's coefficient of a rough table and wall")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
@@ -79,7 +77,9 @@ lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
   if (arguments.young_modulus_pa != 0) options.young_modulus_pa = arguments.young_modulus_pa;
   if (arguments.poisson_ratio >= 0) options.poisson_ratio = arguments.poisson_ratio;
   options.region_ratio = arguments.region_ratio;
-  options.stands = arguments.stands;
+  options.stands = arguments.stands == "rough"    ? ContactLaw::friction
+                   : arguments.stands == "smooth" ? ContactLaw::frictionless
+                                                  : ContactLaw::bonded;
   options.friction_coefficient = arguments.friction_coefficient;
   options.wall = arguments.wall;
   const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),
@@ -102,7 +102,7 @@ nlohmann::json truth_json(const lab::LabRobot& robot) {
                          {"young_modulus_pa", object.young_modulus_pa},
                          {"poisson_ratio", object.poisson_ratio},
                          {"material", object.material},
-                         {"stands", object.description},
+                         {"description", object.description},
                          {"extra", object.extra},
                          {"force_scale", robot.true_force_scale()},
                          {"steps", nlohmann::json::array()}};

@@ -16,8 +16,8 @@ namespace palpate::cli {
 
 /// How a mesh file is taken: many are not in metres, and have y upwards.
 struct MeshFileArguments {
-  int up = 2;         ///< axis of the file
-  double size_m = 0;  ///< longest extent; 0: as the file has it
+  std::string up = "z";  ///< axis of the file
+  double size_m = 0;     ///< longest extent; 0: as the file has it
 };
 void add_mesh_file_options(CLI::App& app, MeshFileArguments& arguments);
 TriMesh read_object(const std::string& file, const MeshFileArguments& arguments);
@@ -28,7 +28,7 @@ struct LabArguments {
   double young_modulus_pa = 0;  ///< 0: drawn from the seed
   double poisson_ratio = -1;    ///< below 0: drawn from the seed
   double region_ratio = 1;      ///< 1: one stiffness everywhere
-  ContactLaw stands = ContactLaw::bonded;
+  std::string stands = "glued";  ///< or rough, smooth
   double friction_coefficient = lab::ObjectOptions().friction_coefficient;
   bool wall = false;
   lab::LabOptions lab;          ///< what goes wrong in it: compliance, relaxation, slip, sliding

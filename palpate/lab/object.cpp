@@ -67,9 +67,14 @@ std::string standing(const ObjectOptions& o) {
 // On the table, and at the wall if there is one.
 void stand(LabObject& object, const ObjectOptions& o) {
   object.supports.push_back(flat(o, SupportKind::table, "table", o.base_centre_m, Vec3::UnitZ()));
+  if (!o.wall) return;
   const double behind_m = object.surface.vertices_m.col(0).maxCoeff();
-  if (o.wall)
-    object.supports.push_back(flat(o, SupportKind::wall, "wall", Vec3(behind_m, o.base_centre_m.y(), o.base_centre_m.z()), -Vec3::UnitX()));
+  bool flat_there = false;
+  for (Index t = 0; t < object.surface.triangles.rows(); ++t)
+    flat_there = flat_there || (object.surface.vertices_m(object.surface.triangles.row(t), 0).array() > behind_m - 1e-9).all();
+  if (o.stands == ContactLaw::bonded && !flat_there)
+    throw Error("has no flat side that could be glued to a wall; let it stand rough or smooth (--stands)", object.name);
+  object.supports.push_back(flat(o, SupportKind::wall, "wall", Vec3(behind_m, o.base_centre_m.y(), o.base_centre_m.z()), -Vec3::UnitX()));
 }
 
 PushSite site(const LabObject& object, const ObjectOptions& o, const std::string& name, const Vec3& aim_m, const Vec3& direction,
@@ -329,7 +334,7 @@ LabObject object_from_surface(const TriMesh& surface, const std::string& name, c
   if (!check.watertight()) throw Error("must be closed and consistently oriented; `palpate model` repairs a surface", name);
   const Vec3 extent = check.max_m - check.min_m;
   if (!(extent.minCoeff() > 0.02 && extent.maxCoeff() < 0.5))
-    throw Error("must be between 2 cm and 50 cm large; are its units metres?", name);
+    throw Error("must be between 2 cm and 50 cm large; are its units metres? (--object-size scales it)", name);
   LabObject object = draw(name, options);
   object.description = "the surface " + name + ", " + standing(options);
   object.surface = surface;

@@ -167,6 +167,9 @@ TEST(Standing, AWallHoldsWhatFrictionDoesNot) {
     EXPECT_LT(frame.T_base_camera.translation().x(), walled.supports[1].plane.point_m.x() + 0.05);
   options.wall = true;
   EXPECT_THROW(make_object("balloon", options), Error);
+  // A round side touches a wall at a point: there is nothing to glue.
+  options.stands = ContactLaw::bonded;
+  EXPECT_THROW(make_object("ball", options), Error);
 }
 
 TEST(Standing, AFilesAxesTurnWithoutMirroring) {
