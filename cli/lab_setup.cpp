@@ -50,7 +50,7 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
   app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
   app.add_option("--stands", arguments.stands, "how the object stands on the table (and at the wall); what is not glued can lift off and slide")
-      ->check(CLI::IsMember({"glued", "rough", "smooth"}))
+      ->check(CLI::IsMember({"glued", "rough"}))
       ->capture_default_str();
   app.add_option("--friction", arguments.friction_coefficient, "Coulomb's coefficient of a rough table and wall")
       ->check(CLI::PositiveNumber)
@@ -77,9 +77,7 @@ lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
   if (arguments.young_modulus_pa != 0) options.young_modulus_pa = arguments.young_modulus_pa;
   if (arguments.poisson_ratio >= 0) options.poisson_ratio = arguments.poisson_ratio;
   options.region_ratio = arguments.region_ratio;
-  options.stands = arguments.stands == "rough"    ? ContactLaw::friction
-                   : arguments.stands == "smooth" ? ContactLaw::frictionless
-                                                  : ContactLaw::bonded;
+  options.stands = arguments.stands == "rough" ? ContactLaw::friction : ContactLaw::bonded;
   options.friction_coefficient = arguments.friction_coefficient;
   options.wall = arguments.wall;
   const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),

@@ -28,7 +28,7 @@ struct LabArguments {
   double young_modulus_pa = 0;  ///< 0: drawn from the seed
   double poisson_ratio = -1;    ///< below 0: drawn from the seed
   double region_ratio = 1;      ///< 1: one stiffness everywhere
-  std::string stands = "glued";  ///< or rough, smooth
+  std::string stands = "glued";  ///< or rough
   double friction_coefficient = lab::ObjectOptions().friction_coefficient;
   bool wall = false;
   lab::LabOptions lab;          ///< what goes wrong in it: compliance, relaxation, slip, sliding

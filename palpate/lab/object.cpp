@@ -73,7 +73,7 @@ void stand(LabObject& object, const ObjectOptions& o) {
   for (Index t = 0; t < object.surface.triangles.rows(); ++t)
     flat_there = flat_there || (object.surface.vertices_m(object.surface.triangles.row(t), 0).array() > behind_m - 1e-9).all();
   if (o.stands == ContactLaw::bonded && !flat_there)
-    throw Error("has no flat side that could be glued to a wall; let it stand rough or smooth (--stands)", object.name);
+    throw Error("has no flat side that could be glued to a wall; let it stand rough (--stands)", object.name);
   object.supports.push_back(flat(o, SupportKind::wall, "wall", Vec3(behind_m, o.base_centre_m.y(), o.base_centre_m.z()), -Vec3::UnitX()));
 }
 

@@ -33,7 +33,8 @@ struct ObjectOptions {
   std::vector<double> extra;                         ///< its further parameters, in the table's order; empty = their initial values
   double region_ratio = 1;                           ///< of an object with regions: their stiffnesses differ by this factor
   Vec3 base_centre_m = Vec3(0.6, 0.0, 0.0);          ///< of the object's foot on the table, base frame
-  /// How it stands on the table, and at the wall if there is one: glued, or only pushed against them.
+  /// How it stands on the table, and at the wall if there is one: glued, or only pushed against them. Without friction its place
+  /// on the table is anybody's guess: nothing holds it there.
   ContactLaw stands = ContactLaw::bonded;
   double friction_coefficient = 0.6;                 ///< with ContactLaw::friction
   /// An upright wall behind the object, at its outermost points along x; a site more pushes towards it.
