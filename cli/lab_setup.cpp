@@ -49,7 +49,8 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
       ->check(CLI::PositiveNumber);
   app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
-  app.add_option("--stands", arguments.stands, "how the object stands on the table (and at the wall); what is not glued can lift off and slide")
+  app.add_option("--stands", arguments.stands,
+                 "how the object stands on the table (and at the wall); what is not glued can lift off and slide")
       ->check(CLI::IsMember({"glued", "rough"}))
       ->capture_default_str();
   app.add_option("--friction", arguments.friction_coefficient, "Coulomb's coefficient of a rough table and wall")
@@ -83,7 +84,8 @@ lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
   const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),
                                     [&](const lab::BuiltInObject& row) { return row.name == arguments.object; });
   if (built_in || !std::filesystem::exists(arguments.object)) return lab::make_object(arguments.object, options);
-  return lab::object_from_surface(read_object(arguments.object, arguments.file), std::filesystem::path(arguments.object).filename().string(), options);
+  return lab::object_from_surface(read_object(arguments.object, arguments.file),
+                                  std::filesystem::path(arguments.object).filename().string(), options);
 }
 
 lab::LabOptions lab_options(const LabArguments& arguments, std::uint64_t seed) {

@@ -47,7 +47,8 @@ int remake(Session& session, const PaperArguments& arguments) {
     surface = read_object(arguments.object, arguments.file);
     own.object = own_name;
     own.title = "Simulated test on a mesh of the user's";
-    own.differs = "The object is the mesh file that was given, glued at its foot and pressed at its top; the pad is soft, the paper pushed at a point.";
+    own.differs = "The object is the mesh file that was given, glued at its foot and pressed at its top; the pad is soft, the paper "
+                  "pushed at a point.";
     own.surface = &surface;
     own.unused.reset();  // at the same place, with other forces
   }

@@ -19,7 +19,8 @@ std::string figure(const std::string& svg, const std::string& caption) {
 }
 
 std::string found(const MethodAnswer& answer) {
-  const std::string took = fmt::format(" in {} iterations, {} simulated samples and {:.1f} s", answer.iterations, answer.solves, answer.seconds);
+  const std::string took =
+      fmt::format(" in {} iterations, {} simulated samples and {:.1f} s", answer.iterations, answer.solves, answer.seconds);
   if (!std::isfinite(answer.young_modulus_pa)) return "found no answer" + took;
   const std::string interval =
       std::isfinite(answer.lower_95_pa) ? " (" + report::interval(answer.lower_95_pa, answer.upper_95_pa, "Pa") + ")" : "";

@@ -143,7 +143,7 @@ struct LabRobot::Impl {
     table.point_m = Vec3(0.5 * (low(0) + high(0)), 0.5 * (low(1) + high(1)), low(2));
     planes.push_back(table);
     for (const Support& support : object.supports)
-      if (support.name == "wall") planes.push_back(support.plane);
+      if (support.kind != SupportKind::box && support.plane.normal.z() < 0.5) planes.push_back(support.plane);
     T_base_camera = options.T_base_camera.value_or(look_at(table.point_m + Vec3(-0.20, -0.42, 0.42),
                                                            table.point_m + 0.55 * (high(2) - low(2)) * Vec3::UnitZ()));
   }
@@ -202,7 +202,7 @@ struct LabRobot::Impl {
   std::size_t active = 0;
   std::unique_ptr<ForceSensor> wrist;
   Plane table;
-  std::vector<Plane> planes;  // the table, and a wall if there is one
+  std::vector<Plane> planes;  // the table, and what is upright
   Random joint_random, force_random, depth_random;
   std::vector<double> commanded, true_joints;
   std::vector<std::pair<std::size_t, TriMesh>> bodies;  // link, mesh in its frame

@@ -55,7 +55,8 @@ class LabRobot : public acquisition::Robot {
   double travel_sigma_m() const override;
 
   /// Images of the untouched object from a camera that is carried around it: `views` - 1 on a ring that looks down by a third
-  /// of a right angle (half a ring in front of a wall), the last from above. Every pose errs anew by camera_std_m and camera_std_rad. The arm is out of the way.
+  /// of a right angle (half a ring in front of a wall), the last from above. Every pose errs anew by camera_std_m and
+  /// camera_std_rad. The arm is out of the way.
   /// @throws Error for less than one view
   std::vector<DepthFrame> look_around(int views) const;
   /// One such image a direction, from where the object is seen under that azimuth (from x towards y) and elevation.
