@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "io/made_up_recording.hpp"
-#include "palpate/io/recording.hpp"
+#include "io/read_back.hpp"
+#include "io/recording_folder.hpp"
 
 namespace palpate::io {
 namespace {

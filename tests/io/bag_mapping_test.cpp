@@ -7,6 +7,7 @@
 
 #include "io/bag_files.hpp"
 #include "io/made_up_recording.hpp"
+#include "io/read_back.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_survey.hpp"
 #include "palpate/io/bag_write.hpp"

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/made_up_recording.hpp"
+#include "io/read_back.hpp"
 #include "io/recording_folder.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/message_source.hpp"

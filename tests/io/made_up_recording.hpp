@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording with all that a bag can say, and the way back from a bag.
+// A recording with all that a bag can say.
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include "io/recording_folder.hpp"
-#include "palpate/acquisition/from_streams.hpp"
-#include "palpate/io/bag_mapping.hpp"
-#include "palpate/io/message_source.hpp"
+#include "palpate/core/recording.hpp"
 
 namespace palpate::io::test {
 
@@ -77,15 +73,6 @@ inline Recording made_up() {
     recording.pushes.push_back(push);
   }
   return recording;
-}
-
-inline Recording read_back(const std::filesystem::path& folder) {
-  BagMapping mapping = read_mapping(folder / "mapping.yaml");
-  const SensorStreams streams = read_streams(read_bag(folder), mapping);
-  const acquisition::FromStreams made = acquisition::recording_from(mapping.plan, streams);
-  EXPECT_TRUE(made.notes.empty()) << made.notes.front();
-  EXPECT_TRUE(made.recording.warnings.empty()) << made.recording.warnings.front();
-  return made.recording;
 }
 
 }  // namespace palpate::io::test

@@ -1,7 +1,8 @@
 // label: statistics
 // SPDX-License-Identifier: Apache-2.0
 // Seeded labs, each estimated as a user would: how often the intervals hold the truth, and how far off the answers are. A few
-// labs by default; PALPATE_LABS=50 lab_coverage_test for figures that mean something, PALPATE_FIRST_SEED to go on elsewhere.
+// labs by default; PALPATE_LABS=50 lab_coverage_test for figures that mean something, PALPATE_FIRST_SEED to go on elsewhere,
+// PALPATE_THROUGH=folder or mcap to estimate what was written there and read again (read_back_test.cpp: the same to rounding).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "io/read_back.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/lab/built_in.hpp"
@@ -35,6 +37,14 @@ struct SceneOfLabs {
 int from_environment(const char* name, int otherwise) {
   const char* text = std::getenv(name);
   return text ? std::max(1, std::atoi(text)) : otherwise;
+}
+
+// Estimated as it came out of memory, or out of files.
+Identification estimated(const Recording& recording) {
+  const char* way = std::getenv("PALPATE_THROUGH");
+  IdentifyOptions options;
+  options.fit.threads = from_environment("PALPATE_THREADS", 1);
+  return identify(io::test::through(way ? way : "memory", recording), options).answer;
 }
 
 struct Tally {
@@ -64,13 +74,11 @@ class Coverage : public testing::TestWithParam<SceneOfLabs> {};
 TEST_P(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
   const SceneOfLabs& scene = GetParam();
   const int labs = from_environment("PALPATE_LABS", 3), first = from_environment("PALPATE_FIRST_SEED", 1);
-  IdentifyOptions options;
-  options.fit.threads = from_environment("PALPATE_THREADS", 1);
   Tally young, poisson;
   std::map<std::string, int> verdicts;
   for (int seed = first; seed < first + labs; ++seed) {
     const Lab lab = scene.make(std::uint64_t(seed));
-    const Identification answer = identify(lab.recording, options).answer;
+    const Identification answer = estimated(lab.recording);
     ASSERT_EQ(answer.termination, Termination::converged) << scene.name << " seed " << seed << ": " << answer.message;
     const auto in = [](const Parameter& p, double truth) { return p.lower_95 <= truth && truth <= p.upper_95; };
     std::printf("%s seed %d:", scene.name.c_str(), seed);
@@ -150,13 +158,11 @@ std::vector<SceneOfLabs> scenes() {
 // One who does not know of the regions is told so: head, belly and back differ by a factor of 1.2 each.
 TEST(Homogeneity, OfABearThatIsNotIsDoubted) {
   const int labs = from_environment("PALPATE_LABS", 3), first = from_environment("PALPATE_FIRST_SEED", 1);
-  IdentifyOptions options;
-  options.fit.threads = from_environment("PALPATE_THREADS", 1);
   int said = 0;
   for (int seed = first; seed < first + labs; ++seed) {
     Lab lab = pushed("bear", std::uint64_t(seed), 1.2);
     lab.recording.regions.clear();
-    const Identification answer = identify(lab.recording, options).answer;
+    const Identification answer = estimated(lab.recording);
     std::printf("bear seed %d:", seed);
     for (const Verdict& verdict : answer.verdicts) std::printf(" %s", verdict.code.c_str());
     std::printf("\n");
