@@ -96,8 +96,11 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
 
 std::string count_of(const Explored& run) {
   const std::size_t pushes = run.pushes.size() + static_cast<std::size_t>(run.fruitless);
-  return fmt::format("{}{} push{}", run.reached ? "" : "more than ", pushes, pushes == 1 ? "" : "es");
+  return fmt::format("{} push{}", pushes, pushes == 1 ? "" : "es");
 }
+
+/// What the goal took, as far as it is known.
+std::string needed(const Explored& run) { return (run.reached ? "" : "more than ") + count_of(run); }
 
 int run(const Options& given, Session& session) {
   must_take_files(given.out);
@@ -144,7 +147,7 @@ int run(const Options& given, Session& session) {
       const auto another = push_robot(given.robot, session.seed);  // its noise starts anew
       const Explored other = run_loop(session, given, *another, order, nullptr, nullptr, nullptr);
       if (Session::interrupted()) break;
-      session.say(fmt::format("{}: {}; next best push: {}", name, count_of(other), count_of(found)));
+      session.say(fmt::format("{}: {}; next best push: {}", name, needed(other), needed(found)));
       nlohmann::json one = {{"order", name}, {"reached", other.reached}, {"pushes", nlohmann::json::array()}};
       for (const auto& push : other.pushes) one["pushes"].push_back(json_of(push));
       json["compared"].push_back(one);
@@ -190,7 +193,7 @@ Run verbs::explore(CLI::App& app) {
   app.add_option("--guess", options.suggest.young_modulus_pa, "of Young's modulus before the first touch, Pa")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--law", given->law, "material law of the estimate (default: that of the true object)");
+  app.add_option("--law", given->law, "material law of the estimate (default: that of the scene)");
   app.add_option("--refine", given->refine, "none or auto: finer under the tool")->check(CLI::IsMember({"none", "auto"}));
   given->live.add_to(app);
   return [given](Session& session) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cli/mistyped.hpp"
+#include "cli/option_hints.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -122,7 +123,7 @@ int main(int argc, char** argv) {
   try {
     return parse_and_run({argv + 1, argv + argc}, session);
   } catch (const palpate::Error& error) {
-    return fail(session, exit_input, "input", error.message(), error.where());
+    return fail(session, exit_input, "input", with_option(error), error.where());
   } catch (const std::bad_alloc&) {
     return fail(session, exit_internal, "internal",
                 "not enough memory for this problem; use a coarser mesh or fewer points");

@@ -46,6 +46,8 @@ std::string stage_words(std::string_view stage) {
   constexpr std::pair<std::string_view, std::string_view> words[] = {
       {"read", "reading the recording"},
       {"press", "pressing the object"},
+      {"rate pushes", "rating pushes"},
+      {"unseen side", "trying other shapes of the unseen side"},
       {"lattice", "filling the object with tetrahedra"},
       {"quality", "improving the tetrahedra"},
       {"fit", "fitting"},

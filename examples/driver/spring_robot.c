@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
- * The smallest driver that does something: a gantry whose stick presses a plate on a spring from above, under a camera that
- * looks straight down. Replace the bodies of the calls by those of your arm's and sensors' libraries.
+ * The smallest driver that does something: a gantry whose stick presses from above, under a camera that looks straight down,
+ * a plate on a spring or a soft block. Replace the bodies of the calls by those of your arm's and sensors' libraries.
  *
  *   cc -shared -fPIC -I PALPATE_SOURCE spring_robot.c -o libspring_robot.so -lm
  *   palpate record --driver ./libspring_robot.so --driver-settings 800 --scene scene --contact 0.5 0 0.1 -o on_a_spring
  *   palpate check on_a_spring --stiffness 800
+ *   palpate explore --driver ./libspring_robot.so --driver-settings "soft 20000 0.3" --scene soft_scene -o on_a_block
+ *
+ * A plate goes down as a whole and has no Young's modulus; the block of 20 kPa and 0.3 has one that explore can find.
  */
 #include "palpate/acquisition/driver.h"
 
@@ -14,48 +17,83 @@
 
 enum { width_px = 160, height_px = 120 };
 
-struct Spring {
-  double stiffness_n_per_m;
-  double clock_s, tip_m[3];
+struct World {
+  double stiffness_n_per_m, half_m, top_m;
+  int soft; /* gives way around the stick only */
+  double clock_s;
   struct PalpatePose tip;
   uint64_t noise;
   float depth_m[width_px * height_px];
 };
 
-static const double plate_half_m = 0.05, plate_m = 0.1, plate_x_m = 0.5, camera_m = 0.6, focal_px = 200;
+static const double pi = 3.14159265358979323846;
+static const double middle_x_m = 0.5, camera_m = 0.6, focal_px = 200, pad_radius_m = 0.01;
 
 /* About standard normal, repeatable: the sum of twelve uniform numbers. */
-static double noise(struct Spring* spring) {
+static double noise(struct World* world) {
   double sum = -6;
   for (int i = 0; i < 12; ++i) {
-    spring->noise = spring->noise * 6364136223846793005u + 1442695040888963407u;
-    sum += (double)(spring->noise >> 11) / 9007199254740992.0;
+    world->noise = world->noise * 6364136223846793005u + 1442695040888963407u;
+    sum += (double)(world->noise >> 11) / 9007199254740992.0;
   }
   return sum;
 }
 
-static double pressed_m(const struct Spring* spring) {
-  const double deep = plate_m - spring->tip.position_m[2];
-  const int above = fabs(spring->tip.position_m[0] - plate_x_m) < plate_half_m && fabs(spring->tip.position_m[1]) < plate_half_m;
+static double pressed_m(const struct World* world) {
+  const double deep = world->top_m - world->tip.position_m[2];
+  const int above = fabs(world->tip.position_m[0] - middle_x_m) < world->half_m && fabs(world->tip.position_m[1]) < world->half_m;
   return above && deep > 0 ? deep : 0;
 }
 
+/* Complete elliptic integrals of modulus k, by the arithmetic-geometric mean. */
+static void elliptic(double k, double* first, double* second) {
+  double a = 1, b = sqrt(1 - k * k), c = k, weight = 0.5, sum = 0.5 * k * k;
+  for (int i = 0; i < 40 && fabs(c) > 1e-15; ++i) {
+    const double mean = 0.5 * (a + b);
+    c = 0.5 * (a - b);
+    b = sqrt(a * b);
+    a = mean;
+    weight *= 2;
+    sum += weight * c * c;
+  }
+  *first = pi / (2 * a);
+  *second = *first * (1 - sum);
+}
+
+/* How far the surface has gone down there: a plate as a whole, a half space under even pressure of a soft round pad as its
+ * theory says (K. L. Johnson, Contact Mechanics, section 3.4), over the mean under the pad, which is the stick's travel. */
+static double sunk_m(const struct World* world, double x_m, double y_m) {
+  const double away = hypot(x_m - world->tip.position_m[0], y_m - world->tip.position_m[1]) / pad_radius_m;
+  double first, second;
+  if (!world->soft) return pressed_m(world);
+  elliptic(fmin(away < 1 ? away : 1 / away, 1 - 1e-9), &first, &second);
+  return 0.75 * pressed_m(world) * (away < 1 ? second : away * (second - (1 - 1 / (away * away)) * first));
+}
+
 static int read_state(void* self, struct PalpateRobotState* state) {
-  struct Spring* spring = self;
-  state->time_s = spring->clock_s;
-  state->T_base_tip = spring->tip;
-  for (int i = 0; i < 3; ++i) state->force_n[i] = 0.02 * noise(spring) + 0.3; /* the sensor is not tared */
-  state->force_n[2] -= spring->stiffness_n_per_m * pressed_m(spring);
+  struct World* world = self;
+  state->time_s = world->clock_s;
+  state->T_base_tip = world->tip;
+  for (int i = 0; i < 3; ++i) state->force_n[i] = 0.02 * noise(world) + 0.3; /* the sensor is not tared */
+  state->force_n[2] -= world->stiffness_n_per_m * pressed_m(world);
   return PALPATE_DONE;
 }
 
+/* A small gantry that points straight down: it stays away from the block's edges, where the half space's theory ends. */
+static int reaches(void* self, const struct PalpatePose* T_base_tip) {
+  const double *q = T_base_tip->rotation_wxyz, *p = T_base_tip->position_m;
+  (void)self;
+  return 1 - 2 * (q[1] * q[1] + q[2] * q[2]) < -0.9999 && fabs(p[0] - middle_x_m) < 0.04 && fabs(p[1]) < 0.04 && p[2] > 0.02 &&
+         p[2] < 0.5;
+}
+
 static int move_tip(void* self, const struct PalpatePose* T_base_tip, double speed_m_s) {
-  struct Spring* spring = self;
+  struct World* world = self;
   double squares = 0;
-  if (T_base_tip->position_m[2] < 0.02 || T_base_tip->position_m[2] > 0.5) return PALPATE_REFUSED;
-  for (int i = 0; i < 3; ++i) squares += pow(T_base_tip->position_m[i] - spring->tip.position_m[i], 2);
-  spring->clock_s += sqrt(squares) / speed_m_s;
-  spring->tip = *T_base_tip;
+  if (!reaches(self, T_base_tip)) return PALPATE_REFUSED;
+  for (int i = 0; i < 3; ++i) squares += pow(T_base_tip->position_m[i] - world->tip.position_m[i], 2);
+  world->clock_s += sqrt(squares) / speed_m_s;
+  world->tip = *T_base_tip;
   return PALPATE_DONE;
 }
 
@@ -65,31 +103,33 @@ static int stop_robot(void* self) {
 }
 
 static int take_depth_image(void* self, struct PalpateDepthImage* image) {
-  struct Spring* spring = self;
-  const double top = camera_m - plate_m + pressed_m(spring);
+  struct World* world = self;
   for (int row = 0; row < height_px; ++row)
     for (int column = 0; column < width_px; ++column) {
-      const double x = (column - 79.5) / focal_px, y = (row - 59.5) / focal_px;
-      const int on_plate = fabs(x * top) < plate_half_m && fabs(y * top) < plate_half_m;
-      spring->depth_m[row * width_px + column] = (float)((on_plate ? top : camera_m) + 0.0005 * noise(spring));
+      const double x = (column - 79.5) / focal_px, y = (row - 59.5) / focal_px; /* the image's y points to the back */
+      const double rest = camera_m - world->top_m;
+      double depth = rest;
+      for (int again = 0; again < 3; ++again) depth = rest + sunk_m(world, middle_x_m + x * depth, -y * depth);
+      if (fabs(x * depth) > world->half_m || fabs(y * depth) > world->half_m) depth = camera_m;
+      world->depth_m[row * width_px + column] = (float)(depth + 0.0005 * noise(world));
     }
-  image->time_s = spring->clock_s;
+  image->time_s = world->clock_s;
   image->width_px = width_px;
   image->height_px = height_px;
   image->fx_px = image->fy_px = focal_px;
   image->cx_px = 79.5;
   image->cy_px = 59.5;
-  image->T_base_camera.position_m[0] = plate_x_m;
+  image->T_base_camera.position_m[0] = middle_x_m;
   image->T_base_camera.position_m[2] = camera_m;
   image->T_base_camera.rotation_wxyz[1] = 1; /* half a turn about x: looks down */
   image->sigma_m = 0.0005;
-  image->depth_m = spring->depth_m;
+  image->depth_m = world->depth_m;
   return PALPATE_DONE;
 }
 
 static int wait_a_while(void* self, double duration_s) {
-  struct Spring* spring = self;
-  spring->clock_s += duration_s;
+  struct World* world = self;
+  world->clock_s += duration_s;
   return PALPATE_DONE;
 }
 
@@ -104,34 +144,42 @@ static const char* last_error(void* self) {
 }
 
 int palpate_make_robot(uint32_t abi, const char* settings, struct PalpateRobot* robot, char* error, size_t error_size) {
-  char* rest = NULL;
-  const double stiffness = *settings == '\0' ? 800 : strtod(settings, &rest);
+  double stiffness = 800, young_pa = 0, poisson = 0;
+  int end = 0;
+  const int soft = sscanf(settings, "soft %lf %lf %n", &young_pa, &poisson, &end) == 2;
   if (abi != PALPATE_ROBOT_ABI) {
     snprintf(error, error_size, "this driver is for version %u of palpate's robots, not %u", PALPATE_ROBOT_ABI, abi);
     return PALPATE_FAILED;
   }
-  if (!(stiffness > 0) || (rest != NULL && *rest != '\0')) {
-    snprintf(error, error_size, "`%s` is no stiffness; give newtons a metre, such as --driver-settings 800", settings);
+  if (!soft && *settings != '\0' && sscanf(settings, "%lf %n", &stiffness, &end) != 1) stiffness = 0;
+  if (soft) stiffness = 3 * pi * pi / 16 * pad_radius_m * young_pa / (1 - poisson * poisson); /* a half space under even pressure */
+  if (!(stiffness > 0) || !(poisson >= 0 && poisson <= 0.5) || settings[end] != '\0') {
+    snprintf(error, error_size, "`%s` is no stiffness; give newtons a metre, such as 800, or `soft 20000 0.3`: Young's modulus (Pa) "
+                                "and Poisson ratio", settings);
     return PALPATE_FAILED;
   }
-  struct Spring* spring = calloc(1, sizeof *spring);
-  if (spring == NULL) {
+  struct World* world = calloc(1, sizeof *world);
+  if (world == NULL) {
     snprintf(error, error_size, "no memory is left");
     return PALPATE_FAILED;
   }
-  spring->stiffness_n_per_m = stiffness;
-  spring->noise = 7;
-  spring->tip.position_m[0] = plate_x_m;
-  spring->tip.position_m[2] = 0.3;
-  spring->tip.rotation_wxyz[1] = 1;
+  world->stiffness_n_per_m = stiffness;
+  world->soft = soft;
+  world->half_m = soft ? 0.1 : 0.05;
+  world->top_m = soft ? 0.2 : 0.1;
+  world->noise = 7;
+  world->tip.position_m[0] = middle_x_m;
+  world->tip.position_m[2] = 0.3;
+  world->tip.rotation_wxyz[1] = 1;
   robot->abi = PALPATE_ROBOT_ABI;
-  robot->self = spring;
+  robot->self = world;
   robot->read = read_state;
   robot->move = move_tip;
   robot->stop = stop_robot;
   robot->take_depth_image = take_depth_image;
   robot->wait = wait_a_while;
   robot->travel_sigma_m = travel_sigma_m;
+  robot->reaches = reaches;
   robot->last_error = last_error;
   robot->destroy = free;
   return PALPATE_DONE;

@@ -30,7 +30,7 @@ DriverRobot::DriverRobot(MakeRobot make, const std::string& settings, std::strin
   const PalpateRobot made = std::exchange(robot_, {});  // what is refused is not destroyed: its layout may be another one
   if (answer != PALPATE_DONE)
     throw Error(error[0] != '\0' ? std::string(error.data())
-                                 : std::string("did not start and does not say why; ask its makers, or check --driver-settings"),
+                                 : std::string("did not start and does not say why; ask its makers, or check its settings"),
                 name_);
   if (made.abi != PALPATE_ROBOT_ABI)
     throw Error("was built for version " + std::to_string(made.abi) + " of driver.h, this program has version " +

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/geometry/union_find.hpp"
 
 namespace palpate::fem {
 
@@ -280,18 +281,13 @@ MatrixX rigid_motions(const Points& nodes_m) {
 namespace {
 
 std::vector<Index> connected_parts(const TetMesh& mesh, Index& count) {
-  std::vector<Index> parent(mesh.nodes_m.rows());
-  for (std::size_t i = 0; i < parent.size(); ++i) parent[i] = static_cast<Index>(i);
-  const auto find = [&](Index i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  geometry::UnionFind parts(mesh.nodes_m.rows());
   for (Index e = 0; e < mesh.tetrahedra.rows(); ++e)
-    for (int a = 1; a < mesh.tetrahedra.cols(); ++a) parent[find(mesh.tetrahedra(e, a))] = find(mesh.tetrahedra(e, 0));
-  std::vector<Index> label(parent.size(), -1), part(parent.size());
+    for (int a = 1; a < mesh.tetrahedra.cols(); ++a) parts.join(mesh.tetrahedra(e, 0), mesh.tetrahedra(e, a));
+  std::vector<Index> label(mesh.nodes_m.rows(), -1), part(mesh.nodes_m.rows());
   count = 0;
-  for (std::size_t i = 0; i < parent.size(); ++i) {
-    const Index root = find(static_cast<Index>(i));
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    const Index root = parts.root(static_cast<Index>(i));
     if (label[root] < 0) label[root] = count++;
     part[i] = label[root];
   }

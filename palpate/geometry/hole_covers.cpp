@@ -4,10 +4,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <unordered_map>
 
 #include "palpate/core/math.hpp"
+#include "palpate/geometry/union_find.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -20,12 +20,11 @@ constexpr double largest_share = 0.7;  // of a part's area that a lid may add: h
 class HoleFinder {
  public:
   HoleFinder(const TriMesh& mesh, const std::vector<std::array<Index, 3>>& open)
-      : m_(mesh), next_(mesh.vertices_m.rows()), part_(mesh.vertices_m.rows()), area_(mesh.vertices_m.rows(), 0) {
-    std::iota(part_.begin(), part_.end(), 0);
+      : m_(mesh), next_(mesh.vertices_m.rows()), parts_(mesh.vertices_m.rows()), area_(mesh.vertices_m.rows(), 0) {
     for (Index t = 0; t < m_.triangles.rows(); ++t)
-      for (int k = 1; k < 3; ++k) part_[root(m_.triangles(t, 0))] = root(m_.triangles(t, k));
+      for (int k = 1; k < 3; ++k) parts_.join(m_.triangles(t, 0), m_.triangles(t, k));
     for (Index t = 0; t < m_.triangles.rows(); ++t)
-      area_[root(m_.triangles(t, 0))] += area(m_.triangles(t, 0), m_.triangles(t, 1), m_.triangles(t, 2));
+      area_[parts_.root(m_.triangles(t, 0))] += area(m_.triangles(t, 0), m_.triangles(t, 1), m_.triangles(t, 2));
     for (const auto& [low, high, t] : open) {
       bool ascending = false;
       for (int k = 0; k < 3; ++k) ascending |= m_.triangles(t, k) == low && m_.triangles(t, (k + 1) % 3) == high;
@@ -51,10 +50,6 @@ class HoleFinder {
   }
 
  private:
-  Index root(Index v) {
-    while (part_[v] != v) v = part_[v] = part_[part_[v]];
-    return v;
-  }
   Vec3 at(Index v) const { return m_.vertices_m.row(v).transpose(); }
   double area(Index a, Index b, Index c) const { return 0.5 * (at(b) - at(a)).cross(at(c) - at(a)).norm(); }
 
@@ -103,7 +98,7 @@ class HoleFinder {
       from.erase(std::find(from.begin(), from.end(), loop[(i + 1) % n]));
       rim += (at(loop[i]) - at(loop[(i + 1) % n])).norm();
     }
-    if (!(lid <= largest_share * area_[root(loop[0])])) return;
+    if (!(lid <= largest_share * area_[parts_.root(loop[0])])) return;
     std::vector<std::pair<int, int>> pending{{0, n - 1}};
     while (!pending.empty()) {
       const auto [i, j] = pending.back();
@@ -119,7 +114,7 @@ class HoleFinder {
 
   const TriMesh& m_;
   std::vector<std::vector<Index>> next_;  ///< open edges, so directed that a lid's triangle runs along them
-  std::vector<Index> part_;
+  UnionFind parts_;
   std::vector<double> area_;   ///< of a part, at its root
   std::vector<Index> starts_;  ///< of open edges
   HoleCovers out_;

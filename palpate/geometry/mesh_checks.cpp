@@ -9,25 +9,10 @@
 #include <numeric>
 
 #include "palpate/core/error.hpp"
+#include "palpate/geometry/union_find.hpp"
 
 namespace palpate::geometry {
 namespace {
-
-class UnionFind {
- public:
-  explicit UnionFind(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
-  Index root(Index i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(Index a, Index b) {
-    a = root(a), b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<Index> parent_;
-};
 
 /// An edge as one triangle sees it.
 struct HalfEdge {

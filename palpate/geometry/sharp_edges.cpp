@@ -3,13 +3,14 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
+
+#include "palpate/geometry/union_find.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -70,21 +71,16 @@ Parts parts_of(const Solid& solid) {
   const auto triangles = static_cast<Index>(surface.triangles.rows());
   const EdgeUses at_edge(surface);
 
-  std::vector<Index> up(static_cast<std::size_t>(triangles));
-  std::iota(up.begin(), up.end(), 0);
-  const auto root = [&](Index t) {
-    while (up[t] != t) t = up[t] = up[up[t]];
-    return t;
-  };
+  UnionFind smooth_parts(triangles);
   at_edge.for_each([&](Index, Index, std::span<const EdgeUses::Use> both) {
     if (both.size() == 2 && solid.normal(both[0].triangle).dot(solid.normal(both[1].triangle)) > smooth)
-      up[root(both[0].triangle)] = root(both[1].triangle);
+      smooth_parts.join(both[0].triangle, both[1].triangle);
   });
 
   Parts parts;
   std::map<Index, Index> number;
   for (Index t = 0; t < triangles; ++t) {
-    const auto [own, fresh] = number.emplace(root(t), static_cast<Index>(number.size()));
+    const auto [own, fresh] = number.emplace(smooth_parts.root(t), static_cast<Index>(number.size()));
     if (fresh) parts.area_m2.push_back(0);
     parts.of.push_back(own->second);
     const auto corner = [&](int k) -> Vec3 { return surface.vertices_m.row(surface.triangles(t, k)).transpose(); };

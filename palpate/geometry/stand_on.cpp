@@ -12,6 +12,7 @@
 
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/geometry/union_find.hpp"
 
 namespace palpate::geometry {
 namespace {
@@ -147,15 +148,11 @@ Vec3 nearest_on(const Outline& outline, const Vec3& p) {
 std::vector<FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface) {
   // Triangles that share a vertex are of one foot.
   const std::vector<Index> triangles = foot_triangles(plane, surface);
-  std::map<Index, Index> parent;
-  const std::function<Index(Index)> root = [&](Index v) {
-    Index& up = parent.emplace(v, v).first->second;
-    return up == v ? v : up = root(up);
-  };
+  UnionFind together(surface.vertices_m.rows());
   for (const Index t : triangles)
-    for (int k = 1; k < 3; ++k) parent[root(surface.triangles(t, k))] = root(surface.triangles(t, 0));
+    for (int k = 1; k < 3; ++k) together.join(surface.triangles(t, 0), surface.triangles(t, k));
   std::map<Index, std::vector<Index>> feet;
-  for (const Index t : triangles) feet[root(surface.triangles(t, 0))].push_back(t);
+  for (const Index t : triangles) feet[together.root(surface.triangles(t, 0))].push_back(t);
   std::vector<FinerNear> finer;
   for (const auto& [foot, members] : feet) {
     double area = 0;

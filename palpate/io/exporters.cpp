@@ -96,7 +96,7 @@ ExportFiles export_files(const Exporter& exporter, const ExportModel& model) {
   if (!(model.young_modulus_pa > 0)) throw Error("must be positive", "export: young_modulus_pa");
   if (!(model.poisson_ratio >= 0 && model.poisson_ratio < 0.5)) throw Error("must be in [0, 0.5)", "export: poisson_ratio");
   if (exporter.needs_density && !(model.density_kg_m3 > 0))
-    throw Error(exporter.name + " simulates motion: give the object's density (--density, kg/m3)", "export: density_kg_m3");
+    throw Error(exporter.name + " simulates motion: give the object's density, kg/m3", "export: density_kg_m3");
   const auto outside = [&](Index node) { return node < 0 || node >= nodes; };
   if (std::any_of(model.fixed.begin(), model.fixed.end(), outside) ||
       std::any_of(model.forces_n.begin(), model.forces_n.end(), [&](const auto& one) { return outside(one.first); }))

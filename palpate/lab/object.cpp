@@ -73,7 +73,7 @@ void stand(LabObject& object, const ObjectOptions& o) {
   for (Index t = 0; t < object.surface.triangles.rows(); ++t)
     flat_there = flat_there || (object.surface.vertices_m(object.surface.triangles.row(t), 0).array() > behind_m - 1e-9).all();
   if (o.stands == ContactLaw::bonded && !flat_there)
-    throw Error("has no flat side that could be glued to a wall; let it stand rough (--stands)", object.name);
+    throw Error("the " + object.name + " has no flat side that could be glued to a wall; let it stand rough", "ObjectOptions.stands");
   object.supports.push_back(flat(o, SupportKind::wall, "wall", Vec3(behind_m, o.base_centre_m.y(), o.base_centre_m.z()), -Vec3::UnitX()));
 }
 
@@ -102,23 +102,7 @@ void make_pressable(LabObject& object, const ObjectOptions& o) {
     const double height_m = object.surface.vertices_m.col(2).maxCoeff() - o.base_centre_m.z();
     object.sites.push_back(site(object, o, "to the wall", {0, 0, 0.6 * height_m}, Vec3(0.94, 0, -0.34)));
   }
-  PressedObjectOptions pressed;
-  pressed.surface = object.surface;
-  pressed.supports = object.supports;
-  pressed.pad_radius_m = object.pad_radius_m;
-  pressed.material = object.material;
-  pressed.young_modulus_pa = object.young_modulus_pa;
-  pressed.poisson_ratio = object.poisson_ratio;
-  pressed.extra = object.extra;
-  pressed.tetrahedra = o.tetrahedra;
-  pressed.cells_in_radius = o.cells_in_radius;
-  pressed.regions = object.regions;
-  object.press = [pressed](const PushSite& at) {
-    PressedObjectOptions here = pressed;
-    here.contact_m = at.contact_m;
-    here.direction = at.direction;
-    return std::make_unique<PressedObject>(here);
-  };
+  object.press = [pressed = pressed_options(object, o)](const PushSite& at) { return press_at(pressed, at); };
 }
 
 // Pushes in the plane y = 0, on top or on the side that looks along -x, are solved on a mesh that is made for the round pad;
@@ -300,6 +284,27 @@ constexpr std::array<BuiltInObject, 6> table_of_objects{{
 
 }  // namespace
 
+PressedObjectOptions pressed_options(const LabObject& object, const ObjectOptions& o) {
+  PressedObjectOptions pressed;
+  pressed.surface = object.surface;
+  pressed.supports = object.supports;
+  pressed.pad_radius_m = object.pad_radius_m;
+  pressed.material = object.material;
+  pressed.young_modulus_pa = object.young_modulus_pa;
+  pressed.poisson_ratio = object.poisson_ratio;
+  pressed.extra = object.extra;
+  pressed.tetrahedra = o.tetrahedra;
+  pressed.cells_in_radius = o.cells_in_radius;
+  pressed.regions = object.regions;
+  return pressed;
+}
+
+std::unique_ptr<Pressed> press_at(PressedObjectOptions options, const PushSite& at) {
+  options.contact_m = at.contact_m;
+  options.direction = at.direction;
+  return std::make_unique<PressedObject>(options);
+}
+
 PushSite place_on(const LabObject& object, const std::string& name, const Vec3& aim_m, const Vec3& direction, double stiffness) {
   ObjectOptions o;
   o.base_centre_m = object.foot_m;
@@ -334,7 +339,7 @@ LabObject object_from_surface(const TriMesh& surface, const std::string& name, c
   if (!check.watertight()) throw Error("must be closed and consistently oriented; `palpate model` repairs a surface", name);
   const Vec3 extent = check.max_m - check.min_m;
   if (!(extent.minCoeff() > 0.02 && extent.maxCoeff() < 0.5))
-    throw Error("must be between 2 cm and 50 cm large; are its units metres? (--object-size scales it)", name);
+    throw Error("must be between 2 cm and 50 cm large; are its units metres? Scale it first", name + ": extent_m");
   LabObject object = draw(name, options);
   object.description = "the surface " + name + ", " + standing(options);
   object.surface = surface;

@@ -67,6 +67,10 @@ struct LabObject {
 /// @throws Error when it passes the object by.
 PushSite place_on(const LabObject& object, const std::string& name, const Vec3& aim_m, const Vec3& direction, double stiffness = 1);
 
+/// The object's truth as it is solved for anywhere, but for the place of the push; and pressed there.
+PressedObjectOptions pressed_options(const LabObject& object, const ObjectOptions& options);
+std::unique_ptr<Pressed> press_at(PressedObjectOptions options, const PushSite& at);
+
 struct BuiltInObject {
   std::string_view name;
   std::string_view summary;

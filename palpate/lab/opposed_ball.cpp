@@ -5,12 +5,11 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/lab/implicit_surface.hpp"
-#include "palpate/lab/pressed_object.hpp"
 
 namespace palpate::lab {
 
 LabObject opposed_ball(const ObjectOptions& o) {
-  constexpr double radius_m = opposed_ball_radius_m, pad_radius_m = 0.018, room_m = 0.01;
+  constexpr double radius_m = opposed_ball_radius_m, room_m = 0.01;
   LabObject object = make_object("ball", o);  // the same draw of E and nu
   object.name = "opposed ball";
   object.description = "a ball of 120 mm that nothing holds, between a pad in the table and another";
@@ -21,23 +20,12 @@ LabObject opposed_ball(const ObjectOptions& o) {
   object.surface.vertices_m.rowwise() += centre_m.transpose();
   object.supports.clear();
   object.sites = {{"top", centre_m + radius_m * Vec3::UnitZ(), -Vec3::UnitZ()}};
-  PressedObjectOptions pressed;
-  pressed.surface = object.surface;
+  PressedObjectOptions pressed = pressed_options(object, o);
   pressed.opposed_m = o.base_centre_m;
-  pressed.pad_radius_m = pad_radius_m;
-  pressed.material = object.material;
-  pressed.young_modulus_pa = object.young_modulus_pa;
-  pressed.poisson_ratio = object.poisson_ratio;
-  pressed.extra = object.extra;
-  pressed.tetrahedra = o.tetrahedra;
-  pressed.cells_in_radius = o.cells_in_radius;
   object.press = [pressed, top = object.sites[0]](const PushSite& at) -> std::unique_ptr<Pressed> {
     if ((at.contact_m - top.contact_m).norm() > 1e-6 || (at.direction - top.direction).norm() > 1e-6)
       throw Error("can be pressed at its top only, straight down: the other pad stands below", "opposed ball");
-    PressedObjectOptions here = pressed;
-    here.contact_m = at.contact_m;
-    here.direction = at.direction;
-    return std::make_unique<PressedObject>(here);
+    return press_at(pressed, at);
   };
   return object;
 }

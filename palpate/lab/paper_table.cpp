@@ -139,7 +139,7 @@ const PaperScene& paper_scene(std::string_view name) {
     if (scene.name == name) return scene;
     names += (names.empty() ? "" : ", ") + std::string(scene.name);
   }
-  throw Error("is no scene of the paper; there are: " + names, "--scene " + std::string(name));
+  throw Error("is no scene of the paper; there are: " + names, "scene " + std::string(name));
 }
 
 }  // namespace palpate::lab

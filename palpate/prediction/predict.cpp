@@ -59,9 +59,9 @@ Elasticity elasticity_of(const Identification& answer) {
     return parameter.name == "young_modulus" && !parameter.region.empty();
   });
   if (young < 0 && by_region)
-    throw Error("E was estimated by region, and only objects of one stiffness are taken on so far: estimate with --regions none, or "
+    throw Error("E was estimated by region, and only objects of one stiffness are taken on so far: estimate it without regions, or "
                 "take the moduli and elements from model/object.vtu",
-                "result: parameters");
+                "result: regions");
   if (young < 0 || poisson < 0)
     throw Error("holds no Young's modulus and Poisson ratio of the whole object", "result: parameters");
   elasticity.extra = Eigen::Map<const VectorX>(extra.data(), Index(extra.size()));

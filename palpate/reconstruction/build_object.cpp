@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <set>
 
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/geometry/union_find.hpp"
 #include "palpate/reconstruction/fused_surface.hpp"
 #include "palpate/registration/views.hpp"
 
@@ -73,32 +73,27 @@ void turn(PointCloud& c, const Pose& T) {
 /// Leaves out parts that hang together neither with the largest one nor with a support's plane: nothing holds them.
 /// @returns their share of the volume
 double drop_floating(const std::vector<Support>& supports, TetMesh& volume) {
-  std::vector<Index> up(static_cast<std::size_t>(volume.nodes_m.rows()));
-  std::iota(up.begin(), up.end(), 0);
-  const auto root = [&](Index i) {
-    while (up[i] != i) i = up[i] = up[up[i]];
-    return i;
-  };
+  geometry::UnionFind parts(volume.nodes_m.rows());
   for (Index t = 0; t < volume.tetrahedra.rows(); ++t)
-    for (int k = 1; k < 4; ++k) up[root(volume.tetrahedra(t, k))] = root(volume.tetrahedra(t, 0));
+    for (int k = 1; k < 4; ++k) parts.join(volume.tetrahedra(t, 0), volume.tetrahedra(t, k));
   std::map<Index, double> size;
   double all = 0;
   for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
     const auto node = [&](int k) { return Vec3(volume.nodes_m.row(volume.tetrahedra(t, k))); };
     const double v = (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6;
-    size[root(volume.tetrahedra(t, 0))] += v;
+    size[parts.root(volume.tetrahedra(t, 0))] += v;
     all += v;
   }
   if (size.size() < 2) return 0;
   std::set<Index> kept{std::max_element(size.begin(), size.end(), [](const auto& a, const auto& b) { return a.second < b.second; })->first};
   for (const Support& s : supports)
     for (Index i = 0; is_plane(s.kind) && i < volume.nodes_m.rows(); ++i)
-      if (std::abs(s.plane.normal.dot(Vec3(volume.nodes_m.row(i)) - s.plane.point_m)) < 1e-9) kept.insert(root(i));
-  std::vector<Index> place(up.size(), -1);
+      if (std::abs(s.plane.normal.dot(Vec3(volume.nodes_m.row(i)) - s.plane.point_m)) < 1e-9) kept.insert(parts.root(i));
+  std::vector<Index> place(static_cast<std::size_t>(volume.nodes_m.rows()), -1);
   Index nodes = 0, tets = 0;
   double left = 0;
   for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
-    if (!kept.contains(root(volume.tetrahedra(t, 0)))) continue;
+    if (!kept.contains(parts.root(volume.tetrahedra(t, 0)))) continue;
     for (int k = 0; k < 4; ++k) place[volume.tetrahedra(t, k)] = 0;
     volume.tetrahedra.row(tets++) = volume.tetrahedra.row(t).eval();
   }

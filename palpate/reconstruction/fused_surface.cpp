@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <unordered_map>
 
 #include "palpate/core/error.hpp"
+#include "palpate/geometry/union_find.hpp"
 #include "palpate/geometry/winding_number.hpp"
 #include "palpate/reconstruction/facets.hpp"
 
@@ -199,34 +199,30 @@ class March {
 
 /// Leaves out closed parts that are much smaller than the largest or do not belong, and hollows.
 TriMesh without_specks(const TriMesh& mesh, const std::function<bool(const Vec3&)>& belongs) {
-  std::vector<Index> up(static_cast<std::size_t>(mesh.vertices_m.rows()));
-  std::iota(up.begin(), up.end(), 0);
-  const auto root = [&](Index i) {
-    while (up[i] != i) i = up[i] = up[up[i]];
-    return i;
-  };
+  const auto vertices_before = static_cast<std::size_t>(mesh.vertices_m.rows());
+  geometry::UnionFind parts(mesh.vertices_m.rows());
   for (Index t = 0; t < mesh.triangles.rows(); ++t)
-    for (int k = 1; k < 3; ++k) up[root(mesh.triangles(t, k))] = root(mesh.triangles(t, 0));
+    for (int k = 1; k < 3; ++k) parts.join(mesh.triangles(t, 0), mesh.triangles(t, k));
   const auto at = [&](Index t, int k) { return Vec3(mesh.vertices_m.row(mesh.triangles(t, k)).transpose()); };
-  std::vector<double> area(up.size(), 0), volume(up.size(), 0);
+  std::vector<double> area(vertices_before, 0), volume(vertices_before, 0);
   const Vec3 middle = at(0, 0);
   for (Index t = 0; t < mesh.triangles.rows(); ++t) {
     const Vec3 n = (at(t, 1) - at(t, 0)).cross(at(t, 2) - at(t, 0));
-    area[root(mesh.triangles(t, 0))] += n.norm();
-    volume[root(mesh.triangles(t, 0))] += n.dot(at(t, 0) - middle);
+    area[parts.root(mesh.triangles(t, 0))] += n.norm();
+    volume[parts.root(mesh.triangles(t, 0))] += n.dot(at(t, 0) - middle);
   }
   const double largest = *std::max_element(area.begin(), area.end());
-  std::vector<char> kept(up.size(), belongs ? 0 : 1);
+  std::vector<char> kept(vertices_before, belongs ? 0 : 1);
   if (belongs)
     for (Index v = 0; v < mesh.vertices_m.rows(); ++v)
-      if (!kept[root(v)] && belongs(mesh.vertices_m.row(v).transpose())) kept[root(v)] = 1;
+      if (!kept[parts.root(v)] && belongs(mesh.vertices_m.row(v).transpose())) kept[parts.root(v)] = 1;
   TriMesh out;
-  std::vector<Index> place(up.size(), -1);
+  std::vector<Index> place(vertices_before, -1);
   out.vertices_m.resize(mesh.vertices_m.rows(), 3);
   out.triangles.resize(mesh.triangles.rows(), 3);
   Index vertices = 0, triangles = 0;
   for (Index t = 0; t < mesh.triangles.rows(); ++t) {
-    const Index r = root(mesh.triangles(t, 0));
+    const Index r = parts.root(mesh.triangles(t, 0));
     if (area[r] < 0.01 * largest || volume[r] <= 0 || !kept[r]) continue;
     for (int k = 0; k < 3; ++k) {
       Index& p = place[mesh.triangles(t, k)];

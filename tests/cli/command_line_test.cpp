@@ -73,6 +73,17 @@ TEST(CommandLine, MistypedVerbGetsSuggestionAndUsageCode) {
   EXPECT_THAT(outcome.err, HasSubstr("Did you mean `doctor`?"));
 }
 
+// The library names the field that is wrong; the program knows which option sets it.
+TEST(CommandLine, OptionThatCuresIsNamed) {
+  const TemporaryFolder files("cure");
+  const std::string out = " -o " + (files / "out").string();
+  EXPECT_THAT(palpate("record --object ball --wall" + out).err, HasSubstr("let it stand rough (`--stands rough`)"));
+  std::ofstream(files / "small.obj") << "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+  const Outcome small = palpate("record --object " + (files / "small.obj").string() + out);
+  EXPECT_EQ(small.exit_code, 3);
+  EXPECT_THAT(small.err, HasSubstr("(`--object-size`)"));
+}
+
 TEST(CommandLine, MistypedOptionGetsSuggestionAndUsageCode) {
   const Outcome outcome = palpate("doctor --treads 2");
   EXPECT_EQ(outcome.exit_code, 2);

@@ -1,7 +1,7 @@
 // label: unit
 // SPDX-License-Identifier: Apache-2.0
-// `palpate record --driver`: a robot out of a shared library that was built from the C header alone, on a spring whose
-// stiffness is known; and what is said of libraries that are none.
+// `palpate record --driver` and `palpate explore --driver`: a robot out of a shared library that was built from the C header
+// alone, on a spring whose stiffness is known and on a half space whose E and nu are; and what is said of libraries that are none.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -91,6 +91,41 @@ TEST_F(Driver, GoesOnWhereARecordingWasCutOff) {
   EXPECT_EQ(read_recording_unchecked(folder.path() / "recording").pushes[0].steps.size(), whole);
 }
 
+// The library answers by the closed form of a half space; the block that stands for it in the scene is twenty pads wide, the mesh
+// of linear elements is not refined: the modulus that a contact shows, E / (1 - nu^2), comes out all the same.
+TEST_F(Driver, ExploresAHalfSpaceWhoseModulusComesOut) {
+  const int code = palpate("--json --seed 1 explore --driver '" + spring + "' --driver-settings 'soft 20000 0.3' --scene '" +
+                           PALPATE_SOURCE_DIR "/examples/driver/soft_scene' -o '" + path("explored") +
+                           "' --pushes 1 --contacts 6 --tilts 0 --levels 2 --refine none --poisson-ratio-within 0.3 " +
+                           "--young-modulus-within 0.3");
+  const nlohmann::json answer = nlohmann::json::parse(folder.get("out"), nullptr, false);
+  ASSERT_TRUE(answer.is_object()) << folder.get("err");
+  ASSERT_EQ(answer.at("pushes").size(), 1u);
+  EXPECT_EQ(answer.at("fruitless"), 0);
+  EXPECT_TRUE(answer.at("reached").get<bool>()) << folder.get("err");
+  EXPECT_EQ(code, answer.at("result").at("termination") == "converged" ? 0 : 1) << folder.get("err");
+  EXPECT_THAT(folder.get("err"), HasSubstr("both intervals are as narrow as was asked for after 1 push."));
+  const auto& push = answer.at("pushes")[0];
+  for (int axis = 0; axis < 2; ++axis)
+    EXPECT_NEAR(push.at("contact_m")[std::size_t(axis)].get<double>(), axis == 0 ? 0.5 : 0.0, 0.04) << "where the gantry reaches";
+  EXPECT_NEAR(push.at("contact_m")[2].get<double>(), 0.2, 1e-9);
+  EXPECT_EQ(push.at("direction")[2], -1.0);
+  double young_pa = 0, poisson = 0;
+  for (const auto& parameter : answer.at("result").at("parameters")) {
+    if (parameter.at("name") == "young_modulus") young_pa = parameter.at("value");
+    if (parameter.at("name") == "poisson_ratio") poisson = parameter.at("value");
+  }
+  EXPECT_NEAR(young_pa / (1 - poisson * poisson) / (20000 / (1 - 0.3 * 0.3)), 1, 0.1) << young_pa << " " << poisson;
+  EXPECT_NEAR(poisson, 0.3, 0.15);
+  const Recording made = read_recording(folder.path() / "explored/recording");
+  EXPECT_TRUE(check_recording(made).empty());
+  ASSERT_EQ(made.pushes.size(), 1u);
+  EXPECT_EQ(made.pushes[0].steps.size(), answer.at("result").at("steps").size());
+  for (const char* file : {"result.json", "report.html", "exploration.json", "model/object.vtu"})
+    EXPECT_TRUE(std::filesystem::exists(folder.path() / "explored" / file)) << file;
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "explored/truth.json")) << "nobody knows it";
+}
+
 TEST_F(Driver, WhatIsWrongIsSaidWithACure) {
   const auto refused = [&](const std::string& arguments, const std::string& words) {
     EXPECT_EQ(palpate(arguments), 3) << arguments;
@@ -107,6 +142,9 @@ TEST_F(Driver, WhatIsWrongIsSaidWithACure) {
   refused(record(spring, one_push + " --direction 0 0 0"), "must not be zero");
   refused(record(spring, one_push + " --views 3"), "rest.views");
   refused("record --driver '" + spring + "' " + one_push + " -o '" + path("recording") + "'", "--scene FOLDER");
+  const std::string explore = "explore --driver '" + spring + "' -o '" + path("recording") + "' --scene '" + scene + "' ";
+  refused(explore + "--compare", "a driver's world has one only");
+  refused(explore + "--driver-settings 'soft 20000'", "Young's modulus (Pa) and Poisson ratio");
 }
 
 }  // namespace
