@@ -49,14 +49,66 @@ std::vector<Scene> scenes() {
           {"platen_bonded_force", [](double) { return plane_shape(); }, 0.02, Touch::bonded, true, "neo_hookean"}};
 }
 
+// A block that is clamped at its foot.
+struct HeldBlock {
+  TetMesh mesh = to_quadratic(distorted(block_mesh(4, 4, 3, {0.1, 0.1, 0.075}), 0.003, 7));
+  Boundary boundary;
+  HeldBlock() {
+    boundary.constraints = clamp(nodes_where(mesh, [](const Vec3& x) { return x.z() < 1e-9; }));
+    boundary.forces = body_force(mesh);
+  }
+};
+
+// A tool a little beside the middle of its top; pressed by force along -z, or moved.
+RigidContact tool_on_top(RigidShapePtr shape, Touch law, bool by_force) {
+  const bool bonded = law == Touch::bonded;
+  RigidContact tool;
+  tool.shape = std::move(shape);
+  tool.law = law;
+  tool.friction_coefficient = 0.15;
+  tool.bond_reach_m = 1e-4;
+  tool.T_base_tool = tool_pose(Vec3(0.047, 0.052, 0.075), bonded ? Vec3(0, 0, -1) : Vec3(0.05, -0.08, -1));
+  if (by_force) tool.free_axes = bonded ? MatrixX(MatrixX::Identity(6, 6)) : along(Vec3(0, 0, -1));
+  return tool;
+}
+
+// A low block on a rough table: its weight (three columns) and a force spread over its top (three more).
+struct LyingBlock {
+  TetMesh mesh = to_quadratic(distorted(block_mesh(4, 3, 2, {0.08, 0.06, 0.04}), 0.002, 5));
+  Boundary boundary;
+  RigidContact table;
+  LyingBlock(double table_height_m, double friction_coefficient) {
+    const auto top = nodes_where(mesh, [](const Vec3& x) { return x.z() > 0.039; });
+    boundary.forces = hstack({body_force(mesh), spread_over_nodes(static_cast<Index>(mesh.nodes_m.rows()), top)});
+    table.shape = plane_shape();
+    table.law = Touch::friction;
+    table.friction_coefficient = friction_coefficient;
+    table.T_base_tool = tool_pose(Vec3(0.04, 0.03, table_height_m), Vec3::UnitZ());
+  }
+};
+
+ContactOptions exact(double tolerance) {
+  ContactOptions options;
+  options.statics.residual_tolerance = options.friction_tolerance = tolerance;
+  return options;
+}
+
+// What central differences say of displacements, and of the first tool's wrench and place.
+struct Differences {
+  VectorX displacement;
+  Vec6 wrench;
+  Vec3 tip;
+  Differences(const ContactEquilibrium& ahead, const ContactEquilibrium& behind, double step)
+      : displacement((ahead.displacement_m - behind.displacement_m) / (2 * step)),
+        wrench((ahead.touches[0].wrench - behind.touches[0].wrench) / (2 * step)),
+        tip((ahead.touches[0].T_base_tool.translation() - behind.touches[0].T_base_tool.translation()) / (2 * step)) {}
+};
+
 class ContactSensitivityContract : public testing::TestWithParam<Scene> {};
 
 TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
   const Scene& scene = GetParam();
-  const TetMesh mesh = to_quadratic(distorted(block_mesh(4, 4, 3, {0.1, 0.1, 0.075}), 0.003, 7));
-  Boundary boundary;
-  boundary.constraints = clamp(nodes_where(mesh, [](const Vec3& x) { return x.z() < 1e-9; }));
-  boundary.forces = body_force(mesh);
+  const HeldBlock block;
   struct Point {
     double log_young = std::log(20000.0), poisson = 0.35;
     VectorX weight = Vec3(200, 0, -3000);
@@ -67,22 +119,14 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
   at.wrench.head<3>() = Vec3(0.2, 0.1, -1.5);
   const bool bonded = scene.law == Touch::bonded;
   const auto solve = [&](const Point& p, ContactSensitivity* sensitivity) {
-    RigidContact tool;
-    tool.shape = scene.shape(p.radius);
-    tool.law = scene.law;
-    tool.friction_coefficient = 0.15;
-    tool.bond_reach_m = 1e-4;
-    tool.T_base_tool = tool_pose(Vec3(0.047, 0.052, 0.075), bonded ? Vec3(0, 0, -1) : Vec3(0.05, -0.08, -1));
+    RigidContact tool = tool_on_top(scene.shape(p.radius), scene.law, scene.by_force);
     tool.T_base_tool.translation() += p.shift.head<3>();
     if (p.shift.tail<3>().norm() > 0)
       tool.T_base_tool.linear() =
           Eigen::AngleAxisd(p.shift.tail<3>().norm(), p.shift.tail<3>().normalized()) * tool.T_base_tool.linear();
-    if (scene.by_force) tool.free_axes = bonded ? MatrixX(MatrixX::Identity(6, 6)) : along(Vec3(0, 0, -1));
-    ContactOptions options;
-    options.statics.residual_tolerance = 1e-12;
-    options.friction_tolerance = 1e-12;
+    ContactOptions options = exact(1e-12);
     if (scene.law == Touch::friction) options.increments = 3;  // slips in each
-    const ContactStatics body(mesh, scene.material, boundary, {tool}, options);
+    const ContactStatics body(block.mesh, scene.material, block.boundary, {tool}, options);
     ContactLoads loads = body.no_loads();
     loads.force_coefficients = p.weight;
     loads.wrench[0] = p.wrench;
@@ -105,13 +149,11 @@ TEST_P(ContactSensitivityContract, AgreesWithDifferences) {
     Point up = at, down = at;
     change(up, step);
     change(down, -step);
-    const ContactEquilibrium a = solve(up, nullptr), b = solve(down, nullptr);
-    const VectorX du = (a.displacement_m - b.displacement_m) / (2 * step);
-    const Vec6 dw = (a.touches[0].wrench - b.touches[0].wrench) / (2 * step);
-    const Vec3 tip = (a.touches[0].T_base_tool.translation() - b.touches[0].T_base_tool.translation()) / (2 * step);
-    EXPECT_LT((du - s.displacement.col(column)).norm(), 1e-3 * du.norm() + 1e-6) << what;
-    EXPECT_LT((dw - s.wrench[0].col(column)).norm(), 1e-3 * dw.norm() + 1e-4 * base.touches[0].wrench.norm()) << what;
-    EXPECT_LT((tip - s.motion[0].col(column).head<3>()).norm(), 1e-3 * tip.norm() + 1e-7) << what;
+    const Differences d(solve(up, nullptr), solve(down, nullptr), step);
+    EXPECT_LT((d.displacement - s.displacement.col(column)).norm(), 1e-3 * d.displacement.norm() + 1e-6) << what;
+    EXPECT_LT((d.wrench - s.wrench[0].col(column)).norm(), 1e-3 * d.wrench.norm() + 1e-4 * base.touches[0].wrench.norm())
+        << what;
+    EXPECT_LT((d.tip - s.motion[0].col(column).head<3>()).norm(), 1e-3 * d.tip.norm() + 1e-7) << what;
   };
   EXPECT_EQ(s.displacement.cols(), s.radius[0] < 0 ? 17 : 18);  // one region: no columns for it
   check("log E", 1e-6, s.log_young, [](Point& p, double h) { p.log_young += h; });
@@ -131,25 +173,16 @@ INSTANTIATE_TEST_SUITE_P(Scenes, ContactSensitivityContract, testing::ValuesIn(s
 
 // Two regions, one four times as stiff, under a rubbing ball: against differences, and all of them together are E.
 TEST(ContactRegions, DerivativesToTheirStiffnessAreThoseOfDifferences) {
-  const TetMesh mesh = to_quadratic(distorted(block_mesh(4, 4, 3, {0.1, 0.1, 0.075}), 0.003, 7));
+  const HeldBlock block;
   for (const char* material : {"linear", "neo_hookean"})
     for (const Dilatation dilatation : {Dilatation::pointwise, Dilatation::averaged})
       for (const bool by_force : {true, false}) {
-        RigidContact ball;
-        ball.shape = sphere_shape(0.03);
-        ball.law = Touch::friction;
-        ball.friction_coefficient = 0.15;
-        ball.T_base_tool = tool_pose(Vec3(0.047, 0.052, 0.075), Vec3(0.05, -0.08, -1));
-        if (by_force) ball.free_axes = along(Vec3(0, 0, -1));
-        Boundary boundary;
-        boundary.constraints = clamp(nodes_where(mesh, [](const Vec3& x) { return x.z() < 1e-9; }));
-        ContactOptions options;
+        ContactOptions options = exact(1e-12);
         options.statics.dilatation = dilatation;
-        options.statics.residual_tolerance = 1e-12;
-        options.friction_tolerance = 1e-12;
-        for (Index e = 0; e < mesh.tetrahedra.rows(); ++e)
-          options.statics.region.push_back(mesh.nodes_m.row(mesh.tetrahedra(e, 0)).x() < 0.051 ? 0 : 1);
-        ContactStatics body(mesh, material, boundary, {ball}, options);
+        for (Index e = 0; e < block.mesh.tetrahedra.rows(); ++e)
+          options.statics.region.push_back(block.mesh.nodes_m.row(block.mesh.tetrahedra(e, 0)).x() < 0.051 ? 0 : 1);
+        const RigidContact ball = tool_on_top(sphere_shape(0.03), Touch::friction, by_force);
+        ContactStatics body(block.mesh, material, block.boundary, {ball}, options);
         ContactLoads loads = body.no_loads();
         if (by_force) loads.wrench[0].head<3>() = Vec3(0.2, 0.1, -1.5);
         if (!by_force) loads.motion[0].head<3>() = Vec3(0.001, 0, -0.004);
@@ -165,28 +198,19 @@ TEST(ContactRegions, DerivativesToTheirStiffnessAreThoseOfDifferences) {
           const ContactEquilibrium at = solve(0);
           EXPECT_GT(at.touches[0].slipping_points, 4);
           const ContactSensitivity s = body.sensitivity(at);
-          const VectorX du = (ahead.displacement_m - behind.displacement_m) / (2 * h);
-          const Vec6 dw = (ahead.touches[0].wrench - behind.touches[0].wrench) / (2 * h);
+          const Differences d(ahead, behind, h);
           const Index column = s.first_stiffness + region;
-          EXPECT_LT((du - s.displacement.col(column)).norm(), 1e-3 * du.norm()) << material << region;
-          EXPECT_LT((dw - s.wrench[0].col(column)).norm(), 1e-3 * dw.norm() + 1e-4 * at.touches[0].wrench.norm());
+          EXPECT_LT((d.displacement - s.displacement.col(column)).norm(), 1e-3 * d.displacement.norm()) << material << region;
+          EXPECT_LT((d.wrench - s.wrench[0].col(column)).norm(), 1e-3 * d.wrench.norm() + 1e-4 * at.touches[0].wrench.norm());
           const VectorX all = s.displacement.col(s.first_stiffness) + s.displacement.col(s.first_stiffness + 1);
-          EXPECT_LT((all - s.displacement.col(s.log_young)).norm(), 1e-6 * du.norm() + 1e-6 * all.norm());
+          EXPECT_LT((all - s.displacement.col(s.log_young)).norm(), 1e-6 * d.displacement.norm() + 1e-6 * all.norm());
         }
       }
 }
 
 // A guess saves work and leaves the answer and its derivatives as they are.
 TEST(ContactGuess, SavesWorkAndNotDigits) {
-  const TetMesh mesh = to_quadratic(distorted(block_mesh(4, 3, 2, {0.08, 0.06, 0.04}), 0.002, 5));
-  Boundary boundary;
-  const auto top = nodes_where(mesh, [](const Vec3& x) { return x.z() > 0.039; });
-  boundary.forces = hstack({body_force(mesh), spread_over_nodes(static_cast<Index>(mesh.nodes_m.rows()), top)});
-  RigidContact table;
-  table.shape = plane_shape();
-  table.law = Touch::friction;
-  table.friction_coefficient = 0.4;
-  table.T_base_tool = tool_pose(Vec3(0.04, 0.03, 0), Vec3::UnitZ());
+  const LyingBlock block(0, 0.4);
   const auto run = [&](ContactStatics& body, double young, const std::vector<ContactEquilibrium>* guesses) {
     std::vector<ContactEquilibrium> steps;
     ContactLoads loads = body.no_loads();
@@ -200,10 +224,8 @@ TEST(ContactGuess, SavesWorkAndNotDigits) {
     }
     return steps;
   };
-  ContactOptions options;
-  options.statics.residual_tolerance = 1e-10;
-  options.friction_tolerance = 1e-10;
-  ContactStatics body(mesh, "neo_hookean", boundary, {table}, options), fresh(mesh, "neo_hookean", boundary, {table}, options);
+  ContactStatics body(block.mesh, "neo_hookean", block.boundary, {block.table}, exact(1e-10)),
+      fresh(block.mesh, "neo_hookean", block.boundary, {block.table}, exact(1e-10));
   const auto before = run(body, 2e4, nullptr), guessed = run(body, 2.02e4, &before), plain = run(fresh, 2.02e4, nullptr);
   for (std::size_t s = 0; s < plain.size(); ++s) {
     EXPECT_LT((guessed[s].displacement_m - plain[s].displacement_m).norm(), 1e-7 * plain[s].displacement_m.norm()) << s;
@@ -227,19 +249,10 @@ TEST(ContactGuess, SavesWorkAndNotDigits) {
 // A block on a table with friction: its weight, then a push aside and down in two steps, the second one back a little. What it
 // does at the end depends on every step before.
 TEST(ContactPath, CarriesDerivativesThroughStepsInSequence) {
-  const TetMesh mesh = to_quadratic(distorted(block_mesh(4, 3, 2, {0.08, 0.06, 0.04}), 0.002, 5));
-  Boundary boundary;
-  const auto top = nodes_where(mesh, [](const Vec3& x) { return x.z() > 0.039; });
-  boundary.forces = hstack({body_force(mesh), spread_over_nodes(static_cast<Index>(mesh.nodes_m.rows()), top)});
-  RigidContact table;
-  table.shape = plane_shape();
-  table.T_base_tool = tool_pose(Vec3(0, 0, 0.0005), Vec3::UnitZ());  // pressed in a little, so that all of it touches
-  table.law = Touch::friction;
-  table.friction_coefficient = 0.3;
-  ContactOptions options;
-  options.statics.residual_tolerance = options.friction_tolerance = 1e-12;
+  const LyingBlock block(0.0005, 0.3);  // pressed in a little, so that all of it touches
+  ContactOptions options = exact(1e-12);
   options.increments = 2;
-  const ContactStatics body(mesh, "neo_hookean", boundary, {table}, options);
+  const ContactStatics body(block.mesh, "neo_hookean", block.boundary, {block.table}, options);
   // Parameters: log E, nu, density, push aside of the first push and of the second, all in sequence.
   const auto run = [&](const VectorX& p, ContactPathSensitivity* d) {
     ContactLoads loads = body.no_loads();
@@ -276,11 +289,9 @@ TEST(ContactPath, CarriesDerivativesThroughStepsInSequence) {
     const double step = k == 2 ? 1e-3 : 1e-6;
     up(k) += step;
     down(k) -= step;
-    const ContactEquilibrium a = run(up, nullptr), b = run(down, nullptr);
-    const VectorX du = (a.displacement_m - b.displacement_m) / (2 * step);
-    const Vec6 dw = (a.touches[0].wrench - b.touches[0].wrench) / (2 * step);
-    EXPECT_LT((du - d.displacement.col(k)).norm(), 1e-3 * du.norm()) << k;
-    EXPECT_LT((dw - d.wrench[0].col(k)).norm(), 1e-3 * dw.norm() + 1e-6) << k;
+    const Differences seen(run(up, nullptr), run(down, nullptr), step);
+    EXPECT_LT((seen.displacement - d.displacement.col(k)).norm(), 1e-3 * seen.displacement.norm()) << k;
+    EXPECT_LT((seen.wrench - d.wrench[0].col(k)).norm(), 1e-3 * seen.wrench.norm() + 1e-6) << k;
   }
 }
 
