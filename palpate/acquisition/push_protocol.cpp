@@ -197,6 +197,7 @@ class PushRun {
     history_.insert(history_.end(), samples.begin(), samples.end());
     if (!unloading) watch_out();
     begin_where_the_force_began();
+    report_.deepest_m = std::max(report_.deepest_m, travel(last));  // as it is recorded: a touch of one step tells a stiffness
     record(last, mean, sigma, unloading);
   }
 

@@ -158,6 +158,17 @@ TEST(PushProtocol, StopsAtTheTravelLimit) {
   EXPECT_LT(result.report.highest_force_n, 8);
 }
 
+// Contact is noticed a millimetre late here: force over travel would come out by half too stiff.
+TEST(PushProtocol, AShortTouchOfOneStepTellsTheStiffness) {
+  SpringRobot robot;
+  PushOptions touch = options();
+  touch.travel_limit_m = 0.002;
+  touch.force_step_n = touch.force_limit_n = 50;
+  const PushReport report = run(robot, touch).report;
+  EXPECT_EQ(report.stop, StopReason::travel_limit);
+  EXPECT_NEAR(report.highest_force_n / report.deepest_m, robot.stiffness_n_m, 0.15 * robot.stiffness_n_m);
+}
+
 TEST(PushProtocol, StopsOnSlip) {
   SpringRobot sideways, gives_way;
   sideways.slips_at_m = 0.009;
