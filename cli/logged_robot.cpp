@@ -8,6 +8,7 @@
 #include "palpate/io/file.hpp"
 #include "palpate/io/recording_writer.hpp"
 #include "palpate/io/ros_messages.hpp"
+#include "palpate/io/yaml_text.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -60,15 +61,12 @@ void LoggedRobot::write_bag(const Recording& scene, const std::filesystem::path&
   if (folder.filename().empty()) folder = folder.parent_path();
   std::filesystem::create_directories(folder);
   std::string mapping = "format: palpate-mapping/1\n" + io::object_text(scene, folder);
-  const std::string noise = camera_.noise.model == "constant"
-                                ? fmt::format("{{model: constant, sigma_m: {}}}", camera_.noise.sigma_m)
-                                : fmt::format("{{model: {}}}", camera_.noise.model);
   mapping += "topics:\n  wrench: /wrench\n";
   if (camera_.camera.width_px > 0)
     mapping += fmt::format(
         "  depth:\n    - {{image: /camera/depth/image, info: /camera/depth/camera_info{}, noise: {}, pose_std_m: {}, "
         "pose_std_rad: {}}}\n",
-        camera_.mask.size() > 0 ? ", mask: /camera/mask" : "", noise, camera_.pose_std_m, camera_.pose_std_rad);
+        camera_.mask.size() > 0 ? ", mask: /camera/mask" : "", io::depth_noise_yaml(camera_.noise), camera_.pose_std_m, camera_.pose_std_rad);
   mapping += fmt::format(
       "frames: {{base: base, tip: tip}}\nwrench: {{reports: force_on_object}}   # not tared: the mean before each contact "
       "is taken off\n"

@@ -24,6 +24,7 @@
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/free_space.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
+#include "palpate/sensing/lens_scatter.hpp"
 #include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/observe.hpp"
 #include "palpate/sensing/plane_mask.hpp"
@@ -67,7 +68,7 @@ TetMesh to_linear(const TetMesh& mesh) {
   const auto corners = std::count(used.begin(), used.end(), 1);
   if (!std::all_of(used.begin(), used.begin() + corners, [](char c) { return c == 1; })) {
     throw Error("corners and midpoints are mixed in the node list, so linear elements would renumber the nodes that supports "
-                "and tools name; use --element tet10, or give the mesh with its corners first",
+                "and tools name; use quadratic ones (tet10), or give the mesh with its corners first",
                 "model.element tet4");
   }
   linear.nodes_m = mesh.nodes_m.topRows(corners);
@@ -247,8 +248,8 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
           if (masked_m != nullptr && masked_m->back().rows() == 0) {
             masked_m->back() = sensing::masked_points(masked, low_m, high_m, masked_a_step);
           }
-          terms.push_back(
-              estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad, frame->noise.bias_std_m});
+          terms.push_back(estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad,
+                                                     frame->noise.bias_std_m, sensing::lens_scatter(*frame)});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
           terms.push_back(*cloud);
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {

@@ -29,6 +29,15 @@ struct DepthNoise {
   std::string model = "constant";
   double sigma_m = std::numeric_limits<double>::quiet_NaN();  ///< of `constant`; NaN = not given
   double bias_std_m = 0.0;                                    ///< prior of one common depth offset a push (0 = none)
+  double shared_std_m = 0.0;                                  ///< error that neighbouring pixels share, beside the model's own
+  /// Prior on the share of the picture's light that the lens spreads over every pixel (time of flight); NaN = the model's
+  double lens_scatter_std = std::numeric_limits<double>::quiet_NaN();
+
+  bool operator==(const DepthNoise& other) const {
+    const auto same = [](double a, double b) { return a == b || (a != a && b != b); };
+    return model == other.model && same(sigma_m, other.sigma_m) && bias_std_m == other.bias_std_m &&
+           shared_std_m == other.shared_std_m && same(lens_scatter_std, other.lens_scatter_std);
+  }
 };
 
 struct DepthFrame {

@@ -29,12 +29,10 @@ struct BagCamera {
 };
 
 bool same_camera(const DepthFrame& a, const DepthFrame& b) {
-  const auto same = [](double x, double y) { return x == y || (std::isnan(x) && std::isnan(y)); };
   return a.camera.width_px == b.camera.width_px && a.camera.height_px == b.camera.height_px &&
          a.camera.fx_px == b.camera.fx_px && a.camera.fy_px == b.camera.fy_px && a.camera.cx_px == b.camera.cx_px &&
          a.camera.cy_px == b.camera.cy_px && a.camera.distortion == b.camera.distortion &&
-         a.camera.distortion_coefficients == b.camera.distortion_coefficients && a.noise.model == b.noise.model &&
-         same(a.noise.sigma_m, b.noise.sigma_m) && a.noise.bias_std_m == b.noise.bias_std_m &&
+         a.camera.distortion_coefficients == b.camera.distortion_coefficients && a.noise == b.noise &&
          a.pose_std_m == b.pose_std_m && a.pose_std_rad == b.pose_std_rad;
 }
 
@@ -204,13 +202,10 @@ class BagWriter {
     if (channels_.count("/joint_states")) text += "  joints: /joint_states\n";
     if (!cameras_.empty()) text += "  depth:\n";
     for (const BagCamera& camera : cameras_) {
-      YamlLine noise, line;
-      noise.word("model", camera.like.noise.model);
-      if (camera.like.noise.model == "constant") noise.number("sigma_m", camera.like.noise.sigma_m);
-      noise.number_unless(0, "bias_std_m", camera.like.noise.bias_std_m);
+      YamlLine line;
       line.put("image", "/" + camera.name + "/depth/image").put("info", "/" + camera.name + "/depth/camera_info");
       if (camera.has_mask) line.put("mask", "/" + camera.name + "/mask");
-      line.put("noise", noise.str());
+      line.put("noise", depth_noise_yaml(camera.like.noise));
       line.number_unless(0, "pose_std_m", camera.like.pose_std_m).number_unless(0, "pose_std_rad", camera.like.pose_std_rad);
       text += "    - " + line.str() + "\n";
     }

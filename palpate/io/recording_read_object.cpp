@@ -260,6 +260,8 @@ DepthNoise read_depth_noise(const YamlField& field) {
   noise.model = keys.required("model").text();
   if (noise.model == "constant") noise.sigma_m = keys.required("sigma_m").positive();
   noise.bias_std_m = keys.non_negative_or("bias_std_m", 0);
+  noise.shared_std_m = keys.non_negative_or("shared_std_m", 0);
+  if (keys.optional("lens_scatter_std")) noise.lens_scatter_std = keys.non_negative_or("lens_scatter_std", 0);
   keys.finish();
   return noise;
 }

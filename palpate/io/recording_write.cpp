@@ -62,23 +62,16 @@ struct RecordingWriter::Pages {
       text += fmt::format("    distortion: {{model: {}, coefficients: {}}}\n", name_of(distortion_names, camera.distortion),
                           yaml_list(camera.distortion_coefficients.data(), camera.distortion_coefficients.size()));
     }
-    YamlLine noise;
-    noise.word("model", known.noise.model);
-    if (known.noise.model == "constant") noise.number("sigma_m", known.noise.sigma_m);
-    noise.number_unless(0, "bias_std_m", known.noise.bias_std_m);
-    return text + fmt::format("    depth_unit_m: {}\n    noise: {}\n", known.depth_unit_m, noise.str());
+    return text + fmt::format("    depth_unit_m: {}\n    noise: {}\n", known.depth_unit_m, depth_noise_yaml(known.noise));
   }
 
   std::size_t camera_of(const DepthFrame& frame, double unit_m) {
-    const auto same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       const Camera& a = cameras[i].camera;
       const Camera& b = frame.camera;
-      const DepthNoise& n = cameras[i].noise;
       if (a.width_px == b.width_px && a.height_px == b.height_px && a.fx_px == b.fx_px && a.fy_px == b.fy_px &&
           a.cx_px == b.cx_px && a.cy_px == b.cy_px && a.distortion == b.distortion &&
-          a.distortion_coefficients == b.distortion_coefficients && n.model == frame.noise.model &&
-          same(n.sigma_m, frame.noise.sigma_m) && n.bias_std_m == frame.noise.bias_std_m &&
+          a.distortion_coefficients == b.distortion_coefficients && cameras[i].noise == frame.noise &&
           cameras[i].depth_unit_m == unit_m) {
         return i;
       }

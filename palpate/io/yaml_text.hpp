@@ -4,11 +4,13 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "palpate/core/math.hpp"
+#include "palpate/core/recording.hpp"
 
 namespace palpate::io {
 
@@ -58,5 +60,15 @@ class YamlLine {
  private:
   std::string text_;
 };
+
+/// As read_depth_noise reads it.
+inline std::string depth_noise_yaml(const DepthNoise& noise) {
+  YamlLine line;
+  line.word("model", noise.model);
+  if (noise.model == "constant") line.number("sigma_m", noise.sigma_m);
+  line.number_unless(0, "bias_std_m", noise.bias_std_m).number_unless(0, "shared_std_m", noise.shared_std_m);
+  if (!std::isnan(noise.lens_scatter_std)) line.number("lens_scatter_std", noise.lens_scatter_std);
+  return line.str();
+}
 
 }  // namespace palpate::io

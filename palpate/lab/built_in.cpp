@@ -238,7 +238,7 @@ Demo make_demo(const DemoOptions& options, const OnProgress& on_progress) {
       frame.T_base_camera = look_at(eye, cube_centre_m + Vec3(0, 0, 0.6 * options.edge_m));
       frame.pose_std_m = options.camera_std_m;
       frame.pose_std_rad = options.camera_std_rad;
-      frame.noise = sensor.noise;
+      frame.noise = stated_noise(sensor);
       const Pose true_camera = frame.T_base_camera * small_motion(options, pose_random);
       cube_tree.refit(cube.surfaces[std::size_t(level)].vertices_m);
       TriMesh posed_stick = stick_mesh;

@@ -118,6 +118,12 @@ double time_of_flight_sigma_m(double depth_m, double incidence_rad, const Look& 
                                          electrons * ambient_light, 0.99);
 }
 
+DepthNoise stated_noise(const DepthSensorOptions& options) {
+  DepthNoise noise = options.noise;
+  noise.shared_std_m = options.correlated_sigma_m;
+  return noise;
+}
+
 void check(const DepthSensorOptions& o) {
   const auto bad = [](const char* field, const char* rule) {
     throw Error(rule, std::string("DepthSensorOptions.") + field);

@@ -49,6 +49,9 @@ DepthSensorOptions depth_sensor(std::string_view name);
 /// @throws Error naming the option that is out of range.
 void check(const DepthSensorOptions& options);
 
+/// What a recording says of the sensor's noise.
+DepthNoise stated_noise(const DepthSensorOptions& options);
+
 /// Axial noise of time of flight on a surface that is not of half albedo, or in other light than the model assumes.
 double time_of_flight_sigma_m(double depth_m, double incidence_rad, const Look& look, double ambient_light);
 

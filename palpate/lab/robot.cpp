@@ -266,7 +266,7 @@ DepthFrame LabRobot::take_depth_image() {
   frame.T_base_camera = lab.T_base_camera;
   frame.pose_std_m = lab.options.camera_std_m;
   frame.pose_std_rad = lab.options.camera_std_rad;
-  frame.noise = lab.options.depth.noise;
+  frame.noise = stated_noise(lab.options.depth);
   const auto& names = lab.mask.kinematics().free_joints();
   const auto poses = lab.mask.kinematics().link_poses(names, lab.true_joints);
   TriMesh shape = lab.travel() > 0 ? lab.curve().surface(lab.curve().at(lab.travel())) : lab.object.surface;
@@ -319,7 +319,7 @@ std::vector<DepthFrame> LabRobot::look_from(const std::vector<ViewDirection>& di
     frame.T_base_camera = look_at(eye, middle);
     frame.pose_std_m = lab.options.camera_std_m;
     frame.pose_std_rad = lab.options.camera_std_rad;
-    frame.noise = lab.options.depth.noise;
+    frame.noise = stated_noise(lab.options.depth);
     Pose T_base_true = frame.T_base_camera;
     const Vec3 turn = lab.options.camera_std_rad * random.normal3();
     if (turn.norm() > 0) T_base_true.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));

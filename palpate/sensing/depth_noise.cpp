@@ -35,6 +35,9 @@ double bumblebee_axial(const DepthNoiseInput& in) { return stereo_sigma_m(in.dep
 double fotonic_axial(const DepthNoiseInput&) { return 0.0263; }
 double fotonic_lateral(const DepthNoiseInput& in) { return 0.003163 * in.focal_px; }
 
+// A per cent of the light is usual (lens_scatter.hpp), of an object half as bright as what stands about it two.
+constexpr double flash_scatter = 0.02;
+
 // A diffuse surface of half albedo that returns 40 000 electrons at 1 m and as much ambient light: 6 mm there.
 double time_of_flight_axial(const DepthNoiseInput& in) {
   const double signal = 4e4 * std::max(std::cos(in.incidence_rad), 0.05) / square(in.depth_m);
@@ -54,9 +57,10 @@ constexpr std::array<DepthNoiseModel, 7> table{{
      d435_stereo_axial, nullptr},
     {"bumblebee_stereo", "z^2 s / (f B), passive stereo with B = 120 mm (Point Grey Bumblebee2), s = 0.1 px",
      bumblebee_axial, nullptr},
-    {"fotonic_g45", "elevation_mapping, fotonic_g45.yaml (ANYbotics): constant", fotonic_axial, fotonic_lateral},
+    {"fotonic_g45", "elevation_mapping, fotonic_g45.yaml (ANYbotics): constant", fotonic_axial, fotonic_lateral,
+     flash_scatter},
     {"time_of_flight", "Lange and Seitz 2001 with 20 MHz and 40 000 electrons at 1 m: a PMD-like camera",
-     time_of_flight_axial, nullptr},
+     time_of_flight_axial, nullptr, flash_scatter},
     {"realsense_l515",
      "Intel RealSense L515 datasheet, 95 % reflectivity, VGA: 2.5 mm at 1 m, 15.5 mm at 9 m, linear between", l515_axial,
      nullptr},
@@ -75,11 +79,11 @@ const DepthNoiseModel& depth_noise_model(std::string_view name) {
 }
 
 double axial_sigma_m(const DepthNoise& noise, const DepthNoiseInput& input) {
-  if (noise.model != "constant") return depth_noise_model(noise.model).axial_sigma_m(input);
-  if (!(noise.sigma_m > 0))
+  const bool constant = noise.model == "constant";
+  if (constant && !(noise.sigma_m > 0))
     throw Error("the model 'constant' needs a positive standard deviation in metres; give it or name a sensor",
                 "noise.sigma_m");
-  return noise.sigma_m;
+  return std::hypot(constant ? noise.sigma_m : depth_noise_model(noise.model).axial_sigma_m(input), noise.shared_std_m);
 }
 
 double stereo_sigma_m(double depth_m, double focal_px, double baseline_m, double disparity_sigma_px) {

@@ -22,6 +22,7 @@ struct DepthNoiseModel {
   std::string_view source;
   double (*axial_sigma_m)(const DepthNoiseInput&);     ///< along the optical axis
   double (*lateral_sigma_px)(const DepthNoiseInput&);  ///< across, in pixels; nullptr = the source states none
+  double lens_scatter_std = 0;  ///< prior of the share of the picture's light that falls on every pixel (lens_scatter.hpp)
 };
 
 /// The table that --help, the docs and the contract test loop over. `constant` is not in it: it has no figures of its own.

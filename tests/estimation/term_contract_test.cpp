@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <complex>
 
 #include "palpate/core/error.hpp"
 #include "scenes.hpp"
@@ -53,6 +54,13 @@ TermInput rays(const Scene& scene) {
   return observation;
 }
 
+/// Four times the usual light spread in the lens, of a picture that ends half a metre behind the object.
+TermInput rays_in_scattered_light(const Scene& scene) {
+  RayObservation observation = std::get<RayObservation>(rays(scene));
+  observation.scatter = LensScatter{0.04, std::polar(1.4, LensScatter::phase_per_m * 0.9)};
+  return observation;
+}
+
 TermInput markers(const Scene&) {
   Markers markers;
   markers.names = {"a", "b", "hidden"};
@@ -94,6 +102,8 @@ const std::vector<Case> cases{
     {"rays_tip", rays, 0, true},
     {"rays_as_points_tip", rays, 0, false},
     {"rays_plate", rays, 2, true},
+    {"rays_in_scattered_light_tip", rays_in_scattered_light, 0, true},
+    {"rays_in_scattered_light_plate", rays_in_scattered_light, 2, true},
     {"cloud_tip", cloud, 0, true},
     {"cloud_plate", cloud, 2, true},
     {"cloud_unloaded", cloud, 1, true, false},

@@ -70,8 +70,7 @@ TEST(BagWrite, ComesBackAsItWas) {
       EXPECT_EQ(read.mask, seen.mask);
       EXPECT_LT((read.T_base_camera.matrix() - seen.T_base_camera.matrix()).norm(), 1e-12);
       EXPECT_EQ(read.camera.fy_px, seen.camera.fy_px);
-      EXPECT_EQ(read.noise.sigma_m, seen.noise.sigma_m);
-      EXPECT_EQ(read.noise.bias_std_m, seen.noise.bias_std_m);
+      EXPECT_EQ(read.noise, seen.noise);
       EXPECT_EQ(read.pose_std_m, seen.pose_std_m);
     }
   }

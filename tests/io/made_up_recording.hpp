@@ -56,6 +56,8 @@ inline Recording made_up() {
       frame.T_base_camera = Eigen::Translation3d(0, 0, 0.5 + 0.01 * i) * Eigen::AngleAxisd(3.1, Vec3::UnitX());
       frame.noise.sigma_m = 0.002;
       frame.noise.bias_std_m = 0.001;
+      frame.noise.shared_std_m = 0.0003;
+      frame.noise.lens_scatter_std = 0.01;
       frame.pose_std_m = 0.0005;
       frame.depth_m = DepthImage::Constant(6, 8, 0.4321f + 0.01f * static_cast<float>(i));
       if (i != 2) {

@@ -256,7 +256,7 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
           EXPECT_EQ(frame->depth_m, other.depth_m);
           EXPECT_EQ(frame->mask, other.mask);
           EXPECT_EQ(frame->T_base_camera.matrix(), other.T_base_camera.matrix());
-          EXPECT_EQ(frame->noise.bias_std_m, other.noise.bias_std_m);
+          EXPECT_EQ(frame->noise, other.noise);
           EXPECT_EQ(frame->camera.distortion_coefficients, other.camera.distortion_coefficients);
         }
         if (const auto* wrench = std::get_if<Wrench>(&a.observations[i])) {

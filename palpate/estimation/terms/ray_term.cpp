@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Depth along the camera ray against the exactly ray-cast deformed surface. Unlike a closest point, the residual lies where the
-// noise lies, so noise does not bias it. While the surface may still be far off, the closest point gives direction instead.
+// Depth along the camera ray against the exactly ray-cast deformed surface. Unlike a closest point, the residual lies where
+// the noise lies, so noise does not bias it. While the surface may still be far off, the closest point gives direction
+// instead.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
@@ -11,16 +14,23 @@
 namespace palpate::estimation {
 namespace {
 
-// What the fit makes of a recording hangs on means over wide parts of the picture: a cell must hold most of the neighbours that a
-// point's error is correlated with (a few times the sensor's correlation length, 5 to 20 pixels), or their effect is missed.
+// What the fit makes of a recording hangs on means over wide parts of the picture: a cell must hold most of the neighbours
+// that a point's error is correlated with (a few times the sensor's correlation length, 5 to 20 pixels), or their effect is
+// missed.
 constexpr Index cell_px = 48;
 constexpr double endless = 1e300;
 constexpr double grazing_cosine = 0.17;  // beyond 80 degrees a depth says little and its noise model is void
 
 class RayTerm : public Term {
  public:
-  RayTerm(const RayObservation& observation, const TriMesh& rest, int pose, int bias)
-      : rays_(observation.rays), pose_(pose), bias_(bias), tree_(rest), hints_(static_cast<std::size_t>(rays_.range_m.size()), -1) {
+  RayTerm(const RayObservation& observation, const TriMesh& rest, int pose, int bias, int scatter)
+      : rays_(observation.rays),
+        lens_(observation.scatter.value_or(LensScatter{})),
+        pose_(pose),
+        bias_(bias),
+        scatter_(scatter),
+        tree_(rest),
+        hints_(static_cast<std::size_t>(rays_.range_m.size()), -1) {
     for (Index i = 0; i < rays_.range_m.size(); ++i) pivot_m_ += point(i) / static_cast<double>(rays_.range_m.size());
     typical_ = rays_.sigma_m.mean();
   }
@@ -32,10 +42,13 @@ class RayTerm : public Term {
     const Index count = static_cast<Index>(predicted.columns.size());
     const Index pose_column = count;
     const Index bias_column = count + (pose_ >= 0 ? 6 : 0);
+    const Index scatter_column = bias_column + (bias_ >= 0 ? 1 : 0);
+    const double share = scatter_ >= 0 ? unknowns(scatter_) : 0;
     TermRows rows;
     rows.unknowns = predicted.columns;
     for (int k = 0; pose_ >= 0 && k < 6; ++k) rows.unknowns.push_back(pose_ + k);
     if (bias_ >= 0) rows.unknowns.push_back(bias_);
+    if (scatter_ >= 0) rows.unknowns.push_back(scatter_);
     const FieldColumns field(predicted);
     field.append_unknowns(rows.unknowns);
     rows.jacobian = MatrixX::Zero(rays_.range_m.size(), static_cast<Index>(rows.unknowns.size()));
@@ -48,6 +61,7 @@ class RayTerm : public Term {
     rows.cell.resize(static_cast<std::size_t>(rays_.range_m.size()));
 
     const MatrixX slopes = predicted.d_surface.transpose();  // a vertex's in one place
+    const MatrixX material_slopes = share != 0 ? MatrixX(predicted.d_markers().transpose()) : MatrixX();
     VectorX slope(count);
     for (Index i = 0; i < rays_.range_m.size(); ++i) {
       rows.cell[static_cast<std::size_t>(i)] = cell(i);
@@ -58,9 +72,10 @@ class RayTerm : public Term {
       rows.observed_m.row(i) = observed;
 
       Index triangle = -1;
-      Vec3 barycentric, gradient;  // residual = (observed - surface) . gradient / sigma
+      Vec3 barycentric, gradient;  // of the distance between observed and surface along the ray (or between both)
       double residual_m = 0;
-      Vec3 lever = measured;                // where the frame's pose acts: the hit, for a ray
+      std::optional<Scattered> scattered;
+      Vec3 lever = measured;  // where the frame's pose acts: the hit, for a ray
       Index& hint = hints_[static_cast<std::size_t>(i)];
       const bool chosen = view.chosen != nullptr && (*view.chosen)[static_cast<std::size_t>(i)] != 0;
       if (view.chosen != nullptr && !chosen) {
@@ -80,6 +95,10 @@ class RayTerm : public Term {
             gradient = normal / std::copysign(std::max(std::abs(cosine), grazing_cosine), cosine);
             residual_m = rays_.range_m(i) - bias_m - hit->range_m;
             lever = measured - residual_m * Vec3(rays_.directions.row(i));
+            if (scatter_ >= 0 && view.along_rays) {
+              scattered = scatter(predicted, triangle, rays_.directions.row(i), hit->range_m);
+              residual_m -= share * scattered->error.m;
+            }
           }
         }
       } else {
@@ -96,22 +115,52 @@ class RayTerm : public Term {
       }
       const double sigma_m = rays_.sigma_m(i);
       rows.residual(i) = residual_m / sigma_m;
+      if (bias_ >= 0) rows.jacobian(i, bias_column) = -gradient.dot(direction) / sigma_m;
       slope.setZero();
+      if (scattered) {
+        rows.jacobian(i, scatter_column) = -scattered->error.m / sigma_m;
+        gradient *= 1 + share * scattered->error.per_range;
+        for (int k = 0; share != 0 && k < 3; ++k)
+          slope.noalias() -= material_slopes.middleCols<3>(3 * tree_.mesh().triangles(triangle, k)) *
+                             (share * scattered->error.per_cosine / sigma_m * scattered->cosine_per_corner[k]);
+      }
       for (int k = 0; k < 3; ++k) {
-        slope.noalias() -= slopes.middleCols<3>(3 * tree_.mesh().triangles(triangle, k)) * (barycentric(k) / sigma_m * gradient);
+        slope.noalias() -=
+            slopes.middleCols<3>(3 * tree_.mesh().triangles(triangle, k)) * (barycentric(k) / sigma_m * gradient);
       }
       rows.jacobian.row(i).head(count) = slope.transpose();
       field.subtract(rows.jacobian, i, tree_.mesh().triangles.row(triangle), barycentric, gradient / sigma_m);
       if (pose_ >= 0) {
         rows.jacobian.block<1, 6>(i, pose_column) = frame.slope(gradient / sigma_m, lever);
       }
-      if (bias_ >= 0) rows.jacobian(i, bias_column) = -gradient.dot(direction) / sigma_m;
     }
     return rows;
   }
   double typical_sigma() const override { return typical_; }
 
  private:
+  /// What scattered light adds to a range that ends on a triangle of the surface.
+  struct Scattered {
+    LensScatter::Error error;
+    std::array<Vec3, 3> cosine_per_corner;  ///< derivative of the cosine between ray and normal to the triangle's corners
+  };
+  /// The normal is that of the material: what is wrong with the rest surface is too slow to turn it.
+  Scattered scatter(const StepPrediction& predicted, Index triangle, const Vec3& direction, double range_m) const {
+    const auto corner = [&](int k) { return Vec3(predicted.markers_m().row(tree_.mesh().triangles(triangle, k))); };
+    const Vec3 e1 = corner(1) - corner(0), e2 = corner(2) - corner(0);
+    const Vec3 doubled = e1.cross(e2);
+    const double size = doubled.norm();
+    const Vec3 normal = doubled / size;
+    const double cosine = normal.dot(direction);
+    Scattered out;
+    out.error = lens_.error(range_m, std::max(std::abs(cosine), grazing_cosine));
+    const bool grazes = std::abs(cosine) < grazing_cosine;
+    const Vec3 turned = grazes ? Vec3(Vec3::Zero()) : Vec3(std::copysign(1 / size, cosine) * (direction - cosine * normal));
+    out.cosine_per_corner[1] = e2.cross(turned);
+    out.cosine_per_corner[2] = turned.cross(e1);
+    out.cosine_per_corner[0] = -out.cosine_per_corner[1] - out.cosine_per_corner[2];
+    return out;
+  }
   Vec3 point(Index i) const { return rays_.origins_m.row(i) + rays_.range_m(i) * rays_.directions.row(i); }
   Vec3 face_normal(Index triangle) const {
     const auto corner = [&](int k) { return Vec3(tree_.mesh().vertices_m.row(tree_.mesh().triangles(triangle, k))); };
@@ -119,11 +168,13 @@ class RayTerm : public Term {
   }
   /// Square image cells, numbered along rows of up to 4096 cells.
   int cell(Index i) const {
-    return rays_.pixel.rows() == 0 ? static_cast<int>(i) : (rays_.pixel(i, 1) / cell_px) * 4096 + rays_.pixel(i, 0) / cell_px;
+    return rays_.pixel.rows() == 0 ? static_cast<int>(i)
+                                   : (rays_.pixel(i, 1) / cell_px) * 4096 + rays_.pixel(i, 0) / cell_px;
   }
 
   RayCloud rays_;
-  int pose_, bias_;
+  LensScatter lens_;
+  int pose_, bias_, scatter_;
   Vec3 pivot_m_ = Vec3::Zero();
   double typical_ = 0;
   mutable geometry::TriangleTree tree_;
@@ -142,8 +193,15 @@ std::unique_ptr<Term> make_ray_term(const RayObservation& observation, const Ter
     if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, observation.bias_std_m});
     bias = context.shared[name];
   }
+  int scatter = -1;
+  if (observation.scatter && observation.scatter->share_std > 0) {
+    const std::string name = "lens_scatter";
+    if (context.shared.count(name) == 0)
+      context.shared[name] = context.unknowns.add({name, "1", 0, observation.scatter->share_std});
+    scatter = context.shared[name];
+  }
   const int pose = add_frame_pose(context, observation.pose_std_m, observation.pose_std_rad);
-  return std::make_unique<RayTerm>(observation, context.model.object().surface.rest(), pose, bias);
+  return std::make_unique<RayTerm>(observation, context.model.object().surface.rest(), pose, bias, scatter);
 }
 
 }  // namespace palpate::estimation

@@ -5,10 +5,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "palpate/core/lens_scatter.hpp"
 #include "palpate/core/recording.hpp"
 #include "palpate/estimation/forward_model.hpp"
 #include "palpate/estimation/unknowns.hpp"
@@ -20,6 +22,7 @@ struct RayObservation {
   RayCloud rays;
   double pose_std_m = 0, pose_std_rad = 0;
   double bias_std_m = 0;  ///< one common depth offset a push
+  std::optional<LensScatter> scatter = {};  ///< nothing: the lens spreads no light. One share for all frames
 };
 
 using TermInput = std::variant<RayObservation, PointCloud, Markers, ToolTravel, Wrench>;
