@@ -64,6 +64,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
     return true;
   };
   double damping = 1e-6;
+  VectorX last_move = VectorX::Zero(start.size());  // that was accepted
   for (best.iterations = 1; best.iterations <= options.max_iterations; ++best.iterations) {
     // Hold nu where it sits on a bound that the gradient pushes against.
     const double nu = best.unknowns(poisson);
@@ -92,6 +93,11 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
         damping = std::max(1e-3, damping * 100);
         continue;
       }
+      // Steps that go to and fro overshoot: of errors that turn by -r each, the end lies at 1 / (1 + r) of the step (Aitken 1926).
+      const VectorX before = last_move(moving);
+      const double size2 = before.cwiseAbs2().dot(scale);
+      const double turns = size2 > 0 ? -before.cwiseProduct(scale).dot(move) / size2 : 0;
+      if (attempt == 0 && turns > 0.3) move /= 1 + std::min(turns, 1.0);
       VectorX next = best.unknowns;
       for (std::size_t k = 0; k < moving.size(); ++k) next(moving[k]) += move(static_cast<Index>(k));
       // A step of log E, in any region, beyond a factor of five leaves every linearisation behind.
@@ -129,6 +135,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
         largest = std::max(largest, std::abs(next(moving[k]) - best.unknowns(moving[k])) / std::max(std_dev, 1e-9));
       }
       const double gain = best.evaluation.cost - trial.cost;
+      last_move = next - best.unknowns;
       best.unknowns = next;
       best.evaluation = std::move(trial);
       if (options.on_accepted) options.on_accepted(best, false);

@@ -96,7 +96,7 @@ PaperError::PaperError(const Recording& recording, const SimulatedObject& object
     if (points_of(inputs[s]).rows() > 0) with_points.push_back(s);
   }
   if (with_points.empty()) {
-    throw Error("the paper's method needs a point cloud or a depth image in at least one step", "--method paper");
+    throw Error("the paper's method needs a point cloud or a depth image in at least one step", "method paper");
   }
   const std::size_t samples = std::min(paper_samples, with_points.size());
   for (std::size_t k = 0; k < samples; ++k) {

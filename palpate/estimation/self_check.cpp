@@ -334,8 +334,7 @@ void judge(const Problem& p, SelfCheck& check) {
   if (check.chi2_per_dof > 1.5)
     said["does_not_fit"] =
         "what is left is larger than the stated sigmas allow: the body gives way elsewhere, it is not where the recording "
-        "says "
-        "(--placed-within), or a sigma is too small";
+        "says, or a sigma is too small";
   for (const auto& [code, message] : said) check.verdicts.push_back({code, message});
 }
 

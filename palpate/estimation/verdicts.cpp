@@ -23,7 +23,7 @@ void judge_end(const VerdictInput& in, std::vector<Verdict>& out) {
   if (in.optimum.termination == Termination::converged) return;
   out.push_back({"not_converged", "The fit did not converge (" + in.optimum.message +
                                       "): do not use the numbers. Check the loads, the supports and the material, or give "
-                                      "a start with --young-modulus-start."});
+                                      "the start of E that you expect."});
 }
 
 void judge_young(const VerdictInput& in, std::vector<Verdict>& out) {
@@ -168,7 +168,7 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
                    "E drifts with the load: the higher half of the loads gives " + ratio(in.checks.high_loads, in.checks.low_loads) +
                        " times the E of the lower half, so the material " + (softens ? "softens" : "stiffens") +
                        " beyond what the law `" + in.answer.material +
-                       "` describes. For small strains believe the lower loads; try another --material (foam softens)."});
+                       "` describes. For small strains believe the lower loads; try another law (foam softens)."});
   }
   if (differ(in.checks.loading, in.checks.unloading)) {
     out.push_back({"hysteresis", "Unloading gives " + ratio(in.checks.unloading, in.checks.loading) +
@@ -195,8 +195,11 @@ void judge_doubts(const VerdictInput& in, bool slipped, std::vector<Verdict>& ou
     if (std::abs(doubt.log_young) < matters * young_std && std::abs(doubt.poisson) < matters * poisson_std) continue;
     if (doubt.about != Doubt::About::support && std::abs(doubt.size_m) < least_share * doubt.scale_m) continue;
     const std::string size = number(1e3 * std::abs(doubt.size_m), "{:.2g}") + " mm";
-    const std::string change = "; E would then be " + number(100 * std::expm1(doubt.log_young), "{:+.2g}") + " %, and nu " +
-                               number(doubt.poisson, "{:+.2g}") + ", from here";
+    // One linear step says how far off the answer is only where that is not far.
+    const bool near = std::abs(doubt.log_young) < 0.5 && std::abs(doubt.poisson) < 0.25;
+    const std::string change = near ? "; E would then be " + number(100 * std::expm1(doubt.log_young), "{:+.2g}") +
+                                          " %, and nu " + number(doubt.poisson, "{:+.2g}") + ", from here"
+                                    : "; E and nu would then be quite different";
     switch (doubt.about) {
       case Doubt::About::contact:
         out.push_back({"contact_elsewhere", "The residuals ask for a contact " + size +
