@@ -106,6 +106,10 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   model.start_from(fitted);
   Objective wider(model, inputs, unknowns);
   const std::vector<int> at = places(objective.unknowns(), unknowns);
+  ForwardModel::Changes changes = fitted.changes();
+  for (auto& change : changes)
+    if (change) change = change->renumbered(at, unknowns.prior_mean());
+  model.set_changes(std::move(changes));
   Optimum there = optimum;
   there.unknowns = unknowns.prior_mean();
   for (std::size_t k = 0; k < at.size(); ++k) {

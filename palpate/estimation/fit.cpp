@@ -11,6 +11,7 @@
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/doubts.hpp"
 #include "palpate/estimation/error_budget.hpp"
+#include "palpate/estimation/mesh_correction.hpp"
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
@@ -65,8 +66,8 @@ void check(const FitOptions& options) {
   };
   demand(options.max_iterations >= 1, "max_iterations", "must be at least 1");
   demand(options.tukey_cut > 1.5 && std::isfinite(options.tukey_cut), "tukey_cut", "must be a number above 1.5");
-  demand(!options.young_start_pa || (*options.young_start_pa > 0 && std::isfinite(*options.young_start_pa)), "young_start_pa",
-         "must be positive, in pascal");
+  demand(!options.young_start_pa || (*options.young_start_pa > 0 && std::isfinite(*options.young_start_pa)),
+         "young_start_pa", "must be positive, in pascal");
   demand(options.poisson_start > -1 && options.poisson_start < 0.5, "poisson_start", "must lie between -1 and 0.5");
   demand(options.threads >= 1, "threads", "must be at least 1");
 }
@@ -83,8 +84,9 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
   return statics;
 }
 
-Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
-                   const OnProgress& on_progress, const FinerModel* finer, FitMemory* memory, ShapeDoubt* doubt) {
+Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
+                   const FitOptions& options, const OnProgress& on_progress, const FinerModel* finer, FitMemory* memory,
+                   ShapeDoubt* doubt) {
   check(options);
   const OnProgress progress = paced(on_progress);
   Unknowns unknowns;
@@ -144,26 +146,67 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     return answer;
   }
 
-  // Neighbouring pixels err together: count them as fewer, and fit once more with that weight.
-  ResidualSummary residuals = objective.summarise(loss);
-  if (residuals.variance_inflation > 1.05) {
-    loss.surface_weight = 1 / residuals.variance_inflation;
+  ResidualSummary residuals;
+  const auto optimise_again = [&] {
     optimum = optimise(objective, optimum.unknowns, loss, optimiser, progress);
     optimum.loss = loss;
-    if (optimum.termination == Termination::cancelled) {
-      answer.termination = optimum.termination;
-      answer.message = optimum.message;
+    answer.termination = optimum.termination;
+    answer.message = optimum.message;
+    residuals = objective.summarise(loss);
+    return optimum.termination != Termination::cancelled;
+  };
+  // Neighbouring pixels err together: count them as fewer, and fit once more with that weight.
+  const auto weigh_neighbours = [&] {
+    const double weight = residuals.variance_inflation > 1.05 ? 1 / residuals.variance_inflation : 1;
+    if (weight == loss.surface_weight) return true;
+    loss.surface_weight = weight;
+    return optimise_again();
+  };
+  residuals = objective.summarise(loss);
+  if (!weigh_neighbours()) return answer;
+
+  double factor = 1;
+  std::vector<int> moving;
+  MatrixX hessian, covariance;
+  const auto look_around = [&] {
+    factor = residuals.points > 0 ? tukey_information_factor(loss.tukey) : 1;
+    moving = free_unknowns(unknowns);
+    hessian = optimum.evaluation.information(factor)(moving, moving);
+    covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
+  };
+  look_around();
+
+  // What the mesh does to the answer, and finer ones until that is little.
+  FinerModel const* meshed = nullptr;  // the mesh that corrects the model; nullptr: its own
+  std::unique_ptr<MeshCorrection> correction;
+  std::optional<AnswerShift> mesh;
+  int load_cases_of_meshes = 0;
+  while (finer != nullptr && optimum.termination == Termination::converged) {
+    mesh = mesh_shift(meshed ? meshed->recording : recording, meshed ? meshed->object : object, objective, optimum, loss,
+                      *finer, options, progress, memory != nullptr ? &memory->finer : nullptr);
+    if (!mesh) break;
+    load_cases_of_meshes += mesh->load_cases;
+    const FinerMesh* better =
+        options.take_finer ? options.take_finer(std::abs(mesh->log_young), std::sqrt(covariance(0, 0))) : nullptr;
+    if (better == nullptr) break;
+    bool corrected = MeshCorrection::applies_to(model);
+    if (corrected) {
+      auto next = std::make_unique<MeshCorrection>(*better->mesh, inputs, options);
+      corrected = next->correct(objective, optimum.unknowns, loss, progress) && optimise_again() && weigh_neighbours();
+      load_cases_of_meshes += next->model().load_cases();
+      correction = std::move(next);
+    }
+    if (!corrected) {
+      if (answer.termination != Termination::cancelled) answer.parameters = parameters_so_far(optimum.unknowns);
       return answer;
     }
-    residuals = objective.summarise(loss);
+    meshed = better->mesh;
+    finer = better->finer;
+    mesh.reset();
+    look_around();
   }
   answer.fit.iterations = optimum.iterations;
   const ReuseWhile reuse(model, optimiser.reuse);  // what follows looks at the optimum and close around it
-
-  const double factor = residuals.points > 0 ? tukey_information_factor(loss.tukey) : 1;
-  const std::vector<int> moving = free_unknowns(unknowns);
-  const MatrixX hessian = optimum.evaluation.information(factor)(moving, moving);
-  const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
   answer.nuisances = nuisances_from(objective, optimum, covariance, moving);
   const FitSummary summary = summary_of(unknowns, optimum, residuals);
   answer.fit.points_used = summary.points_used;
@@ -173,15 +216,6 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   add_bands(answer.steps, objective, covariance, moving);
   answer.budget = error_budget(unknowns, hessian, moving);
 
-  std::optional<AnswerShift> mesh;
-  if (finer != nullptr && optimum.termination == Termination::converged) {
-    mesh = mesh_shift(recording, objective, optimum, loss, *finer, options, progress,
-                      memory != nullptr ? &memory->finer : nullptr);
-  }
-  if (mesh && options.take_finer && options.take_finer(std::abs(mesh->log_young), std::sqrt(covariance(0, 0)))) {
-    answer.parameters = parameters_so_far(optimum.unknowns);
-    return answer;
-  }
   if (doubt != nullptr && !doubt->effect && optimum.termination == Termination::converged)
     doubt->effect = shape_effect(*doubt, recording, inputs, objective, optimum, loss, options, optimiser, progress);
   const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
@@ -201,7 +235,9 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   };
   if (mesh) widen_by("mesh", *mesh);
   if (doubt != nullptr && doubt->effect) widen_by("unseen side", doubt->effect->shift);
-  const auto region_name = [&](std::size_t r) { return object.region_names.empty() ? std::string() : object.region_names[r]; };
+  const auto region_name = [&](std::size_t r) {
+    return object.region_names.empty() ? std::string() : object.region_names[r];
+  };
   answer.parameters = {young_from(regions.front(), region_name(0)), ratio_from(regions.front(), unknowns[poisson])};
   for (std::size_t r = 1; r < regions.size(); ++r) answer.parameters.push_back(young_from(regions[r], region_name(r)));
   answer.covariance = covariance_of(regions);
@@ -212,8 +248,10 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     answer.message = "stopped by the caller";
     return answer;
   };
+  ForwardModel& solved_on = correction ? correction->model() : model;
+  const ReuseWhile reuse_there(solved_on, optimiser.reuse);
   objective.evaluate(optimum.unknowns, loss);  // the last evaluation is the optimum again: what follows looks at it
-  if (options.stresses && !add_stresses(answer.steps, model, optimum.unknowns, progress)) return stopped();
+  if (options.stresses && !add_stresses(answer.steps, solved_on, optimum.unknowns, progress)) return stopped();
   CrossChecks checks;
   Doubts doubts;
   if (options.cross_checks && optimum.termination == Termination::converged) {
@@ -227,8 +265,8 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
       answer.per_site = young_of_parts(checks.sites);
     }
   }
-  answer.fit.solves = model.solves();
-  answer.fit.load_cases = model.load_cases() + (mesh ? mesh->load_cases : 0);
+  answer.fit.solves = model.solves() + (correction ? correction->model().solves() : 0);
+  answer.fit.load_cases = model.load_cases() + load_cases_of_meshes;
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts});
   if (doubt != nullptr) answer.verdicts.push_back(partly_seen(*doubt));
   answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);

@@ -20,6 +20,14 @@ namespace palpate::estimation {
 /// until there is a posterior), the trace, and the steps' surfaces and points at this estimate.
 using OnEstimate = std::function<void(const Identification& so_far)>;
 
+struct FinerModel;
+
+/// A mesh to go on with, and one that shows what it does to the answer in turn; both outlive the fit.
+struct FinerMesh {
+  const FinerModel* mesh = nullptr;
+  const FinerModel* finer = nullptr;  ///< nullptr: there is none
+};
+
 struct FitOptions {
   int max_iterations = 60;
   double tukey_cut = 4.685;               ///< standard deviations beyond which a point is an outlier
@@ -30,12 +38,12 @@ struct FitOptions {
   bool stresses = true;                   ///< von Mises stress of every step, for figures
   int threads = 1;
   OnEstimate on_estimate;                 ///< for those who watch; empty: nobody does
-  /// Asked once it is known what the mesh does to E and what all else leaves unknown of it, both as shares of E. True ends the
-  /// fit at its optimum, without intervals: the caller fits again on a finer mesh.
-  std::function<bool(double mesh_error, double young_std)> take_finer;
+  /// Asked once it is known what the mesh does to E and what all else leaves unknown of it, both as shares of E: a mesh that is
+  /// fine enough, or nullptr. The fit goes on with it where it can (MeshCorrection); else it ends at its optimum, without
+  /// intervals (no covariance), and the caller fits again on that mesh.
+  std::function<const FinerMesh*(double mesh_error, double young_std)> take_finer;
 };
 
-struct FinerModel;
 struct ShapeDoubt;
 
 /// What a fit leaves for the next one of the same object, held and touched in the same way: what was solved for and does not

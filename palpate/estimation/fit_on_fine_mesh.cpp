@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iomanip>
+#include <list>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -39,22 +40,37 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
   };
   FitOptions fit_options = options;
   std::string history;
-  for (int refinements = 0;; ++refinements) {
-    std::optional<FinerModel> finer, better;
+  for (int refinements = 0;;) {
+    std::optional<FinerModel> finer;
     if (recording.model.refine == "auto") finer = finer_model(recording, object);
+    struct Taken {
+      std::optional<FinerModel> mesh, finer;
+      FinerMesh both;
+    };
+    std::list<Taken> taken;
     bool too_coarse = false;
-    fit_options.take_finer = [&](double error, double young_std) {
+    fit_options.take_finer = [&](double error, double young_std) -> const FinerMesh* {
       too_coarse = error > std::max(mesh_tolerance, hardly * young_std);
-      if (!too_coarse || refinements == most_refinements) return false;
-      better = refined_within(recording, object, mesh_tolerance);
-      if (better) history += mesh_words(object) + ": " + percent(error) + " of E; ";
-      return better.has_value();
+      if (!too_coarse || refinements == most_refinements) return nullptr;
+      const Recording& at = taken.empty() ? recording : taken.back().mesh->recording;
+      const SimulatedObject& on = taken.empty() ? object : taken.back().mesh->object;
+      std::optional<FinerModel> better = refined_within(at, on, mesh_tolerance);
+      if (!better) return nullptr;
+      ++refinements;
+      history += mesh_words(on) + ": " + percent(error) + " of E; ";
+      Taken& now = taken.emplace_back();
+      now.mesh = std::move(better);
+      now.finer = finer_model(now.mesh->recording, now.mesh->object);
+      now.both = {&*now.mesh, now.finer ? &*now.finer : nullptr};
+      return &now.both;
     };
     Identification answer =
         fit(recording, object, observed, fit_options, progress, finer ? &*finer : nullptr, nullptr, doubt);
-    if (better) {
-      recording = std::move(better->recording);
-      object = std::move(better->object);
+    if (!taken.empty()) {
+      recording = std::move(taken.back().mesh->recording);
+      object = std::move(taken.back().mesh->object);
+    }
+    if (!taken.empty() && answer.covariance.size() == 0 && answer.termination == Termination::converged) {
       fit_options.young_start_pa = answer.parameters[0].value;
       fit_options.poisson_start = answer.parameters[1].value;
       fit_options.start_is_answer = true;

@@ -244,14 +244,4 @@ void ForwardModel::forget() {
   }
 }
 
-void ForwardModel::start_from(const ForwardModel& other) {
-  for (std::size_t s = 0; s < memory_.size(); ++s) {
-    const Memory& from = other.memory_[s];
-    memory_[s] = Memory{};
-    memory_[s].valid = from.valid;
-    memory_[s].displacement_m = from.displacement_m;
-    memory_[s].derivative.resize(from.displacement_m.size(), 0);
-  }
-}
-
 }  // namespace palpate::estimation

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "palpate/core/recording.hpp"
+#include "palpate/estimation/prediction_change.hpp"
 #include "palpate/estimation/rigid_offset.hpp"
 #include "palpate/estimation/simulated_surface.hpp"
 #include "palpate/estimation/surface_field.hpp"
@@ -104,8 +105,13 @@ class ForwardModel {
   /// True where the object touches something that only pushes, or a rigid tool.
   bool touches() const { return contact_; }
 
-  /// Starts where another model of the same steps and mesh was last solved.
+  /// Starts where another model of the same object and steps was last solved, on the same mesh or another one.
   void start_from(const ForwardModel& other);
+
+  /// Added to every prediction from here on, a step each (none: as it is): what a finer mesh says.
+  using Changes = std::vector<std::optional<PredictionChange>>;
+  void set_changes(Changes changes) { changes_ = std::move(changes); }
+  const Changes& changes() const { return changes_; }
 
   /// Forgets warm starts, so that the next answer does not depend on what was asked before.
   void forget();
@@ -123,6 +129,7 @@ class ForwardModel {
   struct ContactState;
   using ContactStatePtr = std::shared_ptr<const ContactState>;
 
+  StepPrediction unchanged(std::size_t s, const VectorX& unknowns, bool derivatives);
   int unit_load_cases() const;
   /// False: no equilibrium, and `out` says why.
   bool solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
@@ -165,6 +172,7 @@ class ForwardModel {
   bool linear_ = false;  // workers share one solver for each set of platens, else each has its own
   std::shared_ptr<Solved> solved_;
   std::vector<Memory> memory_;
+  Changes changes_;
   double reuse_ = 0;
   std::vector<double> followed_;  // a step: share of itself by which the last prediction left a solution
 

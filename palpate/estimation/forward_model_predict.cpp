@@ -23,6 +23,12 @@ void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const V
 }
 
 StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
+  StepPrediction out = unchanged(s, unknowns, derivatives);
+  if (out.converged && s < changes_.size() && changes_[s]) changes_[s]->add_to(out, unknowns, derivatives);
+  return out;
+}
+
+StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, bool derivatives) {
   const std::size_t worker = worker_of(s);
   Body& body = body_of(push(s), worker);
   Coefficients c = coefficients(s, body, unknowns);

@@ -18,10 +18,18 @@ VectorX ForwardModel::von_mises_pa(std::size_t s, const VectorX& unknowns) {
   } else {
     const Coefficients c = coefficients(s, body, unknowns);
     set_ratios(body, unknowns);
-    const auto at = body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion,
-                                        memory.valid ? &memory.displacement_m : nullptr);
-    if (!at.converged) return {};
-    displacement_m = at.displacement_m;
+    VectorX start;
+    if (memory.valid) start = memory.displacement_m + memory.derivative * memory.change_to(unknowns);
+    const bool near = memory.valid && !memory.columns.empty() &&
+                      (start - memory.displacement_m).lpNorm<Eigen::Infinity>() <= reuse_ * start.lpNorm<Eigen::Infinity>();
+    if (near) {
+      displacement_m = start;
+    } else {
+      const auto at =
+          body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion, memory.valid ? &start : nullptr);
+      if (!at.converged) return {};
+      displacement_m = at.displacement_m;
+    }
   }
   VectorX stiffness;
   if (parameters_ > first_ratio) {

@@ -13,7 +13,7 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr std::size_t most_steps = 3;    // that are solved on the finer mesh: the highest load of as many pushes
+constexpr std::size_t most_steps = 3;  // that are solved on the finer mesh: the highest load of as many pushes
 constexpr double order = 1.5;
 
 /// Highest load of each push; where gravity alone loads, its first step.
@@ -39,31 +39,32 @@ std::vector<char> steps_that_matter(const ForwardModel& model, const std::vector
 
 }  // namespace
 
-std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objective& objective, const Optimum& optimum,
-                                      const Loss& loss, const FinerModel& finer, const FitOptions& options,
-                                      const OnProgress& progress, std::shared_ptr<ForwardModel::Solved>* solved) {
+std::optional<AnswerShift> mesh_shift(const Recording& recording, const SimulatedObject& object, const Objective& objective,
+                                      const Optimum& optimum, const Loss& loss, const FinerModel& finer,
+                                      const FitOptions& options, const OnProgress& progress,
+                                      std::shared_ptr<ForwardModel::Solved>* solved) {
   Loss highest = loss;
   highest.every = 1;
   highest.steps = steps_that_matter(objective.model(), objective.last_rows());
   // What lifts off is held here, so the fit's own surfaces say nothing of the change.
-  const bool linear = fem::material_law(objective.model().object().material).is_linear() &&
+  const bool linear = fem::material_law(object.material).is_linear() &&
                       std::none_of(recording.supports.begin(), recording.supports.end(), lifts_off);
   const bool kept = solved != nullptr && linear;
   int load_cases = 0;
-  const auto small_strains = [&](Recording copy, SimulatedObject object) {
+  const auto small_strains = [&](Recording copy, SimulatedObject body) {
     // Both meshes integrate alike: as the fit did, or as this ratio alone asks for.
-    auto statics = statics_options(copy, object, options);
+    auto statics = statics_options(copy, body, options);
     if (!kept) {
       copy.model.poisson_fixed = optimum.unknowns(poisson);
       copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
-      if (!linear) statics = statics_options(copy, object, options);
+      if (!linear) statics = statics_options(copy, body, options);
     }
-    object.material = "linear";
+    body.material = "linear";
     copy.supports = held_both_ways(std::move(copy.supports));
     Unknowns unknowns;
     auto held = std::make_unique<Recording>(std::move(copy));
     // The change is a per cent itself: a few ratios are enough.
-    ForwardModel model(*held, std::move(object), unknowns, statics, kept ? *solved : nullptr, 1e-3);
+    ForwardModel model(*held, std::move(body), unknowns, statics, kept ? *solved : nullptr, 1e-3);
     if (kept) *solved = model.solved();
     std::vector<StepPrediction> predicted(model.step_count());
     for (std::size_t s = 0; s < model.step_count(); ++s) {
@@ -73,7 +74,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
     return predicted;
   };
   if (progress && !progress("mesh error", 0)) return std::nullopt;
-  const auto coarse = linear ? objective.last_predictions() : small_strains(recording, objective.model().object());
+  const auto coarse = linear ? objective.last_predictions() : small_strains(recording, object);
   const auto fine = small_strains(finer.recording, finer.object);
   if (progress && !progress("mesh error", 1)) return std::nullopt;
 
@@ -111,39 +112,43 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objectiv
 
 void widen(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper) {
   const double sd = std::abs(shift.poisson);
-  const double variance = posterior.covariance(1, 1);
-  const double slope = variance > 0 ? posterior.covariance(0, 1) / variance : 0;
-  const Index old_size = static_cast<Index>(posterior.poisson.size());
-  if (old_size > 1 && sd > 1e-3 * std::sqrt(variance)) {
-    // Widen the grid, spread every node's weight over it, and keep the ridge log E(nu), turned as far as the error turns it.
-    const double from = std::max(poisson_lower, posterior.poisson(0) - 5 * sd);
-    const double to = std::min(poisson_upper, posterior.poisson(old_size - 1) + 5 * sd);
-    const double centre = posterior.weight.dot(posterior.poisson);
-    const double wider_slope = (posterior.covariance(0, 1) + shift.log_young * shift.poisson) / (variance + sd * sd);
-    const double left = std::pow(shift.log_young, 2) + slope * slope * variance - wider_slope * wider_slope * (variance + sd * sd);
-    const VectorX grid = VectorX::LinSpaced(old_size, from, to);
-    VectorX weight = VectorX::Zero(old_size), mean(old_size), std_dev(old_size);
-    const double step = (posterior.poisson(old_size - 1) - posterior.poisson(0)) / static_cast<double>(old_size - 1);
-    for (Index i = 0; i < old_size; ++i) {
-      weight(i) = posterior.weight.dot(((posterior.poisson.array() - grid(i)) / sd).square().unaryExpr([](double z2) {
-        return std::exp(-0.5 * z2);
-      }).matrix());
-      const double at = std::clamp((grid(i) - posterior.poisson(0)) / step, 0.0, static_cast<double>(old_size - 1));
-      const Index k = std::min<Index>(static_cast<Index>(at), old_size - 2);
-      const double share = at - static_cast<double>(k);
-      const double inside = posterior.poisson(0) + at * step;
-      mean(i) = (1 - share) * posterior.log_young_mean(k) + share * posterior.log_young_mean(k + 1) +
-                slope * (grid(i) - inside) + (wider_slope - slope) * (grid(i) - centre);
-      const double own = (1 - share) * posterior.log_young_std(k) + share * posterior.log_young_std(k + 1);
-      std_dev(i) = std::sqrt(std::max(own * own + left, 0.01 * own * own));
-    }
-    posterior.poisson = grid;
-    posterior.weight = weight / weight.sum();
-    posterior.log_young_mean = mean;
-    posterior.log_young_std = std_dev;
-  } else {
+  const Index size = static_cast<Index>(posterior.poisson.size());
+  if (size < 2) {
     posterior.log_young_std = (posterior.log_young_std.array().square() + shift.log_young * shift.log_young).sqrt();
+    update_covariance(posterior);
+    return;
   }
+  const double first = posterior.poisson(0), last = posterior.poisson(size - 1);
+  const double spacing = (last - first) / static_cast<double>(size - 1);
+  // Widen the grid and spread every node's weight over it: but not by less than its own steps, which makes no difference to
+  // nu, while nodes of the old and the new grid that fall apart by more would lose their weight.
+  VectorX grid = posterior.poisson, weight = posterior.weight;
+  if (sd > 2 * spacing) {
+    grid = VectorX::LinSpaced(size, std::max(poisson_lower, first - 5 * sd), std::min(poisson_upper, last + 5 * sd));
+    for (Index i = 0; i < size; ++i)
+      weight(i) = posterior.weight.dot((-0.5 * ((posterior.poisson.array() - grid(i)) / sd).square()).exp().matrix());
+    weight /= weight.sum();
+  }
+  // Keep the ridge log E(nu), turned as far as the error turns it.
+  const double variance = posterior.covariance(1, 1), wider = variance + sd * sd;
+  const double slope = variance > 0 ? posterior.covariance(0, 1) / variance : 0;
+  const double wider_slope = wider > 0 ? (posterior.covariance(0, 1) + shift.log_young * shift.poisson) / wider : 0;
+  const double left = std::pow(shift.log_young, 2) + slope * slope * variance - wider_slope * wider_slope * wider;
+  const double centre = posterior.weight.dot(posterior.poisson);
+  VectorX mean(size), std_dev(size);
+  for (Index i = 0; i < size; ++i) {
+    const double at = std::clamp((grid(i) - first) / spacing, 0.0, static_cast<double>(size - 1));
+    const Index k = std::min<Index>(static_cast<Index>(at), size - 2);
+    const double share = at - static_cast<double>(k);
+    mean(i) = (1 - share) * posterior.log_young_mean(k) + share * posterior.log_young_mean(k + 1) +
+              slope * (grid(i) - first - at * spacing) + (wider_slope - slope) * (grid(i) - centre);
+    const double own = (1 - share) * posterior.log_young_std(k) + share * posterior.log_young_std(k + 1);
+    std_dev(i) = std::sqrt(std::max(own * own + left, 0.01 * own * own));
+  }
+  posterior.poisson = grid;
+  posterior.weight = weight;
+  posterior.log_young_mean = mean;
+  posterior.log_young_std = std_dev;
   update_covariance(posterior);
 }
 

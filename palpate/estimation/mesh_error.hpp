@@ -24,11 +24,12 @@ struct AnswerShift {
 /// power p of the edge length, the coarse mesh is off by the change over 1 - 2^-p; p = 1.5 lies between the first order at the
 /// rim of a tool and the second of smooth regions (fem.discretisation).
 /// The objective's last evaluation must be the optimum's.
+/// @param object  on the mesh that its answers are those of, with the recording that names its nodes
 /// @param solved  nullptr: the finer mesh is solved for at the optimum's nu. Else what is used and filled: a linear object is
 ///                then solved for over all of nu's range, once for all fits that share it
 /// @returns nothing when the caller asked to stop.
-std::optional<AnswerShift> mesh_shift(const Recording& recording, const Objective& objective, const Optimum& optimum,
-                                      const Loss& loss, const FinerModel& finer, const FitOptions& options,
+std::optional<AnswerShift> mesh_shift(const Recording& recording, const SimulatedObject& object, const Objective& objective,
+                                      const Optimum& optimum, const Loss& loss, const FinerModel& finer, const FitOptions& options,
                                       const OnProgress& progress,
                                       std::shared_ptr<ForwardModel::Solved>* solved = nullptr);
 

@@ -79,6 +79,20 @@ TEST(Widening, AddsTheOuterProductOfTheShiftToANormalPosterior) {
   }
 }
 
+// From far below the grid's steps to far above its width: no size of the error makes an interval narrower.
+TEST(Widening, IsRightForErrorsOfEverySize) {
+  for (double size = 1e-5; size < 10; size *= 1.7) {
+    Posterior p = normal_posterior(9.5, 0.25, 4e-6, -1.2e-6, 1e-6);
+    const AnswerShift shift{0.5e-3 * size, 1e-3 * size, {}};  // in standard deviations of nu, and half as many of log E
+    Eigen::Matrix2d wanted = p.covariance;
+    const Eigen::Vector2d d(shift.log_young, shift.poisson);
+    wanted += d * d.transpose();
+    widen(p, shift, 0, 0.4995);
+    const Eigen::Vector2d scale = wanted.diagonal().cwiseSqrt().cwiseInverse();
+    EXPECT_LT((scale.asDiagonal() * (p.covariance - wanted) * scale.asDiagonal()).cwiseAbs().maxCoeff(), 5e-3) << size;
+  }
+}
+
 TEST(Widening, KeepsTheBoundsOfNu) {
   Posterior p = normal_posterior(9.5, 0.45, 4e-4, -1.2e-4, 1e-4);
   widen(p, {0.02, 0.03, {}}, 0, 0.4995);
