@@ -136,22 +136,24 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
                                             : optimise_from_several(objective, start, loss, optimiser, progress);
   loss = optimum.loss;
 
-  answer.termination = optimum.termination;
-  answer.message = optimum.message;
-  if (!optimum.evaluation.usable) {
+  // False: there is no optimum to look at.
+  const auto take = [&] {
+    answer.termination = optimum.termination;
+    answer.message = optimum.message;
+    if (optimum.evaluation.usable) return true;
     answer.fit.solves = model.solves();
     answer.fit.load_cases = model.load_cases();
     answer.verdicts.push_back({"not_converged", "The simulation found no equilibrium (" + optimum.message +
                                                     "): check the loads, the supports and the material."});
-    return answer;
-  }
+    return false;
+  };
+  if (!take()) return answer;
 
   ResidualSummary residuals;
   const auto optimise_again = [&] {
     optimum = optimise(objective, optimum.unknowns, loss, optimiser, progress);
     optimum.loss = loss;
-    answer.termination = optimum.termination;
-    answer.message = optimum.message;
+    if (!take()) return false;
     residuals = objective.summarise(loss);
     return optimum.termination != Termination::cancelled;
   };
@@ -197,7 +199,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
       correction = std::move(next);
     }
     if (!corrected) {
-      if (answer.termination != Termination::cancelled) answer.parameters = parameters_so_far(optimum.unknowns);
+      if (optimum.evaluation.usable) answer.parameters = parameters_so_far(optimum.unknowns);
       return answer;
     }
     meshed = better->mesh;

@@ -2,7 +2,9 @@
 #include "palpate/geometry/triangle_tree.hpp"
 
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <mutex>
 #include <string>
 
 #include "palpate/core/error.hpp"
@@ -72,7 +74,19 @@ struct TriangleTree::Impl {
   Bvh bvh;
   WideBvh wide;
   std::optional<ClosestSearch> search;
+  std::atomic<bool> search_is_old = false;  // who casts rays alone, refit after refit, need not wait for it
+  std::mutex refitting;
 
+  const ClosestSearch& up_to_date_search() {
+    if (search_is_old.load(std::memory_order_acquire)) {
+      const std::lock_guard lock(refitting);
+      if (search_is_old.load(std::memory_order_relaxed)) {
+        search->refit(mesh, bvh);
+        search_is_old.store(false, std::memory_order_release);
+      }
+    }
+    return *search;
+  }
   bool has(Index triangle) const { return triangle >= 0 && triangle < static_cast<Index>(mesh.triangles.rows()); }
 };
 
@@ -101,14 +115,14 @@ void TriangleTree::refit(const Points& vertices_m) {
   impl_->mesh.vertices_m = vertices_m;
   refit_bvh(impl_->bvh, vertices_m, impl_->mesh.triangles);
   copy_boxes(impl_->wide, impl_->bvh);
-  impl_->search->refit(impl_->mesh, impl_->bvh);
+  impl_->search_is_old = true;
 }
 
 ClosestPoint TriangleTree::closest(const Vec3& p, Index hint) const {
   ClosestPoint out;
   out.squared_distance_m2 = std::numeric_limits<double>::quiet_NaN();
   if (!p.allFinite()) return out;
-  const ClosestSearch::Found found = impl_->search->closest(p, hint);
+  const ClosestSearch::Found found = impl_->up_to_date_search().closest(p, hint);
   if (found.triangle < 0) return out;  // coordinates so large that squares overflow
   out.triangle = found.triangle;
   out.barycentric = Vec3(1 - found.at.v - found.at.w, found.at.v, found.at.w);
@@ -118,7 +132,7 @@ ClosestPoint TriangleTree::closest(const Vec3& p, Index hint) const {
 }
 
 bool TriangleTree::within(const Vec3& p, double squared, Index hint) const {
-  return p.allFinite() && impl_->search->within(p, squared, hint);
+  return p.allFinite() && impl_->up_to_date_search().within(p, squared, hint);
 }
 
 std::optional<RayHit> TriangleTree::cast(const Vec3& origin, const Vec3& direction, double max_range, Index hint) const {

@@ -5,6 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <random>
+#include <thread>
+#include <vector>
+
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 #include "refusals.hpp"
@@ -138,6 +143,29 @@ TEST_P(ClosestPointOf, is_exact_after_a_refit) {
   std::mt19937 rng(9);
   std::normal_distribution<double> g;
   for (int i = 0; i < 200; ++i) expect_exact(tree, Vec3(g(rng), g(rng), g(rng)), -1);
+}
+
+// The part that closest points need is refitted by who first asks for one: threads that ask at once get the same answers.
+TEST_P(ClosestPointOf, is_the_same_for_threads_that_ask_at_once_after_a_refit) {
+  TriMesh moved = GetParam();
+  moved.vertices_m *= 1.5;
+  const TriangleTree fresh(moved);
+  std::mt19937 rng(10);
+  std::normal_distribution<double> g;
+  std::vector<Vec3> points;
+  for (int i = 0; i < 100; ++i) points.push_back(Vec3(g(rng), g(rng), g(rng)));
+  for (int round = 0; round < 5; ++round) {
+    TriangleTree tree(GetParam());
+    tree.refit(moved.vertices_m);
+    std::array<int, 4> wrong{};
+    std::vector<std::thread> threads;
+    for (int& mine : wrong)
+      threads.emplace_back([&] {
+        for (const Vec3& p : points) mine += tree.closest(p).point_m != fresh.closest(p).point_m;
+      });
+    for (auto& thread : threads) thread.join();
+    EXPECT_EQ(wrong, (std::array<int, 4>{}));
+  }
 }
 
 TEST_P(ClosestPointOf, first_ray_hit_is_the_nearest_of_all_triangles) {
