@@ -177,6 +177,24 @@ Points normals(const DepthFrame& frame, const MaskImage& invalid, const BackProj
   return result;
 }
 
+double depth_step_m(const DepthImage& depth_m) {
+  constexpr std::size_t enough = 8;  // different depths
+  std::vector<float> different;
+  for (Eigen::Index i = 0; i < depth_m.size() && different.size() < enough; ++i) {
+    const float z = depth_m.data()[i];
+    if (std::isfinite(z) && z > 0 && std::find(different.begin(), different.end(), z) == different.end()) different.push_back(z);
+  }
+  if (different.size() < enough) return 0;
+  for (const double step_m : {1e-3, 5e-4, 2.5e-4, 2e-4, 1.25e-4, 1e-4, 5e-5}) {
+    const auto whole = [&](float z) {
+      const double steps = static_cast<double>(z) / step_m;
+      return !std::isfinite(z) || z <= 0 || std::abs(steps - std::round(steps)) < 0.01;  // a float's own rounding is below that up to 8 m
+    };
+    if (std::all_of(depth_m.data(), depth_m.data() + depth_m.size(), whole)) return step_m;
+  }
+  return 0;
+}
+
 RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& options, Points* normals_base) {
   const MaskImage invalid = invalid_pixels(frame, options);
   const Points directions = pixel_directions(frame.camera);
@@ -189,6 +207,7 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
     double range_m, sigma_m;
   };
   std::vector<Hit> hits;
+  const double rounding_m = depth_step_m(frame.depth_m) / std::sqrt(12.0);
   auto* const lateral = frame.noise.model == "constant" ? nullptr : depth_noise_model(frame.noise.model).lateral_sigma_px;
   for (int row = 0; row < invalid.rows(); row += options.stride_px)
     for (int column = 0; column < invalid.cols(); column += options.stride_px) {
@@ -204,7 +223,7 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
       const DepthNoiseInput at{z, incidence_rad, frame.camera.fx_px};
       // A sample that belongs to a point beside the pixel's centre is off by the surface's slope times that distance.
       const double sideways_m = lateral != nullptr ? lateral(at) * z / frame.camera.fx_px : 0;
-      const double sigma = std::hypot(axial_sigma_m(frame.noise, at), sideways_m * std::tan(incidence_rad));
+      const double sigma = std::hypot(axial_sigma_m(frame.noise, at), sideways_m * std::tan(incidence_rad), rounding_m);
       hits.push_back({row, column, ray / stretch, normal, z * stretch, sigma * stretch});
     }
 

@@ -36,8 +36,12 @@ MaskImage invalid_pixels(const DepthFrame& frame, const BackProjectionOptions& o
 /// @param invalid  as from invalid_pixels
 Points normals(const DepthFrame& frame, const MaskImage& invalid, const BackProjectionOptions& options = {});
 
+/// The step that all depths of an image are whole multiples of (a millimetre, a tenth of one, ...), as integer formats have it;
+/// 0 where there is none, or too few different depths to tell.
+double depth_step_m(const DepthImage& depth_m);
+
 /// Valid pixels as rays in the base frame, with the standard deviation along the ray from the sensor's noise model at that
-/// depth and incidence.
+/// depth and incidence, and from the rounding to whole steps (a step over the root of 12).
 /// @param normals_base  if given: filled with one unit normal a ray (base frame, facing the camera)
 /// @throws Error as invalid_pixels does.
 RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& options = {}, Points* normals_base = nullptr);

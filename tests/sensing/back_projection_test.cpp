@@ -37,6 +37,26 @@ DepthFrame see_plane(const Vec3& normal, double distance_m, DepthFrame frame = e
   return frame;
 }
 
+// An image in whole millimetres, or in whatever its format counts, is off by its rounding as well.
+TEST(BackProjection, RoundedDepthsAreOffByTheirRounding) {
+  const DepthFrame exact = see_plane(Vec3(0.3, -0.4, -0.8).normalized(), -0.6);
+  EXPECT_EQ(depth_step_m(exact.depth_m), 0);
+  for (const double step_m : {1e-3, 1.25e-4, 1e-4}) {
+    DepthFrame rounded = exact;
+    rounded.depth_m = (exact.depth_m.array() / float(step_m)).round() * float(step_m);
+    rounded.depth_m(3, 4) = 0;
+    rounded.depth_m(5, 6) = std::nanf("");
+    rounded.noise.sigma_m = 2e-4;
+    EXPECT_EQ(depth_step_m(rounded.depth_m), step_m);
+    const RayCloud coarse = back_project(rounded);
+    const double root = (rounded.depth_m - exact.depth_m).cast<double>().block(20, 20, 80, 80).norm() / 80;
+    EXPECT_NEAR(root / (step_m / std::sqrt(12.0)), 1, 0.05);
+    const double stretch = unproject(rounded.camera, coarse.pixel.row(0).cast<double>().transpose())->norm();
+    EXPECT_NEAR(coarse.sigma_m(0) / stretch / std::hypot(2e-4, root), 1, 0.05);
+  }
+  EXPECT_EQ(depth_step_m(DepthImage::Constant(9, 9, 0.7F)), 0) << "one depth says nothing of steps";
+}
+
 TEST(BackProjection, PlaneIsReproducedExactlyInTheBaseFrame) {
   const Vec3 normal = Vec3(0.3, -0.4, -0.8).normalized();
   DepthFrame frame = see_plane(normal, -0.6);
