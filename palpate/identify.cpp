@@ -145,6 +145,22 @@ double seen_std_m(const reconstruction::BuiltObject& built) {
   return count > 0 ? std::sqrt(sum / count) : 0;
 }
 
+/// A given surface filled. A mesh that cuts off part of the object makes the rest of it too stiff, and no finer mesh of the same
+/// outline would tell: a part that is missing or too much asks for twice as many tetrahedra, and again.
+reconstruction::BuiltObject build_from_surface(const Recording& recording, reconstruction::BuildOptions options,
+                                               const OnProgress& progress) {
+  constexpr double little = 0.005;  // of the volume: the lab's bear without 1.5 % of it had a back of 11 % more than its E
+  constexpr int most_tries = 3;
+  std::optional<reconstruction::BuiltObject> best;
+  for (int tries = 0; tries < most_tries; ++tries, options.mesh.tetrahedra *= 2) {
+    auto built = reconstruction::build_object(*recording.rest.surface, recording.supports, options, progress);
+    const auto off = [](const reconstruction::BuiltObject& object) { return std::abs(object.volume_error.value_or(0)); };
+    if (!best || off(built) < off(*best)) best = std::move(built);
+    if (off(*best) < little) break;
+  }
+  return std::move(*best);
+}
+
 /// Volume mesh of a recording that gives a surface or views of one.
 void fill_with_tetrahedra(Recording& recording, reconstruction::Completion completion, std::vector<char>* seen,
                           const OnProgress& progress) {
@@ -161,7 +177,7 @@ void fill_with_tetrahedra(Recording& recording, reconstruction::Completion compl
     }
   }
   auto built = recording.rest.surface
-                   ? reconstruction::build_object(*recording.rest.surface, recording.supports, options, progress)
+                   ? build_from_surface(recording, options, progress)
                    : build_from_views(recording, options, completion, progress);
   if (recording.rest.surface_std_m == 0) recording.rest.surface_std_m = seen_std_m(built);
   if (seen != nullptr) *seen = built.seen;

@@ -39,6 +39,19 @@ std::vector<Parameter> young_of_parts(const std::vector<PartialYoung>& parts) {
   return out;
 }
 
+/// @param covariance  of the unknowns `moving`, log E first
+std::vector<YoungDoubt> young_doubts(const AnswerShift& mesh, const MatrixX& covariance, const std::vector<int>& moving,
+                                     Index ratios) {
+  std::vector<YoungDoubt> out;
+  for (Index r = 0; r <= ratios; ++r) {
+    VectorX sum = VectorX::Unit(covariance.rows(), 0);  // a region's log E: that of the first one and a ratio's
+    const auto ratio = std::find(moving.begin(), moving.end(), first_ratio + r - 1);
+    if (r > 0 && ratio != moving.end()) sum(static_cast<Index>(ratio - moving.begin())) = 1;
+    out.push_back({std::abs(mesh.of_region(r).log_young), std::sqrt(sum.dot(covariance * sum))});
+  }
+  return out;
+}
+
 /// E and nu where the search stands: no interval yet.
 std::vector<Parameter> parameters_so_far(const VectorX& unknowns) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -189,7 +202,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     if (!mesh) break;
     load_cases_of_meshes += mesh->load_cases;
     const FinerMesh* better =
-        options.take_finer ? options.take_finer(std::abs(mesh->log_young), std::sqrt(covariance(0, 0))) : nullptr;
+        options.take_finer ? options.take_finer(young_doubts(*mesh, covariance, moving, unknowns.ratio_count())) : nullptr;
     if (better == nullptr) break;
     bool corrected = MeshCorrection::applies_to(model);
     if (corrected) {

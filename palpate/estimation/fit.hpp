@@ -28,6 +28,12 @@ struct FinerMesh {
   const FinerModel* finer = nullptr;  ///< nullptr: there is none
 };
 
+/// Of a region's E, as shares of it.
+struct YoungDoubt {
+  double by_mesh = 0;
+  double by_all_else = 0;  ///< one standard deviation
+};
+
 struct FitOptions {
   int max_iterations = 60;
   double tukey_cut = 4.685;               ///< standard deviations beyond which a point is an outlier
@@ -38,10 +44,10 @@ struct FitOptions {
   bool stresses = true;                   ///< von Mises stress of every step, for figures
   int threads = 1;
   OnEstimate on_estimate;                 ///< for those who watch; empty: nobody does
-  /// Asked once it is known what the mesh does to E and what all else leaves unknown of it, both as shares of E: a mesh that is
+  /// Asked once it is known what the mesh does to E and what all else leaves unknown of it (a region each): a mesh that is
   /// fine enough, or nullptr. The fit goes on with it where it can (MeshCorrection); else it ends at its optimum, without
   /// intervals (no covariance), and the caller fits again on that mesh.
-  std::function<const FinerMesh*(double mesh_error, double young_std)> take_finer;
+  std::function<const FinerMesh*(const std::vector<YoungDoubt>&)> take_finer;
 };
 
 struct ShapeDoubt;

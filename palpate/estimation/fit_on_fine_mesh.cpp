@@ -49,8 +49,13 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
     };
     std::list<Taken> taken;
     bool too_coarse = false;
-    fit_options.take_finer = [&](double error, double young_std) -> const FinerMesh* {
-      too_coarse = error > std::max(mesh_tolerance, hardly * young_std);
+    fit_options.take_finer = [&](const std::vector<YoungDoubt>& doubts) -> const FinerMesh* {
+      const auto most = std::max_element(doubts.begin(), doubts.end(), [&](const YoungDoubt& a, const YoungDoubt& b) {
+        const auto over = [&](const YoungDoubt& d) { return d.by_mesh / std::max(mesh_tolerance, hardly * d.by_all_else); };
+        return over(a) < over(b);
+      });
+      const double error = most->by_mesh;
+      too_coarse = error > std::max(mesh_tolerance, hardly * most->by_all_else);
       if (!too_coarse || refinements == most_refinements) return nullptr;
       const Recording& at = taken.empty() ? recording : taken.back().mesh->recording;
       const SimulatedObject& on = taken.empty() ? object : taken.back().mesh->object;
