@@ -192,7 +192,7 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   look_around();
 
   // What the mesh does to the answer, and finer ones until that is little.
-  FinerModel const* meshed = nullptr;  // the mesh that corrects the model; nullptr: its own
+  const FinerModel* meshed = nullptr;  // the mesh that corrects the model; nullptr: its own
   std::unique_ptr<MeshCorrection> correction;
   std::optional<AnswerShift> mesh;
   int load_cases_of_meshes = 0;

@@ -95,7 +95,7 @@ class RayTerm : public Term {
             gradient = normal / std::copysign(std::max(std::abs(cosine), grazing_cosine), cosine);
             residual_m = rays_.range_m(i) - bias_m - hit->range_m;
             lever = measured - residual_m * Vec3(rays_.directions.row(i));
-            if (scatter_ >= 0 && view.along_rays) {
+            if (scatter_ >= 0) {
               scattered = scatter(predicted, triangle, rays_.directions.row(i), hit->range_m);
               residual_m -= share * scattered->error.m;
             }
