@@ -108,7 +108,7 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   const std::vector<int> at = places(objective.unknowns(), unknowns);
   ForwardModel::Changes changes = fitted.changes();
   for (auto& change : changes)
-    if (change) change = change->renumbered(at, unknowns.prior_mean());
+    if (change) change = change->renumbered(at, unknowns.size());
   model.set_changes(std::move(changes));
   Optimum there = optimum;
   there.unknowns = unknowns.prior_mean();

@@ -48,9 +48,9 @@ void PredictionChange::add_to(StepPrediction& predicted, const VectorX& unknowns
   }
 }
 
-PredictionChange PredictionChange::renumbered(const std::vector<int>& place, const VectorX& unknowns) const {
+PredictionChange PredictionChange::renumbered(const std::vector<int>& place, Index count) const {
   PredictionChange out = *this;
-  out.at = unknowns;
+  out.at = VectorX::Zero(count);
   for (std::size_t k = 0; k < place.size(); ++k) out.at(place[k]) = at(static_cast<Index>(k));
   for (int& column : out.columns) column = place[static_cast<std::size_t>(column)];
   return out;

@@ -23,9 +23,8 @@ struct PredictionChange {
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> d_force;  ///< a load: 3 x columns
 
   void add_to(StepPrediction& predicted, const VectorX& unknowns, bool derivatives) const;
-  /// The same for unknowns that are numbered otherwise. @param place  where each of `at` is now  @param unknowns  as many as are
-  /// now, at the same state
-  PredictionChange renumbered(const std::vector<int>& place, const VectorX& unknowns) const;
+  /// The same among more unknowns. @param place  where each of `at` is now  @param count  of all of them
+  PredictionChange renumbered(const std::vector<int>& place, Index count) const;
 };
 
 /// Nothing where one of the two has no equilibrium or they are not of the same surface, loads and unknowns.

@@ -38,7 +38,7 @@ Index widen_node(const Bvh& bvh, Index node, WideBvh& out) {
   return id;
 }
 
-/// At most v, by less than two roundings of a float. Without a branch or a call: a refit asks it of every box.
+/// At most v, by a few roundings of a float. Without a branch or a call: a refit asks it of every box.
 float down(double v) {
   const auto f = static_cast<float>(v);
   return f - (std::abs(f) * std::numeric_limits<float>::epsilon() + std::numeric_limits<float>::min());

@@ -10,19 +10,10 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/depth_noise.hpp"
 #include "refusals.hpp"
+#include "sensing/small_camera.hpp"
 
 namespace palpate::lab {
 namespace {
-
-Camera camera() {
-  Camera c;
-  c.width_px = 160;
-  c.height_px = 120;
-  c.fx_px = c.fy_px = 300;
-  c.cx_px = 79.5;
-  c.cy_px = 59.5;
-  return c;
-}
 
 PerfectView wall(float depth_m, float incidence_rad = 0) {
   PerfectView view;
@@ -44,7 +35,7 @@ TEST(DepthSensor, AxialNoiseIsThatOfEveryModelAtEveryRange) {
       options.depth_unit_m = 0;
       Random random(11, std::uint64_t(z * 10));
       const double expected = row.axial_sigma_m({z, 0.3, 300});
-      const DepthImage seen = sense_depth(wall(z, 0.3F), camera(), options, random);
+      const DepthImage seen = sense_depth(wall(z, 0.3F), small_camera(), options, random);
       // 19 200 samples: the standard error of their spread is half a per cent.
       EXPECT_NEAR(spread(seen, z) / expected, 1, 0.02) << row.name << " at " << z;
       EXPECT_NEAR(seen.cast<double>().mean(), z, 4 * expected / std::sqrt(19200.0)) << row.name;
@@ -57,7 +48,7 @@ TEST(DepthSensor, EveryRowOfTheTableWorks) {
     EXPECT_NO_THROW(check(options)) << row.name;
     EXPECT_FALSE(row.source.empty());
     Random random(3);
-    EXPECT_GT((sense_depth(wall(0.7F, 0.4F), camera(), options, random).array() > 0).count(), 19000) << row.name;
+    EXPECT_GT((sense_depth(wall(0.7F, 0.4F), small_camera(), options, random).array() > 0).count(), 19000) << row.name;
   }
   EXPECT_THROW(depth_sensor("eye"), Error);
 }
@@ -69,7 +60,7 @@ TEST(DepthSensor, PassiveStereoLosesWhatHasNoTexture) {
     double share = 0;
     for (std::uint64_t seed = 0; seed < 8; ++seed) {
       Random random(seed);
-      share += double((sense_depth(wall(0.7F), camera(), options, random).array() > 0).count()) / 19200 / 8;
+      share += double((sense_depth(wall(0.7F), small_camera(), options, random).array() > 0).count()) / 19200 / 8;
     }
     // Patches of 6 pixels: some 170 independent ones an image.
     EXPECT_NEAR(share, texture, 0.06) << texture;
@@ -85,7 +76,7 @@ TEST(DepthSensor, TimeOfFlightIsNoisierOnDarkThingsAndInBrightLight) {
     options.looks = {Look{}, Look{albedo, 1}};
     options.ambient_light = ambient;
     Random random(5);
-    return spread(sense_depth(wall(1.0F), camera(), options, random), 1.0);
+    return spread(sense_depth(wall(1.0F), small_camera(), options, random), 1.0);
   };
   const double usual = spread_of(0.5, 1);
   EXPECT_NEAR(usual / sensing::depth_noise_model("time_of_flight").axial_sigma_m({1.0, 0, 300}), 1, 0.02);
@@ -104,7 +95,7 @@ TEST(DepthSensor, LensScatterDrawsDarkThingsTowardsBrightOnes) {
   const auto mean_near = [&](double scatter) {
     options.lens_scatter = scatter;
     Random random(9);
-    const DepthImage seen = sense_depth(view, camera(), options, random);
+    const DepthImage seen = sense_depth(view, small_camera(), options, random);
     return double(seen.block(50, 15, 20, 15).mean());
   };
   const double moved = mean_near(0.02) - mean_near(0);
@@ -134,7 +125,7 @@ TEST(DepthSensor, CorrelatedPartHasItsVarianceAndLength) {
   double variance = 0, near = 0, far = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Random random(seed);
-    const Eigen::ArrayXXd e = sense_depth(wall(0.7F), camera(), options, random).cast<double>().array() - double(0.7F);
+    const Eigen::ArrayXXd e = sense_depth(wall(0.7F), small_camera(), options, random).cast<double>().array() - double(0.7F);
     variance += e.square().mean() / 20;
     near += (e.leftCols(155) * e.rightCols(155)).mean() / 20;  // 5 px apart: exp(-1/2)
     far += (e.leftCols(130) * e.rightCols(130)).mean() / 20;   // 30 px apart: nothing
@@ -151,7 +142,7 @@ TEST(DepthSensor, FlyingPixelsStandBetweenTheTwoSidesOfAnEdge) {
   options.noise = {"constant", 1e-4, 0};
   options.depth_unit_m = 0;
   Random random(3);
-  const DepthImage seen = sense_depth(view, camera(), options, random);
+  const DepthImage seen = sense_depth(view, small_camera(), options, random);
   int flying = 0, elsewhere = 0;
   for (int row = 0; row < 120; ++row)
     for (int column = 0; column < 160; ++column) {
@@ -166,8 +157,8 @@ TEST(DepthSensor, FlyingPixelsStandBetweenTheTwoSidesOfAnEdge) {
 TEST(DepthSensor, GrazingSurfacesGiveNothingAndDepthIsQuantised) {
   DepthSensorOptions options;
   Random random(5);
-  EXPECT_EQ(sense_depth(wall(1, 1.45F), camera(), options, random).maxCoeff(), 0);
-  const DepthImage seen = sense_depth(wall(1), camera(), options, random);
+  EXPECT_EQ(sense_depth(wall(1, 1.45F), small_camera(), options, random).maxCoeff(), 0);
+  const DepthImage seen = sense_depth(wall(1), small_camera(), options, random);
   for (Eigen::Index i = 0; i < seen.size(); i += 37) {
     const double units = double(seen.data()[i]) / 0.001;
     EXPECT_NEAR(units, std::round(units), 1e-3);
@@ -177,9 +168,9 @@ TEST(DepthSensor, GrazingSurfacesGiveNothingAndDepthIsQuantised) {
 TEST(DepthSensor, SameSeedSameImage) {
   const PerfectView view = wall(0.9F);
   Random a(9, 2), b(9, 2), c(9, 3);
-  const DepthImage first = sense_depth(view, camera(), {}, a);
-  EXPECT_EQ(first, sense_depth(view, camera(), {}, b));
-  EXPECT_NE(first, sense_depth(view, camera(), {}, c));
+  const DepthImage first = sense_depth(view, small_camera(), {}, a);
+  EXPECT_EQ(first, sense_depth(view, small_camera(), {}, b));
+  EXPECT_NE(first, sense_depth(view, small_camera(), {}, c));
 }
 
 TEST(DepthSensor, BadOptionsAreRefused) {

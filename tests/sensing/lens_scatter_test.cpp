@@ -8,19 +8,10 @@
 #include <cmath>
 
 #include "palpate/lab/depth_sensor.hpp"
+#include "sensing/small_camera.hpp"
 
 namespace palpate::sensing {
 namespace {
-
-Camera camera() {
-  Camera c;
-  c.width_px = 160;
-  c.height_px = 120;
-  c.fx_px = c.fy_px = 300;
-  c.cx_px = 79.5;
-  c.cy_px = 59.5;
-  return c;
-}
 
 double stretch_at(int row, int column) {
   return std::sqrt(1 + std::pow((column - 79.5) / 300, 2) + std::pow((row - 59.5) / 300, 2));
@@ -44,7 +35,7 @@ DepthFrame seen(double share, std::uint64_t seed = 4) {
   sensor.flying_pixel_share = 0;
   lab::Random random(seed);
   DepthFrame frame;
-  frame.camera = camera();
+  frame.camera = small_camera();
   frame.noise = lab::stated_noise(sensor);
   frame.depth_m = lab::sense_depth(scene(), frame.camera, sensor, random);
   return frame;
