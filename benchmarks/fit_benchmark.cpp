@@ -144,11 +144,14 @@ void sample(benchmark::State& state) {
   estimation::GrowingFit before(options);
   for (std::size_t k = 1; k < count; ++k) before.update(scene.first(k), scene.object, scene.seen(k));
   double error = 0, evaluated = 0;
+  double nudge_m = 0;  // so that no answer of an earlier round is asked for again
   for (auto _ : state) {
     state.PauseTiming();
     estimation::GrowingFit now = before;
     const Recording recording = scene.first(count);
-    const estimation::Inputs inputs = scene.seen(count);
+    estimation::Inputs inputs = scene.seen(count);
+    nudge_m += 1e-7;
+    std::get<estimation::RayObservation>(inputs.back()[0]).rays.range_m.array() += nudge_m;
     state.ResumeTiming();
     const Identification answer = now.update(recording, scene.object, inputs);
     error = std::log(answer.parameters[0].value / young_pa);

@@ -82,7 +82,7 @@ class CrossCheck {
     Optimum part;
     part.unknowns = optimum_.unknowns;
     part.evaluation = objective_.assemble(joint_rows_, optimum_.unknowns, loss);
-    const VectorX move = MatrixX(part.evaluation.hessian(moving, moving)).ldlt().solve(-VectorX(part.evaluation.gradient(moving)));
+    const VectorX move = MatrixX(part.evaluation.curvature(moving, moving)).ldlt().solve(-VectorX(part.evaluation.gradient(moving)));
     const Unknown& nu = objective_.unknowns()[poisson];
     for (std::size_t k = 0; k < moving.size(); ++k) part.unknowns(moving[k]) += move(static_cast<Index>(k));
     const bool inside = part.unknowns(poisson) >= nu.lower && part.unknowns(poisson) <= nu.upper;

@@ -187,6 +187,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   solved_->bodies.resize(linear_ ? 1 : workers_);
   if (earlier && !contact_ && solved_->holds_for(*earlier)) {
     solved_->bodies = std::move(earlier->bodies);
+    solved_->rest_tree = earlier->rest_tree;
     for (auto& bodies : solved_->bodies) {
       for (const auto& push : recording.pushes) drop_if_unfit(bodies, push);
     }
@@ -232,6 +233,11 @@ const Tool& ForwardModel::tool(const std::string& name) const {
     if (tool.name == name) return tool;
   }
   throw Error("no tool of this name", "loads.tool " + name);
+}
+
+std::shared_ptr<const geometry::TriangleTree> ForwardModel::rest_tree() const {
+  if (!solved_->rest_tree) solved_->rest_tree = std::make_shared<const geometry::TriangleTree>(object_.surface.rest());
+  return solved_->rest_tree;
 }
 
 void ForwardModel::forget() {

@@ -16,6 +16,7 @@
 #include "palpate/estimation/surface_field.hpp"
 #include "palpate/estimation/unknowns.hpp"
 #include "palpate/fem/contact_statics.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
 
@@ -79,6 +80,8 @@ class ForwardModel {
   const Tool& tool(const std::string& name) const;
   StepIndex index(std::size_t s) const { return steps_[s]; }
   const SimulatedObject& object() const { return object_; }
+  /// Of the surface at rest, made when it is first asked for (by one thread): others copy it.
+  std::shared_ptr<const geometry::TriangleTree> rest_tree() const;
 
   /// Solves step s. Starts from the last solution of this step, moved along its derivatives to the new unknowns.
   /// @param derivatives  false: surface and converged only (the paper's method differentiates numerically)
@@ -101,6 +104,9 @@ class ForwardModel {
   void set_reuse(double share) { reuse_ = share; }
   /// The largest square of such a share in the steps' last predictions: how far they are from solutions, relative.
   double reuse_error() const;
+
+  /// True where answers are sums of answers to unit loads: a prediction costs next to nothing.
+  bool superposes() const { return linear_; }
 
   /// True where the object touches something that only pushes, or a rigid tool.
   bool touches() const { return contact_; }

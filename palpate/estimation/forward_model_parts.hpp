@@ -89,6 +89,7 @@ struct ForwardModel::Solved {
   std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies;  ///< a worker (all together: linear), by driven tools
   std::unique_ptr<SurfaceField> field;
   double field_std_m = 0, field_correlation_m = 0;
+  std::shared_ptr<const geometry::TriangleTree> rest_tree;  ///< of the surface, once somebody asked
 };
 
 struct ForwardModel::Coefficients {

@@ -9,9 +9,10 @@ namespace palpate::estimation {
 /// Into the base frame: x = T(X + b n + u).
 void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const {
   const RigidOffset clamp = clamp_offset(s, unknowns);
-  out.surface_m = object_.surface.rest().vertices_m;
-  for (Index v = 0; v < out.surface_m.rows(); ++v) {
-    out.surface_m.row(v) = clamp.apply(out.surface_m.row(v).transpose() + moved_m.segment<3>(3 * v));
+  out.surface_m = object_.surface.rest().vertices_m + Eigen::Map<const Points>(moved_m.data(), object_.surface.vertex_count(), 3);
+  if (clamp_[s] >= 0) {
+    const RigidMap moved(clamp);
+    for (Index v = 0; v < out.surface_m.rows(); ++v) out.surface_m.row(v) = moved.apply(out.surface_m.row(v));
   }
   if (!field_) return;
   out.field = field_;

@@ -35,7 +35,7 @@ GrowingFit::GrowingFit(FitOptions options) : options_(std::move(options)) { chec
 
 void GrowingFit::forget_object() {
   memory_ = {};
-  kept_.clear();
+  kept_ = {};
   same_object_ = false;
 }
 
@@ -74,7 +74,8 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
     }
     std::vector<int> moved;  // where the earlier unknowns are now
     for (const auto& name : names_) moved.push_back(place.count(name) > 0 ? place.at(name) : -1);
-    objective.adopt(kept_, moved);
+    objective.adopt(std::move(kept_), moved);
+    kept_ = {};
     objective.set_reuse(reuse);
     // Which rays of a new step count is chosen where the steps before it say that it should be.
     if (objective.evaluate(start, *loss_, progress).usable) loss_ = objective.with_chosen_rays(*loss_);
@@ -163,7 +164,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   objective.evaluate(optimum.unknowns, optimum.loss);  // verdicts look at the optimum's rows
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}, Doubts{}});
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
-  kept_ = objective.kept();
+  kept_ = objective.take_kept();
   return done();
 }
 

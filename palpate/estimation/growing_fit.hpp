@@ -42,7 +42,7 @@ class GrowingFit {
   FitMemory memory_;
   std::map<std::string, double> known_;  // unknowns at the last optimum, by name
   std::optional<Loss> loss_;             // of the last optimum
-  std::vector<Objective::KeptPlaces> kept_;
+  Objective::Kept kept_;
   std::vector<std::string> names_;  // of the unknowns that kept_ counts
   bool same_object_ = true;
   int steps_evaluated_ = 0;

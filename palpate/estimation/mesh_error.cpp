@@ -91,7 +91,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
   const Evaluation before = objective.assemble(objective.last_rows(), optimum.unknowns, highest);
   const Evaluation after = objective.assemble(changed, optimum.unknowns, highest);
   const std::vector<int> moving = free_unknowns(objective.unknowns());
-  const VectorX change = MatrixX(before.hessian(moving, moving))
+  const VectorX change = MatrixX(before.curvature(moving, moving))
                              .ldlt()
                              .solve(VectorX(before.gradient(moving)) - VectorX(after.gradient(moving)));
   if (!change.allFinite()) return std::nullopt;

@@ -16,38 +16,7 @@ namespace {
 // 75 degrees: a sphere's ray there is a thirtieth of the radius inside the outline.
 constexpr double well_inside = 0.26;
 
-constexpr std::size_t places_kept = 16;  // a step: the optimum, and those of a search over nu
-
 }  // namespace
-
-double tukey_rho(double residual, double cut) {
-  const double t = residual / cut;
-  if (!(std::abs(t) < 1)) return cut * cut / 6;
-  const double keep = 1 - t * t;
-  return cut * cut / 6 * (1 - keep * keep * keep);
-}
-
-double tukey_weight(double residual, double cut) {
-  const double t = residual / cut;
-  if (!(std::abs(t) < 1)) return 0;
-  const double keep = 1 - t * t;
-  return keep * keep;
-}
-
-double tukey_information_factor(double cut) {
-  double weight = 0, psi_squared = 0, psi_slope = 0;
-  constexpr int steps = 4000;
-  for (int i = 0; i < steps; ++i) {
-    const double r = cut * (2 * (i + 0.5) / steps - 1);
-    const double density = std::exp(-0.5 * r * r) / std::sqrt(2 * EIGEN_PI) * 2 * cut / steps;
-    const double t2 = r * r / (cut * cut);
-    const double w = (1 - t2) * (1 - t2);
-    weight += density * w;
-    psi_squared += density * w * w * r * r;
-    psi_slope += density * (1 - t2) * (1 - 5 * t2);
-  }
-  return psi_slope * psi_slope / (psi_squared * weight);
-}
 
 Objective::Objective(ForwardModel& model, const std::vector<std::vector<TermInput>>& inputs, Unknowns& unknowns)
     : model_(model), unknowns_(unknowns) {
@@ -62,141 +31,19 @@ Objective::Objective(ForwardModel& model, const std::vector<std::vector<TermInpu
   if (terms == 0) throw Error("no step has an observation that says anything about the object", "pushes");
 }
 
-namespace {
-
-/// Adds what some rows say. @param place  where their unknowns are in `out`
-void add_rows(const TermRows& rows, const Loss& loss, const std::vector<int>& place, Evaluation& out) {
-  double relevance = rows.cell.empty() ? 1 : loss.surface_weight;
-  if (rows.robust) relevance /= loss.widening * loss.widening;
-  VectorX weight = VectorX::Constant(rows.residual.size(), relevance);
-  for (Index i = 0; i < rows.residual.size(); ++i) {
-    if (rows.robust) {
-      out.robust_cost += relevance * tukey_rho(rows.residual(i), loss.tukey);
-      weight(i) *= tukey_weight(rows.residual(i), loss.tukey);
-    } else {
-      out.cost += relevance * 0.5 * rows.residual(i) * rows.residual(i);
-    }
-  }
-  VectorX finite = rows.residual;
-  for (Index i = 0; i < finite.size(); ++i) {
-    if (weight(i) == 0) finite(i) = 0;
-  }
-  const MatrixX weighted = weight.asDiagonal() * rows.jacobian;
-  const MatrixX block = rows.jacobian.transpose() * weighted;
-  const VectorX slope = weighted.transpose() * finite;
-  for (std::size_t a = 0; a < place.size(); ++a) {
-    out.gradient(place[a]) += slope(static_cast<Index>(a));
-    for (std::size_t b = 0; b < place.size(); ++b) {
-      const double entry = block(static_cast<Index>(a), static_cast<Index>(b));
-      out.hessian(place[a], place[b]) += entry;
-      if (rows.robust) out.robust_hessian(place[a], place[b]) += entry;
-    }
-  }
-}
-
-Evaluation nothing(Index count) {
-  Evaluation out;
-  out.hessian = MatrixX::Zero(count, count);
-  out.robust_hessian = MatrixX::Zero(count, count);
-  out.gradient = VectorX::Zero(count);
-  return out;
-}
-
-}  // namespace
-
-/// Puts the nearest place that is near enough at the end of what is kept; false: there is none.
-bool Objective::find_kept(std::size_t s, const VectorX& unknowns, const Loss& loss) {
-  KeptPlaces& places = kept_[s];
-  auto nearest = places.end();
-  double least = reuse_ * reuse_;
-  for (auto kept = places.begin(); kept != places.end(); ++kept) {
-    if (kept->loss.tukey != loss.tukey || kept->loss.widening != loss.widening || kept->loss.along_rays != loss.along_rays ||
-        kept->loss.surface_weight != loss.surface_weight || kept->loss.rays_of(s) != loss.rays_of(s) ||
-        (rows_wanted_ && kept->rows.empty())) {
-      continue;
-    }
-    const VectorX change = unknowns(kept->unknowns) - kept->at;
-    const double moved = change.dot(kept->normal.hessian * change);
-    if (moved <= least) {
-      least = moved;
-      nearest = kept;
-    }
-  }
-  if (nearest == places.end()) return false;
-  std::rotate(nearest, nearest + 1, places.end());
-  return true;
-}
-
-void Objective::keep(std::size_t s, const VectorX& unknowns, const Loss& loss) {
-  KeptPlaces& places = kept_[s];
-  if (places.size() == places_kept) {  // the one that was of no use for longest goes, the last one with rows stays
-    places.erase(std::find_if(places.begin(), places.end(), [](const KeptStep& p) { return p.rows.empty(); }));
-  }
-  if (rows_wanted_)
-    for (KeptStep& other : places) other.rows.clear();
-  KeptStep kept;
-  for (const TermRows& rows : rows_[s]) kept.unknowns.insert(kept.unknowns.end(), rows.unknowns.begin(), rows.unknowns.end());
-  std::sort(kept.unknowns.begin(), kept.unknowns.end());
-  kept.unknowns.erase(std::unique(kept.unknowns.begin(), kept.unknowns.end()), kept.unknowns.end());
-  kept.at = unknowns(kept.unknowns);
-  kept.normal = nothing(static_cast<Index>(kept.unknowns.size()));
-  kept.loss = loss;
-  for (const TermRows& rows : rows_[s]) {
-    std::vector<int> place;
-    for (int unknown : rows.unknowns) {
-      place.push_back(static_cast<int>(std::lower_bound(kept.unknowns.begin(), kept.unknowns.end(), unknown) - kept.unknowns.begin()));
-    }
-    add_rows(rows, loss, place, kept.normal);
-  }
-  kept.normal.cost += kept.normal.robust_cost;
-  if (rows_wanted_) kept.rows = rows_[s];
-  places.push_back(std::move(kept));
-}
-
-void Objective::adopt(const std::vector<KeptPlaces>& kept, const std::vector<int>& moved) {
-  kept_.assign(model_.step_count(), {});
-  const auto renumber = [&](std::vector<int>& unknowns) {
-    for (int& unknown : unknowns) unknown = moved[static_cast<std::size_t>(unknown)];
-    return std::none_of(unknowns.begin(), unknowns.end(), [](int unknown) { return unknown < 0; });
-  };
-  for (std::size_t s = 0; s < std::min(kept.size(), kept_.size()); ++s) {
-    for (KeptStep place : kept[s]) {
-      bool whole = renumber(place.unknowns);
-      for (TermRows& rows : place.rows) whole = renumber(rows.unknowns) && whole;
-      if (whole) kept_[s].push_back(std::move(place));
-    }
-  }
-}
-
-Evaluation Objective::sum_kept(const VectorX& unknowns, const Loss& loss) const {
-  Evaluation out = nothing(unknowns_.size());
-  for (std::size_t s = 0; s < kept_.size(); ++s) {
-    if (kept_[s].empty() || !loss.counts(s)) continue;
-    const KeptStep& kept = kept_[s].back();
-    const VectorX change = unknowns(kept.unknowns) - kept.at;
-    const VectorX bent = kept.normal.hessian * change;
-    const double gain = kept.normal.gradient.dot(change) + 0.5 * change.dot(bent);
-    out.cost += kept.normal.cost + gain;
-    out.robust_cost += kept.normal.robust_cost + (kept.normal.robust_cost > 0 ? gain : 0);
-    for (std::size_t a = 0; a < kept.unknowns.size(); ++a) {
-      const Index row = static_cast<Index>(a);
-      out.gradient(kept.unknowns[a]) += kept.normal.gradient(row) + bent(row);
-      for (std::size_t b = 0; b < kept.unknowns.size(); ++b) {
-        const Index column = static_cast<Index>(b);
-        out.hessian(kept.unknowns[a], kept.unknowns[b]) += kept.normal.hessian(row, column);
-        out.robust_hessian(kept.unknowns[a], kept.unknowns[b]) += kept.normal.robust_hessian(row, column);
-      }
-    }
-  }
-  add_priors(unknowns, out);
-  return out;
-}
-
 Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const OnProgress& progress) {
   Evaluation out;
-  rows_.assign(model_.step_count(), {});
+  const bool anchored = reuse_ > 0 && model_.superposes();
+  if (anchored) {
+    if (!pattern_) pattern_ = std::make_shared<const SurfacePattern>(model_.object().surface.rest());
+    anchors_.resize(model_.step_count());
+    rows_.resize(model_.step_count());  // those of the anchors stay
+  } else {
+    rows_.assign(model_.step_count(), {});
+  }
   predictions_.assign(model_.step_count(), {});
   if (reuse_ > 0) kept_.resize(model_.step_count());
+  std::vector<StepNormal> normals(reuse_ > 0 ? model_.step_count() : 0);
   // Every worker solves and linearises its own steps; what follows adds them up in order, so that digits do not depend on
   // who finished first.
   std::atomic<std::size_t> done{0};
@@ -206,16 +53,25 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
     try {
       for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
         if (terms_[s].empty() || !loss.counts(s)) continue;
-        if (reuse_ > 0 && find_kept(s, unknowns, loss)) {
+        if (anchored) {
+    if (!pattern_) pattern_ = std::make_shared<const SurfacePattern>(model_.object().surface.rest());
+          predictions_[s] = model_.predict(s, unknowns);
+          normals[s] = follow(s, unknowns, loss);
+        } else if (reuse_ > 0 && find_kept(s, unknowns, loss)) {
           if (rows_wanted_) rows_[s] = kept_[s].back().rows;
+          normals[s] = moved_along(kept_[s].back(), unknowns);
           continue;
+        } else {
+          ++steps_evaluated_;
+          predictions_[s] = model_.predict(s, unknowns);
+          if (!predictions_[s].converged) stop = true;
+          if (stop) return;
+          rows_[s] = rows_of(s, predictions_[s], unknowns, loss);
+          if (reuse_ > 0) {
+            keep(s, unknowns, loss);
+            normals[s] = kept_[s].back();
+          }
         }
-        ++steps_evaluated_;
-        predictions_[s] = model_.predict(s, unknowns);
-        if (!predictions_[s].converged) stop = true;
-        if (stop) return;
-        rows_[s] = rows_of(s, predictions_[s], unknowns, loss);
-        if (reuse_ > 0) keep(s, unknowns, loss);
         ++done;
         // Only the calling thread speaks to the caller.
         if (worker == 0 && progress && !progress("fit", static_cast<double>(done) / static_cast<double>(model_.step_count()))) {
@@ -243,11 +99,11 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
     }
   }
 
-  return reuse_ > 0 ? sum_kept(unknowns, loss) : assemble(rows_, unknowns, loss);
+  return reuse_ > 0 ? sum(normals, unknowns) : assemble(rows_, unknowns, loss);
 }
 
 Evaluation Objective::assemble(const std::vector<std::vector<TermRows>>& all_rows, const VectorX& unknowns, const Loss& loss) const {
-  Evaluation out = nothing(unknowns_.size());
+  Evaluation out = Evaluation::nothing(unknowns_.size());
   for (std::size_t s = 0; s < all_rows.size(); ++s) {
     if (!loss.counts(s)) continue;
     for (const TermRows& rows : all_rows[s]) add_rows(rows, loss, rows.unknowns, out);
@@ -266,17 +122,18 @@ void Objective::add_priors(const VectorX& unknowns, Evaluation& out) const {
     out.cost += 0.5 * precision * off * off;
     out.gradient(k) += precision * off;
     out.hessian(k, k) += precision;
+    out.curvature(k, k) += precision;
   }
   out.usable = std::isfinite(out.cost);
 }
 
 std::vector<TermRows> Objective::rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns,
-                                         const Loss& loss) const {
+                                         const Loss& loss, bool surface_slopes) const {
   const RaysOfStep* chosen = loss.along_rays ? loss.rays_of(s) : nullptr;
   std::vector<TermRows> rows;
   for (std::size_t t = 0; t < terms_[s].size(); ++t) {
     const bool some = chosen != nullptr && !(*chosen)[t].empty();
-    rows.push_back(terms_[s][t]->rows(predicted, unknowns, {loss.along_rays, some ? &(*chosen)[t] : nullptr}));
+    rows.push_back(terms_[s][t]->rows(predicted, unknowns, {loss.along_rays, some ? &(*chosen)[t] : nullptr, surface_slopes}));
   }
   return rows;
 }

@@ -35,7 +35,7 @@ std::vector<int> free_unknowns(const Unknowns& unknowns) {
 NewtonStep newton_step(const Evaluation& evaluation, const std::vector<int>& moving) {
   const VectorX gradient = evaluation.gradient(moving);
   NewtonStep out;
-  out.move = MatrixX(evaluation.hessian(moving, moving)).ldlt().solve(-gradient);
+  out.move = MatrixX(evaluation.curvature(moving, moving)).ldlt().solve(-gradient);
   out.gain = -0.5 * gradient.dot(out.move);
   return out;
 }
@@ -74,7 +74,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
     std::vector<int> moving = free_unknowns(unknowns);
     if (best.poisson_at_lower || best.poisson_at_upper) moving.erase(std::remove(moving.begin(), moving.end(), poisson), moving.end());
 
-    const MatrixX hessian = pick(best.evaluation.hessian, moving);
+    const MatrixX hessian = pick(best.evaluation.curvature, moving);
     VectorX gradient(static_cast<Index>(moving.size()));
     for (std::size_t k = 0; k < moving.size(); ++k) gradient(static_cast<Index>(k)) = best.evaluation.gradient(moving[k]);
     const VectorX scale = hessian.diagonal().cwiseMax(1e-300);

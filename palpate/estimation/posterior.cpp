@@ -9,6 +9,7 @@ namespace palpate::estimation {
 namespace {
 
 constexpr int grid_size = 401;
+constexpr double search_reuse = 2;  // Objective::set_reuse for a linear body: what single points err by
 constexpr double negligible = 8;  // of the cost above its least: e^-8 of the density, four standard deviations
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
@@ -30,7 +31,7 @@ Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& un
   const MatrixX information = evaluation.information(factor);
   const VectorX cross = information.col(poisson)(others);
   // The cost's slope leads to the estimate, the information says how sharp it is.
-  const MatrixX& hessian = evaluation.hessian;
+  const MatrixX& hessian = evaluation.curvature;
   const VectorX hessian_cross = hessian.col(poisson)(others);
   const Eigen::LDLT<MatrixX> held(hessian(others, others));
   const double slope = evaluation.gradient(poisson) - hessian_cross.dot(held.solve(VectorX(evaluation.gradient(others))));
@@ -109,6 +110,26 @@ void fill(Posterior& posterior, const MatrixX& mean, const MatrixX& std_dev) {
   posterior.region_std = std_dev.rightCols(std_dev.cols() - 1);
 }
 
+/// A search over nu asks a linear body's steps many times close around the optimum: their rows are made there once.
+class FollowRows {
+ public:
+  FollowRows(Objective& objective, const Optimum& optimum, const Loss& loss) : objective_(objective), before_(objective.reuse()) {
+    if (!objective.model().superposes()) return;
+    objective.set_reuse(search_reuse);
+    objective.evaluate(optimum.unknowns, loss);
+    objective.set_reuse(search_reuse, false);
+  }
+  ~FollowRows() {
+    if (objective_.model().superposes()) objective_.set_reuse(before_);
+  }
+  FollowRows(const FollowRows&) = delete;
+  FollowRows& operator=(const FollowRows&) = delete;
+
+ private:
+  Objective& objective_;
+  double before_;
+};
+
 void finish(Posterior& posterior, const VectorX& log_density) {
   posterior.weight = (log_density.array() - log_density.maxCoeff()).exp();
   posterior.weight /= posterior.weight.sum();
@@ -153,13 +174,22 @@ double Posterior::poisson_quantile(double probability) const {
 
 double Posterior::log_young_quantile(double probability) const {
   double low = (log_young_mean - 9 * log_young_std).minCoeff(), high = (log_young_mean + 9 * log_young_std).maxCoeff();
-  for (int i = 0; i < 100; ++i) {
-    const double middle = 0.5 * (low + high);
-    double below = 0;
-    for (Index k = 0; k < weight.size(); ++k) below += weight(k) * normal_cdf((middle - log_young_mean(k)) / log_young_std(k));
-    (below < probability ? low : high) = middle;
+  const double close_enough = 1e-13 * (1 + high - low);
+  double at = 0.5 * (low + high);
+  while (high - low > close_enough) {  // Newton's method, and halves where it leaves the bracket
+    double below = 0, density = 0;
+    for (Index k = 0; k < weight.size(); ++k) {
+      if (weight(k) < 1e-16) continue;
+      const double z = (at - log_young_mean(k)) / log_young_std(k);
+      below += weight(k) * normal_cdf(z);
+      density += weight(k) * std::exp(-0.5 * z * z) / (std::sqrt(2 * EIGEN_PI) * log_young_std(k));
+    }
+    (below < probability ? low : high) = at;
+    const double next = density > 0 ? at - (below - probability) / density : at;
+    if (std::abs(next - at) < close_enough) return at;
+    at = next > low && next < high ? next : 0.5 * (low + high);
   }
-  return 0.5 * (low + high);
+  return at;
 }
 
 double Posterior::poisson_std() const { return std::sqrt(std::max(covariance(1, 1), 0.0)); }
@@ -199,6 +229,7 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
     return posterior;
   }
 
+  const FollowRows follow(objective, optimum, loss);
   // Conditional optima outwards from the best one, each started from its neighbour.
   posterior.quadrature = true;
   const double from = std::max(lower, nu - 6 * std_nu), to = std::min(upper, nu + 6 * std_nu);
@@ -232,9 +263,9 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   const auto visit = [&](Index i, Optimum& walk) {
     ++done;
     VectorX begin = walk.unknowns;
-    const VectorX along = MatrixX(walk.evaluation.hessian(others, others))
+    const VectorX along = MatrixX(walk.evaluation.curvature(others, others))
                               .ldlt()
-                              .solve(-VectorX(walk.evaluation.hessian.col(poisson)(others)));
+                              .solve(-VectorX(walk.evaluation.curvature.col(poisson)(others)));
     for (std::size_t k = 0; k < others.size(); ++k) {
       begin(others[k]) += (node(i) - walk.unknowns(poisson)) * along(static_cast<Index>(k));
     }

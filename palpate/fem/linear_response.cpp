@@ -91,8 +91,11 @@ UnitResponses LinearResponse::solve(double poisson_ratio) const {
 
 std::shared_ptr<const UnitResponses> LinearResponse::at(double poisson_ratio) const {
   const std::lock_guard lock(mutex_);
-  for (auto& known : recent_)
-    if (known->poisson_ratio == poisson_ratio) return known;
+  for (auto known = recent_.begin(); known != recent_.end(); ++known) {
+    if ((*known)->poisson_ratio != poisson_ratio) continue;
+    std::rotate(known, known + 1, recent_.end());
+    return recent_.back();
+  }
   const bool inside = poisson_ratio >= options_.poisson_lower && poisson_ratio <= options_.poisson_upper;
   if (inside && usable_ && coefficients_.empty() && options_.poisson_upper > options_.poisson_lower) make_polynomial();
   std::shared_ptr<const UnitResponses> answer;
@@ -101,9 +104,11 @@ std::shared_ptr<const UnitResponses> LinearResponse::at(double poisson_ratio) co
   } else {
     answer = std::make_shared<UnitResponses>(solve(poisson_ratio));
   }
-  // A search that is refused a step comes back to where it was.
+  // A search that is refused a step comes back to where it was, and one over nu to the same places as data come in.
+  constexpr double kept_bytes = 5e7;
+  const std::size_t kept = std::clamp<std::size_t>(static_cast<std::size_t>(kept_bytes / (16.0 * static_cast<double>(answer->force.size() + 1))), 4, 24);
   recent_.push_back(answer);
-  if (recent_.size() > 4) recent_.erase(recent_.begin());
+  if (recent_.size() > kept) recent_.erase(recent_.begin());
   return answer;
 }
 
@@ -165,11 +170,19 @@ UnitResponses LinearResponse::interpolate(double poisson_ratio) const {
   VectorX value(static_cast<Index>(coefficients_.size())), slope;
   chebyshev(range.to_unit(z), value, slope);
   const double chain = 1 / (range.half * poisson_d_z(z));
-  MatrixX y = coefficients_[0];
-  MatrixX dy = MatrixX::Zero(y.rows(), y.cols());
-  for (std::size_t i = 1; i < coefficients_.size(); ++i) {
-    y += value(static_cast<Index>(i)) * coefficients_[i];
-    dy += chain * slope(static_cast<Index>(i)) * coefficients_[i];
+  MatrixX y(coefficients_[0].rows(), coefficients_[0].cols()), dy(y.rows(), y.cols());
+  constexpr Eigen::Index piece = 512;  // sums stay in the first cache while every coefficient is read once
+  for (Eigen::Index from = 0; from < y.size(); from += piece) {
+    const Eigen::Index size = std::min(piece, y.size() - from);
+    const auto part = [&](auto& matrix) { return Eigen::Map<VectorX>(matrix.data() + from, size); };
+    auto sum = part(y), sum_of_slopes = part(dy);
+    sum = Eigen::Map<const VectorX>(coefficients_[0].data() + from, size);
+    sum_of_slopes.setZero();
+    for (std::size_t i = 1; i < coefficients_.size(); ++i) {
+      const Eigen::Map<const VectorX> coefficient(coefficients_[i].data() + from, size);
+      sum += value(static_cast<Index>(i)) * coefficient;
+      sum_of_slopes += chain * slope(static_cast<Index>(i)) * coefficient;
+    }
   }
   const Index rows = static_cast<Index>(watched_.rows()), m = static_cast<Index>(y.rows()) - rows - 1;
   const Index k = static_cast<Index>(y.cols()) - m;

@@ -74,14 +74,18 @@ struct TriangleTree::Impl {
   Bvh bvh;
   WideBvh wide;
   std::optional<ClosestSearch> search;
-  std::atomic<bool> search_is_old = false;  // who casts rays alone, refit after refit, need not wait for it
+  std::atomic<bool> search_is_old = true;  // who casts rays alone, refit after refit, need not wait for it
   std::mutex refitting;
 
   const ClosestSearch& up_to_date_search() {
     if (search_is_old.load(std::memory_order_acquire)) {
       const std::lock_guard lock(refitting);
       if (search_is_old.load(std::memory_order_relaxed)) {
-        search->refit(mesh, bvh);
+        if (search) {
+          search->refit(mesh, bvh);
+        } else {
+          search.emplace(mesh, bvh);
+        }
         search_is_old.store(false, std::memory_order_release);
       }
     }
@@ -99,7 +103,12 @@ TriangleTree::TriangleTree(TriMesh mesh) : impl_(std::make_unique<Impl>()) {
   impl_->mesh = std::move(mesh);
   impl_->bvh = build_bvh(triangle_boxes(impl_->mesh), leaf_size);
   impl_->wide = widen(impl_->bvh);
-  impl_->search.emplace(impl_->mesh, impl_->bvh);
+}
+
+TriangleTree::TriangleTree(const TriangleTree& other) : impl_(std::make_unique<Impl>()) {
+  impl_->mesh = other.impl_->mesh;
+  impl_->bvh = other.impl_->bvh;
+  impl_->wide = other.impl_->wide;
 }
 
 TriangleTree::~TriangleTree() = default;

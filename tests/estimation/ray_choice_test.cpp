@@ -124,7 +124,7 @@ TEST(RayChoice, TheSameRaysCountForEveryPoissonRatio) {
   Loss all = ball.loss;
   all.rays.clear();
   const double nu = ball.optimum.unknowns(poisson);
-  const auto apart = [&](const Loss& loss) { return std::abs(ball.finite_rows(0.15, loss) - ball.finite_rows(0.45, loss)); };
+  const auto apart = [&](const Loss& loss) { return std::abs(ball.finite_rows(0.05, loss) - ball.finite_rows(0.48, loss)); };
   EXPECT_GE(apart(all), 5) << "the scene has no outline worth a test";
   EXPECT_EQ(apart(ball.loss), 0) << "a ray that counts came or went";
   // The choice leaves out what grazes, not what faces the camera.

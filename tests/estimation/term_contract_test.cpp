@@ -8,6 +8,7 @@
 #include <complex>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/surface_quadratic.hpp"
 #include "scenes.hpp"
 
 namespace palpate::estimation {
@@ -180,6 +181,65 @@ TEST_P(TermContract, JacobianIsTheDerivativeOfTheResidual) {
   }
   // Rays that pass by have no residual; most must hit for this to say anything.
   EXPECT_GT(compared, static_cast<std::size_t>(unknowns.size() * rows.residual.size()) * 4 / 5);
+}
+
+TEST_P(TermContract, ItsRowsAsAQuadraticOfTheSurfaceSayTheSame) {
+  const auto& [test, material] = GetParam();
+  const TetMesh mesh = kuhn_block(3, 2, 2, block_size_m);
+  Recording recording = clamped_block(mesh, test.weight);
+  const SimulatedObject object = simulated(mesh, material);
+  Unknowns unknowns;
+  ForwardModel model(recording, object, unknowns, tight());
+  const Points surface_m = model.predict(test.step, away_from_rest(unknowns)).surface_m;
+  const TermInput input = test.make({surface_m, object.surface.rest().triangles});
+  const bool sees_surface = std::holds_alternative<RayObservation>(input) || std::holds_alternative<PointCloud>(input);
+  if (const auto* reading = std::get_if<Wrench>(&input)) recording.pushes[1].steps[0].observations.push_back(*reading);
+  std::map<std::string, int> shared;
+  const auto term = make_term(input, {model, test.step, unknowns, shared});
+  const VectorX at = away_from_rest(unknowns);
+  const StepPrediction predicted = model.predict(test.step, at);
+  const TermRows rows = term->rows(predicted, at, {test.along_rays, nullptr, true});
+  ASSERT_EQ(rows.surface.size(), sees_surface ? static_cast<std::size_t>(rows.residual.size()) : 0u);
+  if (!sees_surface) return;
+
+  const Loss loss;
+  const auto dense_at = [&](const VectorX& place) {
+    Evaluation out = Evaluation::nothing(unknowns.size());
+    const TermRows there = term->rows(model.predict(test.step, place), place, {test.along_rays});
+    add_rows(there, loss, there.unknowns, out);
+    return out;
+  };
+  const SurfacePattern pattern(object.surface.rest());
+  const SurfaceQuadratic quadratic(pattern, rows, loss, predicted, at);
+  const auto quadratic_at = [&](const VectorX& place) {
+    const StepPrediction there = model.predict(test.step, place);
+    std::vector<int> places = there.columns;
+    places.insert(places.end(), quadratic.own().begin(), quadratic.own().end());
+    Evaluation out = Evaluation::nothing(unknowns.size());
+    quadratic.add_to(there, place, places, out);
+    return out;
+  };
+
+  // Where it was made it is the rows' own sum; the light that spreads in the lens does not see that a clamp turns the rest
+  // surface's error with it.
+  const Evaluation here = quadratic_at(at), dense = dense_at(at);
+  const VectorX scale = dense.hessian.diagonal().cwiseSqrt().cwiseMax(1e-12);
+  const MatrixX off = scale.cwiseInverse().asDiagonal() * (here.hessian - dense.hessian) * scale.cwiseInverse().asDiagonal();
+  const double same = std::holds_alternative<RayObservation>(input) && std::get<RayObservation>(input).scatter ? 0.02 : 1e-9;
+  EXPECT_NEAR(here.robust_cost, dense.robust_cost, 1e-9 * dense.robust_cost);
+  EXPECT_LT(off.cwiseAbs().maxCoeff(), same);
+  EXPECT_LT((here.gradient - dense.gradient).cwiseQuotient(scale).cwiseAbs().maxCoeff(), same * std::sqrt(double(rows.residual.size())));
+  EXPECT_EQ(quadratic.moved_m(predicted, at, unknowns), 0);
+
+  // Aside its slope is the derivative of its cost.
+  VectorX way(unknowns.size());
+  for (int k = 0; k < unknowns.size(); ++k) way(k) = (k % 2 == 0 ? 0.01 : -0.01) * (k <= poisson ? 1 : unknowns[k].prior_std);
+  const VectorX aside = at + way;
+  constexpr double h = 1e-3;
+  const double rise = (quadratic_at(aside + h * way).robust_cost - quadratic_at(aside - h * way).robust_cost) / (2 * h);
+  EXPECT_NEAR(rise, quadratic_at(aside).gradient.dot(way), 1e-3 * quadratic_at(aside).gradient.cwiseProduct(way).cwiseAbs().sum());
+  EXPECT_LT(here.curvature.trace(), here.hessian.trace());
+  EXPECT_GT(quadratic.moved_m(model.predict(test.step, aside), aside, unknowns), 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Every, TermContract,

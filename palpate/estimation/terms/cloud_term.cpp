@@ -3,6 +3,7 @@
 // by the mesh's spacing). The whole boundary is searched, not only the part that sensors see: noise carries points over the
 // edge of the seen part, and clipping there would pull the surface outwards.
 #include <cmath>
+#include <optional>
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
@@ -13,21 +14,26 @@ namespace {
 
 class CloudTerm : public Term {
  public:
-  CloudTerm(const PointCloud& cloud, const TriMesh& rest, int pose)
-      : points_m_(cloud.points_m), pose_(pose), tree_(rest), hints_(static_cast<std::size_t>(cloud.points_m.rows()), -1) {
+  CloudTerm(const PointCloud& cloud, std::shared_ptr<const geometry::TriangleTree> rest, int pose)
+      : points_m_(cloud.points_m),
+        pose_(pose),
+        rest_tree_(std::move(rest)),
+        rest_(rest_tree_->mesh()),
+        hints_(static_cast<std::size_t>(cloud.points_m.rows()), -1) {
     sigma_m_ = cloud.sigma_m.size() == 1 ? VectorX::Constant(points_m_.rows(), cloud.sigma_m(0)).eval() : cloud.sigma_m;
     centre_m_ = points_m_.colwise().mean();
     typical_ = sigma_m_.mean();
     // Neighbours may err together: cells of a tenth of the object.
-    const double cell_m = 0.1 * (rest.vertices_m.colwise().maxCoeff() - rest.vertices_m.colwise().minCoeff()).norm();
+    const double cell_m = 0.1 * (rest_.vertices_m.colwise().maxCoeff() - rest_.vertices_m.colwise().minCoeff()).norm();
     for (Index i = 0; i < points_m_.rows(); ++i) {
       const Eigen::Array3d at = ((points_m_.row(i).transpose() - centre_m_) / cell_m).array().floor() + 512;
       cell_.push_back(static_cast<int>(at(0)) + 1024 * (static_cast<int>(at(1)) + 1024 * static_cast<int>(at(2))));
     }
   }
 
-  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView&) const override {
-    tree_.refit(predicted.surface_m);
+  TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const override {
+    if (!tree_) tree_.emplace(*rest_tree_);
+    tree_->refit(predicted.surface_m);
     const RigidMap frame = frame_pose(unknowns, pose_, centre_m_);
     const Index count = static_cast<Index>(predicted.columns.size());
     TermRows rows;
@@ -42,14 +48,15 @@ class CloudTerm : public Term {
     rows.observed_m.resize(points_m_.rows(), 3);
     rows.robust = true;
     rows.unit = "m";
+    if (view.surface_slopes) rows.surface.resize(static_cast<std::size_t>(points_m_.rows()));
     const MatrixX slopes = predicted.d_surface.transpose();  // a vertex's in one place
     VectorX slope(count);
     for (Index i = 0; i < points_m_.rows(); ++i) {
       const Vec3 point = frame.apply(points_m_.row(i));
-      const auto hit = tree_.closest(point, hints_[static_cast<std::size_t>(i)]);
+      const auto hit = tree_->closest(point, hints_[static_cast<std::size_t>(i)]);
       hints_[static_cast<std::size_t>(i)] = hit.triangle;
-      const auto triangle = tree_.mesh().triangles.row(hit.triangle);
-      const auto corner = [&](int k) { return Vec3(tree_.mesh().vertices_m.row(triangle(k))); };
+      const auto triangle = rest_.triangles.row(hit.triangle);
+      const auto corner = [&](int k) { return Vec3(predicted.surface_m.row(triangle(k))); };
       Vec3 normal = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
       const Vec3 apart = point - hit.point_m;
       const double side = normal.dot(apart) < 0 ? -1 : 1;
@@ -63,6 +70,8 @@ class CloudTerm : public Term {
       field.subtract(rows.jacobian, i, triangle, hit.barycentric, normal / sigma_m_(i));
       if (pose_ >= 0) rows.jacobian.row(i).segment<6>(count) = frame.slope(normal / sigma_m_(i), points_m_.row(i));
       rows.observed_m.row(i) = point;
+      if (view.surface_slopes)
+        rows.surface[static_cast<std::size_t>(i)] = {hit.triangle, -normal / sigma_m_(i) * hit.barycentric.transpose()};
     }
     return rows;
   }
@@ -75,7 +84,9 @@ class CloudTerm : public Term {
   Vec3 centre_m_ = Vec3::Zero();
   double typical_ = 0;
   int pose_;
-  mutable geometry::TriangleTree tree_;  // refitted to the surface that is asked about
+  std::shared_ptr<const geometry::TriangleTree> rest_tree_;
+  const TriMesh& rest_;
+  mutable std::optional<geometry::TriangleTree> tree_;  // refitted to the surface that is asked about; none yet: never asked
   mutable std::vector<Index> hints_;     // last closest triangles: they only make the search faster
 };
 
@@ -88,7 +99,7 @@ std::unique_ptr<Term> make_cloud_term(const PointCloud& cloud, const TermContext
     throw Error("give one standard deviation (sigma_m), or one a point", where);
   }
   if (!(cloud.sigma_m.minCoeff() > 0)) throw Error("sigma_m must be positive", where);
-  return std::make_unique<CloudTerm>(cloud, context.model.object().surface.rest(),
+  return std::make_unique<CloudTerm>(cloud, context.model.rest_tree(),
                                      add_frame_pose(context, cloud.pose_std_m, cloud.pose_std_rad));
 }
 

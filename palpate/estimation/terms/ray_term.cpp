@@ -23,20 +23,21 @@ constexpr double grazing_cosine = 0.17;  // beyond 80 degrees a depth says littl
 
 class RayTerm : public Term {
  public:
-  RayTerm(const RayObservation& observation, const TriMesh& rest, int pose, int bias, int scatter)
+  RayTerm(const RayObservation& observation, std::shared_ptr<const geometry::TriangleTree> rest, int pose, int bias, int scatter)
       : rays_(observation.rays),
         lens_(observation.scatter.value_or(LensScatter{})),
         pose_(pose),
         bias_(bias),
         scatter_(scatter),
-        tree_(rest),
+        rest_tree_(std::move(rest)),
+        rest_(rest_tree_->mesh()),
         hints_(static_cast<std::size_t>(rays_.range_m.size()), -1) {
     for (Index i = 0; i < rays_.range_m.size(); ++i) pivot_m_ += point(i) / static_cast<double>(rays_.range_m.size());
     typical_ = rays_.sigma_m.mean();
   }
 
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const override {
-    tree_.refit(predicted.surface_m);
+    geometry::TriangleTree& tree = tree_at(predicted.surface_m);
     const RigidMap frame = frame_pose(unknowns, pose_, pivot_m_);
     const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
     const Index count = static_cast<Index>(predicted.columns.size());
@@ -59,6 +60,7 @@ class RayTerm : public Term {
     rows.robust = true;
     rows.unit = "m";
     rows.cell.resize(static_cast<std::size_t>(rays_.range_m.size()));
+    if (view.surface_slopes) rows.surface.resize(static_cast<std::size_t>(rays_.range_m.size()));
 
     const MatrixX slopes = predicted.d_surface.transpose();  // a vertex's in one place
     const MatrixX material_slopes = share != 0 ? MatrixX(predicted.d_markers().transpose()) : MatrixX();
@@ -83,9 +85,9 @@ class RayTerm : public Term {
         continue;
       }
       if (view.along_rays) {
-        if (const auto hit = tree_.cast(frame.apply(rays_.origins_m.row(i)), direction, endless, hint)) {
+        if (const auto hit = tree.cast(frame.apply(rays_.origins_m.row(i)), direction, endless, hint)) {
           hint = hit->triangle;
-          const Vec3 normal = face_normal(hit->triangle);
+          const Vec3 normal = face_normal(predicted.surface_m, hit->triangle);
           const double cosine = normal.dot(direction);
           rows.facing(i) = std::abs(cosine);
           if (chosen || std::abs(cosine) > grazing_cosine) {
@@ -102,11 +104,11 @@ class RayTerm : public Term {
           }
         }
       } else {
-        const auto hit = tree_.closest(observed, hint);
+        const auto hit = tree.closest(observed, hint);
         triangle = hint = hit.triangle;
         barycentric = hit.barycentric;
         const Vec3 apart = observed - hit.point_m;
-        gradient = apart.norm() > 1e-9 ? Vec3(apart.normalized()) : face_normal(hit.triangle);
+        gradient = apart.norm() > 1e-9 ? Vec3(apart.normalized()) : face_normal(predicted.surface_m, hit.triangle);
         residual_m = apart.norm();
       }
       if (triangle < 0) {  // the ray passes the object by: an outlier, at no gradient
@@ -121,15 +123,22 @@ class RayTerm : public Term {
         rows.jacobian(i, scatter_column) = -scattered->error.m / sigma_m;
         gradient *= 1 + share * scattered->error.per_range;
         for (int k = 0; share != 0 && k < 3; ++k)
-          slope.noalias() -= material_slopes.middleCols<3>(3 * tree_.mesh().triangles(triangle, k)) *
+          slope.noalias() -= material_slopes.middleCols<3>(3 * rest_.triangles(triangle, k)) *
                              (share * scattered->error.per_cosine / sigma_m * scattered->cosine_per_corner[k]);
       }
       for (int k = 0; k < 3; ++k) {
         slope.noalias() -=
-            slopes.middleCols<3>(3 * tree_.mesh().triangles(triangle, k)) * (barycentric(k) / sigma_m * gradient);
+            slopes.middleCols<3>(3 * rest_.triangles(triangle, k)) * (barycentric(k) / sigma_m * gradient);
       }
       rows.jacobian.row(i).head(count) = slope.transpose();
-      field.subtract(rows.jacobian, i, tree_.mesh().triangles.row(triangle), barycentric, gradient / sigma_m);
+      if (view.surface_slopes) {
+        SurfaceSlope& surface = rows.surface[static_cast<std::size_t>(i)];
+        surface.triangle = triangle;
+        surface.per_corner = -gradient / sigma_m * barycentric.transpose();
+        for (int k = 0; scattered && k < 3; ++k)
+          surface.per_corner.col(k) -= share * scattered->error.per_cosine / sigma_m * scattered->cosine_per_corner[k];
+      }
+      field.subtract(rows.jacobian, i, rest_.triangles.row(triangle), barycentric, gradient / sigma_m);
       if (pose_ >= 0) {
         rows.jacobian.block<1, 6>(i, pose_column) = frame.slope(gradient / sigma_m, lever);
       }
@@ -139,6 +148,11 @@ class RayTerm : public Term {
   double typical_sigma() const override { return typical_; }
 
  private:
+  geometry::TriangleTree& tree_at(const Points& surface_m) const {
+    if (!tree_) tree_.emplace(*rest_tree_);
+    tree_->refit(surface_m);
+    return *tree_;
+  }
   /// What scattered light adds to a range that ends on a triangle of the surface.
   struct Scattered {
     LensScatter::Error error;
@@ -146,7 +160,7 @@ class RayTerm : public Term {
   };
   /// The normal is that of the material: what is wrong with the rest surface is too slow to turn it.
   Scattered scatter(const StepPrediction& predicted, Index triangle, const Vec3& direction, double range_m) const {
-    const auto corner = [&](int k) { return Vec3(predicted.markers_m().row(tree_.mesh().triangles(triangle, k))); };
+    const auto corner = [&](int k) { return Vec3(predicted.markers_m().row(rest_.triangles(triangle, k))); };
     const Vec3 e1 = corner(1) - corner(0), e2 = corner(2) - corner(0);
     const Vec3 doubled = e1.cross(e2);
     const double size = doubled.norm();
@@ -162,8 +176,8 @@ class RayTerm : public Term {
     return out;
   }
   Vec3 point(Index i) const { return rays_.origins_m.row(i) + rays_.range_m(i) * rays_.directions.row(i); }
-  Vec3 face_normal(Index triangle) const {
-    const auto corner = [&](int k) { return Vec3(tree_.mesh().vertices_m.row(tree_.mesh().triangles(triangle, k))); };
+  Vec3 face_normal(const Points& surface_m, Index triangle) const {
+    const auto corner = [&](int k) { return Vec3(surface_m.row(rest_.triangles(triangle, k))); };
     return (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
   }
   /// Square image cells, numbered along rows of up to 4096 cells.
@@ -177,7 +191,9 @@ class RayTerm : public Term {
   int pose_, bias_, scatter_;
   Vec3 pivot_m_ = Vec3::Zero();
   double typical_ = 0;
-  mutable geometry::TriangleTree tree_;
+  std::shared_ptr<const geometry::TriangleTree> rest_tree_;
+  const TriMesh& rest_;
+  mutable std::optional<geometry::TriangleTree> tree_;  // steps that a growing fit does not ask again need none
   mutable std::vector<Index> hints_;
 };
 
@@ -201,7 +217,7 @@ std::unique_ptr<Term> make_ray_term(const RayObservation& observation, const Ter
     scatter = context.shared[name];
   }
   const int pose = add_frame_pose(context, observation.pose_std_m, observation.pose_std_rad);
-  return std::make_unique<RayTerm>(observation, context.model.object().surface.rest(), pose, bias, scatter);
+  return std::make_unique<RayTerm>(observation, context.model.rest_tree(), pose, bias, scatter);
 }
 
 }  // namespace palpate::estimation

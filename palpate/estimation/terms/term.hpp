@@ -33,11 +33,18 @@ struct TermView {
   /// Rays that count, whatever they meet and how they graze it; the others are not asked about. nullptr: all that meet the
   /// surface at less than 80 degrees
   const std::vector<char>* chosen = nullptr;
+  bool surface_slopes = false;  ///< TermRows::surface is wanted, by terms that look at the surface
+};
+
+/// How a residual follows the surface that it looks at: it changes by the sum of per_corner.col(k) . motion of corner k.
+struct SurfaceSlope {
+  Index triangle = -1;  ///< -1: it meets none
+  Mat3 per_corner = Mat3::Zero();
 };
 
 /// Rows of one term: residual = (observed - predicted) / sigma, jacobian = d residual / d unknowns.
 struct TermRows {
-  std::vector<int> unknowns;  ///< columns of the jacobian
+  std::vector<int> unknowns;  ///< columns of the jacobian; where `surface` is filled the prediction's come first
   MatrixX jacobian;
   VectorX residual;
   bool robust = false;        ///< may hold outliers: goes through the robust loss
@@ -45,6 +52,7 @@ struct TermRows {
   VectorX sigma;              ///< a row
   Points observed_m;          ///< at the fitted pose; empty for what is not a point
   VectorX facing;             ///< |cosine| between ray and surface normal, 0 where the ray passes by; empty: not along rays
+  std::vector<SurfaceSlope> surface;  ///< a row; empty: not asked for, or not the term's way
   std::vector<int> cell;      ///< group of neighbours whose errors may be correlated (image or space cell); empty = independent
 };
 

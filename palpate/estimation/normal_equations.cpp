@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/normal_equations.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::estimation {
+
+double tukey_rho(double residual, double cut) {
+  const double t = residual / cut;
+  if (!(std::abs(t) < 1)) return cut * cut / 6;
+  const double keep = 1 - t * t;
+  return cut * cut / 6 * (1 - keep * keep * keep);
+}
+
+double tukey_weight(double residual, double cut) {
+  const double t = residual / cut;
+  if (!(std::abs(t) < 1)) return 0;
+  const double keep = 1 - t * t;
+  return keep * keep;
+}
+
+double tukey_slope(double residual, double cut) {
+  const double t2 = residual * residual / (cut * cut);
+  return t2 < 1 ? (1 - t2) * (1 - 5 * t2) : 0;
+}
+
+double tukey_information_factor(double cut) {
+  double weight = 0, psi_squared = 0, psi_slope = 0;
+  constexpr int steps = 4000;
+  for (int i = 0; i < steps; ++i) {
+    const double r = cut * (2 * (i + 0.5) / steps - 1);
+    const double density = std::exp(-0.5 * r * r) / std::sqrt(2 * EIGEN_PI) * 2 * cut / steps;
+    const double w = tukey_weight(r, cut);
+    weight += density * w;
+    psi_squared += density * w * w * r * r;
+    psi_slope += density * tukey_slope(r, cut);
+  }
+  return psi_slope * psi_slope / (psi_squared * weight);
+}
+
+Evaluation Evaluation::nothing(Index unknowns) {
+  Evaluation out;
+  out.hessian = MatrixX::Zero(unknowns, unknowns);
+  out.robust_hessian = MatrixX::Zero(unknowns, unknowns);
+  out.curvature = MatrixX::Zero(unknowns, unknowns);
+  out.gradient = VectorX::Zero(unknowns);
+  return out;
+}
+
+namespace {
+
+/// What each square counts before the loss.
+double relevance(const TermRows& rows, const Loss& loss) {
+  const double of_neighbours = rows.cell.empty() ? 1 : loss.surface_weight;
+  return rows.robust ? of_neighbours / (loss.widening * loss.widening) : of_neighbours;
+}
+
+}  // namespace
+
+VectorX row_weights(const TermRows& rows, const Loss& loss) {
+  VectorX weight = VectorX::Constant(rows.residual.size(), relevance(rows, loss));
+  for (Index i = 0; rows.robust && i < weight.size(); ++i) weight(i) *= tukey_weight(rows.residual(i), loss.tukey);
+  return weight;
+}
+
+double mean_bend(const TermRows& rows, const Loss& loss) {
+  if (!rows.robust) return 1;
+  double slopes = 0, weights = 0;
+  for (Index i = 0; i < rows.residual.size(); ++i) {
+    slopes += tukey_slope(rows.residual(i), loss.tukey);
+    weights += tukey_weight(rows.residual(i), loss.tukey);
+  }
+  constexpr double least = 0.3;  // where most rows are outliers the loss bends the other way: no step leads there
+  return weights > 0 ? std::max(slopes / weights, least) : 1;
+}
+
+double loss_of(const TermRows& rows, const Loss& loss) {
+  double sum = 0;
+  for (Index i = 0; i < rows.residual.size(); ++i)
+    sum += rows.robust ? tukey_rho(rows.residual(i), loss.tukey) : 0.5 * rows.residual(i) * rows.residual(i);
+  return relevance(rows, loss) * sum;
+}
+
+void add_rows(const TermRows& rows, const Loss& loss, const std::vector<int>& places, Evaluation& out) {
+  const double cost = loss_of(rows, loss);
+  (rows.robust ? out.robust_cost : out.cost) += cost;
+  const double bend = mean_bend(rows, loss);
+  const VectorX weight = row_weights(rows, loss);
+  const VectorX finite = (weight.array() == 0).select(0, rows.residual);
+  const MatrixX weighted = weight.asDiagonal() * rows.jacobian;
+  const MatrixX block = rows.jacobian.transpose() * weighted;
+  const VectorX slope = weighted.transpose() * finite;
+  for (std::size_t a = 0; a < places.size(); ++a) {
+    out.gradient(places[a]) += slope(static_cast<Index>(a));
+    for (std::size_t b = 0; b < places.size(); ++b) {
+      const double entry = block(static_cast<Index>(a), static_cast<Index>(b));
+      out.hessian(places[a], places[b]) += entry;
+      out.curvature(places[a], places[b]) += bend * entry;
+      if (rows.robust) out.robust_hessian(places[a], places[b]) += entry;
+    }
+  }
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// What was evaluated before, used again nearby.
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/estimation/objective.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr std::size_t places_kept = 16;  // a step: the optimum, and those of a search over nu
+
+/// Sorted, each once.
+void tidy(std::vector<int>& unknowns) {
+  std::sort(unknowns.begin(), unknowns.end());
+  unknowns.erase(std::unique(unknowns.begin(), unknowns.end()), unknowns.end());
+}
+
+std::vector<int> places_in(const std::vector<int>& sorted, const std::vector<int>& unknowns) {
+  std::vector<int> places;
+  for (int unknown : unknowns)
+    places.push_back(static_cast<int>(std::lower_bound(sorted.begin(), sorted.end(), unknown) - sorted.begin()));
+  return places;
+}
+
+}  // namespace
+
+/// Puts the nearest place that is near enough at the end of what is kept; false: there is none.
+bool Objective::find_kept(std::size_t s, const VectorX& unknowns, const Loss& loss) {
+  KeptPlaces& places = kept_[s];
+  auto nearest = places.end();
+  double least = reuse_ * reuse_;
+  for (auto kept = places.begin(); kept != places.end(); ++kept) {
+    if (!kept->loss.weighs_like(loss) || kept->loss.rays_of(s) != loss.rays_of(s) || (rows_wanted_ && kept->rows.empty())) continue;
+    const VectorX change = unknowns(kept->unknowns) - kept->at;
+    const double moved = change.dot(kept->normal.hessian * change);
+    if (moved <= least) {
+      least = moved;
+      nearest = kept;
+    }
+  }
+  if (nearest == places.end()) return false;
+  std::rotate(nearest, nearest + 1, places.end());
+  return true;
+}
+
+void Objective::keep(std::size_t s, const VectorX& unknowns, const Loss& loss) {
+  KeptPlaces& places = kept_[s];
+  if (places.size() == places_kept) {  // the one that was of no use for longest goes, the last one with rows stays
+    places.erase(std::find_if(places.begin(), places.end(), [](const KeptStep& p) { return p.rows.empty(); }));
+  }
+  if (rows_wanted_)
+    for (KeptStep& other : places) other.rows.clear();
+  KeptStep kept;
+  for (const TermRows& rows : rows_[s]) kept.unknowns.insert(kept.unknowns.end(), rows.unknowns.begin(), rows.unknowns.end());
+  tidy(kept.unknowns);
+  kept.at = unknowns(kept.unknowns);
+  kept.normal = Evaluation::nothing(static_cast<Index>(kept.unknowns.size()));
+  kept.loss = loss;
+  for (const TermRows& rows : rows_[s]) add_rows(rows, loss, places_in(kept.unknowns, rows.unknowns), kept.normal);
+  if (rows_wanted_) kept.rows = rows_[s];
+  places.push_back(std::move(kept));
+}
+
+Objective::StepNormal Objective::moved_along(const KeptStep& kept, const VectorX& unknowns) const {
+  StepNormal out = kept;
+  const VectorX change = unknowns(kept.unknowns) - kept.at, bent = kept.normal.curvature * change;
+  const double gain = kept.normal.gradient.dot(change) + 0.5 * change.dot(bent);
+  (kept.normal.robust_cost > 0 ? out.normal.robust_cost : out.normal.cost) += gain;
+  out.normal.gradient += bent;
+  return out;
+}
+
+Objective::Anchor Objective::anchor_of(const std::vector<TermRows>& rows, const StepPrediction& there, const VectorX& unknowns,
+                                       const Loss& loss) const {
+  Anchor anchor;
+  anchor.loss = loss;
+  anchor.terms.resize(rows.size());
+  for (std::size_t t = 0; t < rows.size(); ++t)
+    if (!rows[t].surface.empty()) anchor.terms[t].emplace(*pattern_, rows[t], loss, there, unknowns);
+  return anchor;
+}
+
+Objective::StepNormal Objective::follow(std::size_t s, const VectorX& unknowns, const Loss& loss) {
+  const StepPrediction& here = predictions_[s];
+  Anchor& anchor = anchors_[s];
+  double moved = std::numeric_limits<double>::infinity();  // in standard deviations of a point
+  if (!anchor.terms.empty() && anchor.loss.weighs_like(loss)) {
+    moved = 0;
+    for (std::size_t t = 0; t < anchor.terms.size(); ++t)
+      if (anchor.terms[t]) moved = std::max(moved, anchor.terms[t]->moved_m(here, unknowns, unknowns_) / terms_[s][t]->typical_sigma());
+  }
+  const bool same_rays = anchor.loss.rays_of(s) == loss.rays_of(s);
+  if (moved == 0 && !same_rays && anchor.loss.rays_of(s) == nullptr) {  // a choice among what was cast
+    for (std::size_t t = 0; t < rows_[s].size(); ++t) {
+      const std::vector<char>& chosen = (*loss.rays_of(s))[t];
+      for (std::size_t i = 0; i < chosen.size(); ++i)
+        if (chosen[i] == 0) rows_[s][t].residual(static_cast<Index>(i)) = std::numeric_limits<double>::infinity();
+    }
+    anchor = anchor_of(rows_[s], here, unknowns, loss);
+  } else if (!same_rays || !(moved <= 0.5 * reuse_ * anchor.patience)) {
+    ++steps_evaluated_;
+    std::vector<TermRows> rows = rows_of(s, here, unknowns, loss, true);
+    Anchor fresh = anchor_of(rows, here, unknowns, loss);
+    if (!rows_wanted_) return normal_around(fresh, s, unknowns, loss);
+    // Rays that change triangles send the optimum to and fro: each time it takes a longer way to ask them again.
+    fresh.patience = anchor.terms.empty() ? 1 : 2 * anchor.patience;
+    anchor = std::move(fresh);
+    rows_[s] = std::move(rows);
+  }
+  if (anchor.last.size() != unknowns.size() || anchor.last != unknowns) {
+    anchor.said = normal_around(anchor, s, unknowns, loss);
+    anchor.last = unknowns;
+  }
+  return anchor.said;
+}
+
+Objective::StepNormal Objective::normal_around(const Anchor& anchor, std::size_t s, const VectorX& unknowns, const Loss& loss) {
+  const StepPrediction& here = predictions_[s];
+  std::vector<std::vector<int>> involved(anchor.terms.size());
+  std::vector<TermRows> asked(anchor.terms.size());
+  StepNormal out;
+  for (std::size_t t = 0; t < anchor.terms.size(); ++t) {
+    if (anchor.terms[t]) {
+      involved[t] = here.columns;
+      involved[t].insert(involved[t].end(), anchor.terms[t]->own().begin(), anchor.terms[t]->own().end());
+    } else {
+      asked[t] = terms_[s][t]->rows(here, unknowns, {loss.along_rays});
+      involved[t] = asked[t].unknowns;
+    }
+    out.unknowns.insert(out.unknowns.end(), involved[t].begin(), involved[t].end());
+  }
+  tidy(out.unknowns);
+  out.normal = Evaluation::nothing(static_cast<Index>(out.unknowns.size()));
+  for (std::size_t t = 0; t < anchor.terms.size(); ++t) {
+    const std::vector<int> places = places_in(out.unknowns, involved[t]);
+    if (anchor.terms[t]) {
+      anchor.terms[t]->add_to(here, unknowns, places, out.normal);
+    } else {
+      add_rows(asked[t], loss, places, out.normal);
+      if (rows_wanted_) rows_[s][t] = std::move(asked[t]);
+    }
+  }
+  return out;
+}
+
+Evaluation Objective::sum(const std::vector<StepNormal>& steps, const VectorX& unknowns) const {
+  Evaluation out = Evaluation::nothing(unknowns_.size());
+  for (const StepNormal& step : steps) {
+    out.cost += step.normal.cost + step.normal.robust_cost;
+    out.robust_cost += step.normal.robust_cost;
+    for (std::size_t a = 0; a < step.unknowns.size(); ++a) {
+      const Index row = static_cast<Index>(a);
+      out.gradient(step.unknowns[a]) += step.normal.gradient(row);
+      for (std::size_t b = 0; b < step.unknowns.size(); ++b) {
+        const Index column = static_cast<Index>(b);
+        out.hessian(step.unknowns[a], step.unknowns[b]) += step.normal.hessian(row, column);
+        out.curvature(step.unknowns[a], step.unknowns[b]) += step.normal.curvature(row, column);
+        out.robust_hessian(step.unknowns[a], step.unknowns[b]) += step.normal.robust_hessian(row, column);
+      }
+    }
+  }
+  add_priors(unknowns, out);
+  return out;
+}
+
+Objective::Kept Objective::take_kept() {
+  Kept out{std::move(kept_), std::move(anchors_), {}, pattern_};
+  if (!out.anchors.empty()) out.rows = std::move(rows_);
+  kept_.clear();
+  anchors_.clear();
+  rows_.clear();
+  return out;
+}
+
+void Objective::adopt(Kept kept, const std::vector<int>& moved) {
+  const auto renumber = [&](std::vector<int>& unknowns) {
+    for (int& unknown : unknowns) unknown = moved[static_cast<std::size_t>(unknown)];
+    return std::none_of(unknowns.begin(), unknowns.end(), [](int unknown) { return unknown < 0; });
+  };
+  const std::size_t steps = model_.step_count();
+  kept_.assign(steps, {});
+  for (std::size_t s = 0; s < std::min(kept.places.size(), steps); ++s) {
+    for (KeptStep& place : kept.places[s]) {
+      bool whole = renumber(place.unknowns);
+      for (TermRows& rows : place.rows) whole = renumber(rows.unknowns) && whole;
+      if (whole) kept_[s].push_back(std::move(place));
+    }
+  }
+  if (!model_.superposes()) return;
+  pattern_ = std::move(kept.pattern);
+  anchors_.assign(steps, {});
+  rows_.assign(steps, {});
+  for (std::size_t s = 0; s < std::min(kept.anchors.size(), steps); ++s) {
+    bool whole = kept.anchors[s].terms.size() == terms_[s].size() && kept.rows[s].size() == terms_[s].size();
+    for (auto& term : kept.anchors[s].terms) whole = (!term || term->renumber(moved)) && whole;
+    for (TermRows& rows : kept.rows[s]) whole = renumber(rows.unknowns) && whole;
+    if (!whole) continue;
+    anchors_[s] = std::move(kept.anchors[s]);
+    anchors_[s].patience = 1;
+    anchors_[s].last.resize(0);
+    rows_[s] = std::move(kept.rows[s]);
+  }
+}
+
+}  // namespace palpate::estimation

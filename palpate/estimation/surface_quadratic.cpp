@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/surface_quadratic.hpp"
+
+#include <algorithm>
+#include <map>
+
+namespace palpate::estimation {
+
+SurfacePattern::SurfacePattern(const TriMesh& surface)
+    : triangles(surface.triangles), vertices(static_cast<Index>(surface.vertices_m.rows())) {
+  std::map<std::array<Index, 2>, std::size_t> number;
+  edges_of.resize(static_cast<std::size_t>(triangles.rows()));
+  for (Index t = 0; t < triangles.rows(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const Index a = triangles(t, k), b = triangles(t, (k + 1) % 3);
+      const auto [at, fresh] = number.try_emplace({std::min(a, b), std::max(a, b)}, edges.size());
+      if (fresh) edges.push_back(at->first);
+      edges_of[static_cast<std::size_t>(t)][static_cast<std::size_t>(k)] = at->second;
+    }
+  }
+}
+
+namespace {
+
+/// Rows that count, those of a triangle one after another.
+std::vector<Index> rows_by_triangle(const TermRows& rows, const VectorX& weight, Index triangles) {
+  std::vector<std::size_t> first(static_cast<std::size_t>(triangles) + 1, 0);
+  const auto counts = [&](Index i) { return weight(i) != 0 && rows.surface[static_cast<std::size_t>(i)].triangle >= 0; };
+  for (Index i = 0; i < weight.size(); ++i)
+    if (counts(i)) ++first[static_cast<std::size_t>(rows.surface[static_cast<std::size_t>(i)].triangle) + 1];
+  for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
+  std::vector<Index> order(first.back());
+  for (Index i = 0; i < weight.size(); ++i)
+    if (counts(i)) order[first[static_cast<std::size_t>(rows.surface[static_cast<std::size_t>(i)].triangle)]++] = i;
+  return order;
+}
+
+}  // namespace
+
+struct SurfaceQuadratic::RowsByTriangle {
+  const SurfacePattern& pattern;
+  const TermRows& rows;
+  const VectorX& weight;
+  Index own_first, own_count;        ///< columns of the jacobian
+  const std::vector<Index>&vertex, &edge;  ///< the pattern's among those seen
+  std::vector<Index> order;
+};
+
+SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows& rows, const Loss& loss,
+                                   const StepPrediction& there, const VectorX& unknowns)
+    : robust_(rows.robust), cost_(loss_of(rows, loss)), bend_(mean_bend(rows, loss)) {
+  const Index first = static_cast<Index>(there.columns.size());
+  own_.assign(rows.unknowns.begin() + first, rows.unknowns.end());
+  const Index count = static_cast<Index>(own_.size());
+  own_at_ = unknowns(own_);
+  radius_m_ = 0.5 * (there.surface_m.colwise().maxCoeff() - there.surface_m.colwise().minCoeff()).norm();
+
+  const VectorX weight = row_weights(rows, loss);
+  constexpr Index unseen = -1;
+  std::vector<Index> vertex(static_cast<std::size_t>(pattern.vertices), unseen), edge(pattern.edges.size(), unseen);
+  for (Index i = 0; i < weight.size(); ++i) {
+    const Index triangle = rows.surface[static_cast<std::size_t>(i)].triangle;
+    if (weight(i) == 0 || triangle < 0) continue;
+    for (int k = 0; k < 3; ++k) {
+      vertex[static_cast<std::size_t>(pattern.triangles(triangle, k))] = 0;
+      edge[pattern.edges_of[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)]] = 0;
+    }
+  }
+  for (std::size_t v = 0; v < vertex.size(); ++v) {
+    if (vertex[v] == unseen) continue;
+    vertex[v] = static_cast<Index>(seen_.size());
+    seen_.push_back(static_cast<Index>(v));
+  }
+  for (std::size_t e = 0; e < edge.size(); ++e) {
+    if (edge[e] == unseen) continue;
+    edge[e] = static_cast<Index>(edges_.size());
+    const auto [low, high] = pattern.edges[e];
+    edges_.push_back({vertex[static_cast<std::size_t>(low)], vertex[static_cast<std::size_t>(high)]});
+  }
+  const Index size = static_cast<Index>(seen_.size());
+  seen_m_ = there.markers_m()(seen_, Eigen::all);
+  seen_there_m_ = there.surface_m(seen_, Eigen::all);
+  vertex_blocks_.assign(seen_.size(), Mat3::Zero());
+  edge_blocks_.assign(edges_.size(), Mat3::Zero());
+  cross_ = RowMajor::Zero(3 * size, count);
+  own_block_ = MatrixX::Zero(count, count);
+  surface_slope_ = VectorX::Zero(3 * size);
+  own_slope_ = VectorX::Zero(count);
+  const RowsByTriangle seen{pattern, rows, weight, first, count, vertex, edge, rows_by_triangle(rows, weight, pattern.triangles.rows())};
+  constexpr int narrow = 16, wide = 24;  // whole vector registers: three corners, own unknowns, residual
+  if (10 + count <= narrow) {
+    gather<narrow>(seen);
+  } else if (10 + count <= wide) {
+    gather<wide>(seen);
+  } else {
+    gather<Eigen::Dynamic>(seen);
+  }
+}
+
+template <int width>
+void SurfaceQuadratic::gather(const RowsByTriangle& seen) {
+  using Square = Eigen::Matrix<double, width, width>;
+  using Row = Eigen::Matrix<double, width, 1>;
+  const Index count = seen.own_count, size = width == Eigen::Dynamic ? 10 + count : width;
+  Square gram(size, size);
+  Row row = Row::Zero(size);
+  for (std::size_t from = 0; from < seen.order.size();) {
+    const Index triangle = seen.rows.surface[static_cast<std::size_t>(seen.order[from])].triangle;
+    gram.setZero();
+    std::size_t to = from;
+    for (; to < seen.order.size(); ++to) {
+      const Index i = seen.order[to];
+      const SurfaceSlope& slope = seen.rows.surface[static_cast<std::size_t>(i)];
+      if (slope.triangle != triangle) break;
+      for (int k = 0; k < 3; ++k) row.template segment<3>(3 * k) = slope.per_corner.col(k);
+      row.segment(9, count) = seen.rows.jacobian.row(i).segment(seen.own_first, count).transpose();
+      row(9 + count) = seen.rows.residual(i);
+      gram.noalias() += (seen.weight(i) * row) * row.transpose();
+    }
+    from = to;
+    for (int k = 0; k < 3; ++k) {
+      const int next = (k + 1) % 3;
+      const Index v = seen.pattern.triangles(triangle, k);
+      const Index at = seen.vertex[static_cast<std::size_t>(v)];
+      const bool upwards = v < seen.pattern.triangles(triangle, next);
+      const std::size_t edge = seen.pattern.edges_of[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)];
+      vertex_blocks_[static_cast<std::size_t>(at)] += gram.template block<3, 3>(3 * k, 3 * k);
+      edge_blocks_[static_cast<std::size_t>(seen.edge[edge])] += gram.template block<3, 3>(3 * (upwards ? k : next), 3 * (upwards ? next : k));
+      cross_.template middleRows<3>(3 * at) += gram.block(3 * k, 9, 3, count);
+      surface_slope_.template segment<3>(3 * at) += gram.template block<3, 1>(3 * k, 9 + count);
+    }
+    own_block_ += gram.block(9, 9, count, count);
+    own_slope_ += gram.col(9 + count).segment(9, count);
+  }
+}
+
+bool SurfaceQuadratic::renumber(const std::vector<int>& moved) {
+  for (int& unknown : own_) unknown = moved[static_cast<std::size_t>(unknown)];
+  return std::none_of(own_.begin(), own_.end(), [](int unknown) { return unknown < 0; });
+}
+
+double SurfaceQuadratic::moved_m(const StepPrediction& there, const VectorX& unknowns, const Unknowns& list) const {
+  double of_frame_m = 0;
+  for (std::size_t k = 0; k < own_.size(); ++k) {
+    const double change = std::abs(unknowns(own_[k]) - own_at_(static_cast<Index>(k)));
+    const std::string& unit = list[own_[k]].unit;
+    of_frame_m += unit == "m" ? change : unit == "rad" ? radius_m_ * change : 0;
+  }
+  double furthest2_m2 = 0;
+  for (Index v = 0; v < seen_there_m_.rows(); ++v) {
+    const Vec3 now_m = there.surface_m.row(seen_[static_cast<std::size_t>(v)]);
+    furthest2_m2 = std::max(furthest2_m2, (now_m - seen_there_m_.row(v).transpose()).squaredNorm());
+  }
+  return std::sqrt(furthest2_m2) + of_frame_m;
+}
+
+template <int width>
+void SurfaceQuadratic::multiply(const RowMajor& columns, Index from, RowMajor& out) const {
+  using Strip = Eigen::Matrix<double, Eigen::Dynamic, width, Eigen::RowMajor>;
+  const Index used = std::min<Index>(width, static_cast<Index>(columns.cols()) - from);
+  Strip strip = Strip::Zero(columns.rows(), width), product(columns.rows(), width);
+  strip.leftCols(used) = columns.middleCols(from, used);
+  for (std::size_t v = 0; v < vertex_blocks_.size(); ++v) {
+    const Index row = 3 * static_cast<Index>(v);
+    product.template middleRows<3>(row).noalias() = vertex_blocks_[v] * strip.template middleRows<3>(row);
+  }
+  for (std::size_t e = 0; e < edge_blocks_.size(); ++e) {
+    const auto [low, high] = edges_[e];
+    product.template middleRows<3>(3 * low).noalias() += edge_blocks_[e] * strip.template middleRows<3>(3 * high);
+    product.template middleRows<3>(3 * high).noalias() += edge_blocks_[e].transpose() * strip.template middleRows<3>(3 * low);
+  }
+  out.middleCols(from, used) = product.leftCols(used);
+}
+
+void SurfaceQuadratic::add_to(const StepPrediction& there, const VectorX& unknowns, const std::vector<int>& places,
+                              Evaluation& out) const {
+  const Index columns = static_cast<Index>(there.columns.size()), count = static_cast<Index>(own_.size());
+  const Index size = static_cast<Index>(seen_.size());
+  // How the vertices follow the unknowns, and in the last column how far they have moved.
+  RowMajor follow(3 * size, columns + 1);
+  for (Index i = 0; i < size; ++i) {
+    const Index v = seen_[static_cast<std::size_t>(i)];
+    follow.block(3 * i, 0, 3, columns) = there.d_surface.middleRows<3>(3 * v);
+    follow.block<3, 1>(3 * i, columns) = (there.markers_m().row(v) - seen_m_.row(i)).transpose();
+  }
+  RowMajor bent(3 * size, columns + 1);
+  constexpr int narrow = 4, wide = 8;  // vector registers
+  for (Index from = 0; from <= columns;) {
+    const bool few = columns + 1 - from <= narrow;
+    few ? multiply<narrow>(follow, from, bent) : multiply<wide>(follow, from, bent);
+    from += few ? narrow : wide;
+  }
+  const VectorX own_moved = unknowns(own_) - own_at_;
+  const VectorX moved = follow.col(columns);
+  const VectorX turn = bent.col(columns) + cross_ * own_moved, own_turn = cross_.transpose() * moved + own_block_ * own_moved;
+
+  const double gain = surface_slope_.dot(moved) + own_slope_.dot(own_moved) + 0.5 * bend_ * (moved.dot(turn) + own_moved.dot(own_turn));
+  (robust_ ? out.robust_cost : out.cost) += cost_ + gain;
+  const auto followed = follow.leftCols(columns).transpose();
+  VectorX slope(columns + count);
+  slope << followed * (surface_slope_ + bend_ * turn), own_slope_ + bend_ * own_turn;
+  MatrixX block(slope.size(), slope.size());
+  block.topLeftCorner(columns, columns) = followed * bent.leftCols(columns);
+  block.topRightCorner(columns, count) = followed * cross_;
+  block.bottomLeftCorner(count, columns) = block.topRightCorner(columns, count).transpose();
+  block.bottomRightCorner(count, count) = own_block_;
+  for (std::size_t a = 0; a < places.size(); ++a) {
+    out.gradient(places[a]) += slope(static_cast<Index>(a));
+    for (std::size_t b = 0; b < places.size(); ++b) {
+      const double entry = block(static_cast<Index>(a), static_cast<Index>(b));
+      out.hessian(places[a], places[b]) += entry;
+      out.curvature(places[a], places[b]) += bend_ * entry;
+      if (robust_) out.robust_hessian(places[a], places[b]) += entry;
+    }
+  }
+}
+
+}  // namespace palpate::estimation

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the rows of a depth image or a cloud say, as a quadratic form of where the surface's vertices lie and of the term's own
+// unknowns. A residual changes with the three vertices of a triangle only, so the form is sparse: to ask it takes a few per cent
+// of what casting the rays again does, and it is right as long as rays meet the triangles that they met.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "palpate/estimation/normal_equations.hpp"
+#include "palpate/estimation/terms/term.hpp"
+
+namespace palpate::estimation {
+
+/// Which vertices of a surface are neighbours: where a quadratic form of their places has 3 x 3 blocks.
+struct SurfacePattern {
+  explicit SurfacePattern(const TriMesh& surface);
+  Triangles triangles;
+  Index vertices = 0;
+  std::vector<std::array<Index, 2>> edges;           ///< vertices, the lower one first
+  std::vector<std::array<std::size_t, 3>> edges_of;  ///< a triangle: between its corners 0 and 1, 1 and 2, 2 and 0
+};
+
+class SurfaceQuadratic {
+ public:
+  /// @param rows  of a term, made at `there` and `unknowns` with TermView::surface_slopes
+  SurfaceQuadratic(const SurfacePattern& pattern, const TermRows& rows, const Loss& loss, const StepPrediction& there,
+                   const VectorX& unknowns);
+
+  /// Unknowns of the term beside the prediction's columns: pose of the frame, offset of the camera, modes of the rest surface's error.
+  const std::vector<int>& own() const { return own_; }
+  /// Unknown k has the number moved[k] now. False: one is gone.
+  bool renumber(const std::vector<int>& moved);
+
+  /// How far a vertex or a point of the frame has moved at most since, m.
+  double moved_m(const StepPrediction& there, const VectorX& unknowns, const Unknowns& list) const;
+
+  /// Adds cost, slope and curvature at another prediction. @param places  where in `out` are: the prediction's columns, the own
+  /// unknowns
+  void add_to(const StepPrediction& there, const VectorX& unknowns, const std::vector<int>& places, Evaluation& out) const;
+
+ private:
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  struct RowsByTriangle;
+  template <int width>
+  void gather(const RowsByTriangle& seen);
+  /// Columns `from` to `from + width` of the blocks times `columns`; beyond the last one they count as zero.
+  template <int width>
+  void multiply(const RowMajor& columns, Index from, RowMajor& out) const;
+
+  std::vector<int> own_;
+  VectorX own_at_;
+  std::vector<Index> seen_;  ///< vertices that a row looks at: the only ones below
+  std::vector<std::array<Index, 2>> edges_;  ///< between two of them, the lower one first
+  Points seen_m_;       ///< without the rest surface's error, whose modes are unknowns of their own
+  Points seen_there_m_;  ///< with it
+  double radius_m_ = 0;
+  bool robust_ = false;
+  double cost_ = 0;
+  double bend_ = 1;  ///< curvature of the loss over the weights, on average: Tukey's bends less than its weights say
+  std::vector<Mat3> vertex_blocks_, edge_blocks_;
+  RowMajor cross_;  ///< 3 seen x own
+  MatrixX own_block_;
+  VectorX surface_slope_, own_slope_;
+};
+
+}  // namespace palpate::estimation
