@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <sstream>
+#include <tuple>
 #include <utility>
 
 #include "palpate/core/error.hpp"
@@ -245,8 +246,44 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
   return recording;
 }
 
+namespace {
+
+/// Names of the frames' cameras, told by their intrinsics: one that stands at a place, or one that is carried around. "" for a
+/// camera of one frame.
+std::vector<std::string> cameras_of(const std::vector<const DepthFrame*>& frames) {
+  const auto intrinsics = [](const DepthFrame& frame) {
+    const Camera& c = frame.camera;
+    return std::tie(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.distortion, c.distortion_coefficients);
+  };
+  const auto same_place = [&](const DepthFrame& a, const DepthFrame& b) {
+    return intrinsics(a) == intrinsics(b) && a.T_base_camera.matrix().isApprox(b.T_base_camera.matrix(), 1e-9);
+  };
+  std::vector<bool> stands;
+  for (const DepthFrame* one : frames)
+    stands.push_back(std::count_if(frames.begin(), frames.end(), [&](const DepthFrame* other) { return same_place(*one, *other); }) > 1);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    std::size_t first = frames.size(), count = 0;
+    for (std::size_t j = 0; j < frames.size(); ++j) {
+      const bool belongs = stands[i] ? same_place(*frames[i], *frames[j]) : !stands[j] && intrinsics(*frames[i]) == intrinsics(*frames[j]);
+      if (belongs && ++count == 1) first = j;
+    }
+    names.push_back(count > 1 ? std::to_string(first) : "");
+  }
+  return names;
+}
+
+}  // namespace
+
 estimation::Inputs observe(const Recording& recording, std::vector<Points>* masked_m) {
   estimation::Inputs inputs;
+  std::vector<const DepthFrame*> frames;
+  for (const auto& push : recording.pushes)
+    for (const auto& step : push.steps)
+      for (const auto& observation : step.observations)
+        if (const auto* frame = std::get_if<DepthFrame>(&observation)) frames.push_back(frame);
+  const std::vector<std::string> cameras = cameras_of(frames);
+  std::size_t frame_number = 0;
   const auto [low_m, high_m] = surroundings(recording);
   if (masked_m != nullptr) masked_m->clear();
   std::optional<sensing::RobotMask> robot;  // a robot that was recorded without shapes cannot be masked
@@ -265,7 +302,8 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
             masked_m->back() = sensing::masked_points(masked, low_m, high_m, masked_a_step);
           }
           terms.push_back(estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad,
-                                                     frame->noise.bias_std_m, sensing::lens_scatter(*frame)});
+                                                     frame->noise.bias_std_m, sensing::lens_scatter(*frame), cameras[frame_number++],
+                                                     frame->T_base_camera.linear()});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
           terms.push_back(*cloud);
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {

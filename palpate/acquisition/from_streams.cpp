@@ -192,7 +192,8 @@ class Assembly {
     push.travel_offset_std_m = plan.travel_offset_std_m;
     push.force_tare_std_n = plan.force_tare_std_n;
     Vec3 tare = Vec3::Zero();
-    if (plan_.tare != Tare::none) {
+    const bool touches = std::any_of(times.steps.begin(), times.steps.end(), [](const StepTime& at) { return at.loaded.value_or(true); });
+    if (plan_.tare != Tare::none && touches) {
       if (times.span == nullptr)
         throw Error("push '" + push.name +
                         "': no contact was found in the force, so that it cannot be tared before it; give wrench.tare",
@@ -202,10 +203,10 @@ class Assembly {
         push.force_tare_std_n =
             times.span->free_air_std_n / std::sqrt(double(std::max<std::size_t>(1, times.span->free_air_samples)));
     }
-    if (!plan.contact_m && times.span == nullptr)
+    if (!plan.contact_m && times.span == nullptr && touches)
       throw Error("push '" + push.name + "': no contact was found in the force; give its contact_m",
                   plan_.source + ": steps.pushes");
-    const Vec3 contact = plan.contact_m ? *plan.contact_m : times.span->contact_m;
+    const Vec3 contact = plan.contact_m ? *plan.contact_m : times.span != nullptr ? times.span->contact_m : Vec3::Zero();
     Vec3 direction = plan.direction ? *plan.direction : Vec3::Zero();
     double highest_n = 0, deepest_m = 0;
     std::size_t loaded_steps = 0;
@@ -217,7 +218,7 @@ class Assembly {
                              ": step left out");
         continue;
       }
-      if (direction.norm() == 0) {
+      if (direction.norm() == 0 && touches) {
         if (times.span != nullptr)
           direction = times.span->direction;
         else if (tip)

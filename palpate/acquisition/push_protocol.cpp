@@ -45,8 +45,7 @@ class PushRun {
   PushReport run() {
     try {
       look_at_rest();
-      approach();
-      const Stopped stop = rise();
+      const Stopped stop = press();
       report_.stop = stop.reason;
       report_.message = stop.message;
       if (stop.reason == StopReason::force_limit || stop.reason == StopReason::travel_limit) go_back_step_by_step();
@@ -123,6 +122,20 @@ class PushRun {
                                               " mm beyond the expected surface"};
   }
 
+  // A first touch of little more than noise may be lost to the arm's own repeat error: the approach then goes on.
+  Stopped press() {
+    constexpr int touches = 5;
+    for (int touch = 1;; ++touch) {
+      approach();
+      try {
+        return rise();
+      } catch (const Stopped& stop) {
+        const bool hardly_touched = !loaded_ && recorded_force_n_ == 0 && report_.highest_force_n < options_.force_step_n;
+        if (stop.reason != StopReason::contact_lost || !hardly_touched || touch == touches) throw;
+      }
+    }
+  }
+
   // The least force that still counts as contact: half of what found it.
   double lost_n() const {
     return 0.5 * std::max(options_.contact.threshold_n, options_.contact.noise_factor * free_air_std_n_);
@@ -196,6 +209,7 @@ class PushRun {
     const double sigma = std::sqrt(std::max(variance.mean(), free_air_std_n_ * free_air_std_n_ * 0.01) / count);
     history_.insert(history_.end(), samples.begin(), samples.end());
     if (!unloading) watch_out();
+    loaded_ = true;
     begin_where_the_force_began();
     report_.deepest_m = std::max(report_.deepest_m, travel(last));  // as it is recorded: a touch of one step tells a stiffness
     record(last, mean, sigma, unloading);
@@ -304,6 +318,7 @@ class PushRun {
   std::vector<sensing::ContactSample> history_;  // since contact
   double free_air_std_n_ = 0;
   std::vector<sensing::ContactSample> approach_;  // before contact was noticed
+  bool loaded_ = false;       // a step under load is recorded
   bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
   double at_m_ = 0;  // commanded, along the push from the expected contact
   int next_index_ = 0;

@@ -195,6 +195,11 @@ void Objective::adopt(Kept kept, const std::vector<int>& moved) {
     bool whole = kept.anchors[s].terms.size() == terms_[s].size() && kept.rows[s].size() == terms_[s].size();
     for (auto& term : kept.anchors[s].terms) whole = (!term || term->renumber(moved)) && whole;
     for (TermRows& rows : kept.rows[s]) whole = renumber(rows.unknowns) && whole;
+    for (std::size_t t = 0; whole && t < terms_[s].size(); ++t) {
+      if (!kept.anchors[s].terms[t]) continue;
+      const std::vector<int> own = terms_[s][t]->own_unknowns(), &then = kept.anchors[s].terms[t]->own();
+      whole = then.size() >= own.size() && std::equal(own.begin(), own.end(), then.begin());  // behind them come modes
+    }
     if (!whole) continue;
     anchors_[s] = std::move(kept.anchors[s]);
     anchors_[s].patience = 1;

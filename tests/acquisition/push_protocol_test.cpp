@@ -24,6 +24,7 @@ struct SpringRobot : Robot {
   double clock_s = 0, moved_s = -100, faded_n = 0;
   Pose tip = Pose(Eigen::Translation3d(0, 0, 0.3));
   bool stopped = false;
+  int errs_after_touch = 0;  // motions that end 2 mm short, from the first after the first touch on
   int images = 0;
   std::mt19937 generator{7};
 
@@ -47,8 +48,13 @@ struct SpringRobot : Robot {
   Motion move(const Pose& pose, double speed_m_s) override {
     if (surface_m - pose.translation().z() > refuses_at_m) return Motion::refused;
     const double before = spring();
+    const bool errs = before > 0 && errs_after_touch > 0;
     clock_s += (pose.translation() - tip.translation()).norm() / speed_m_s;
     tip = pose;
+    if (errs) {
+      tip.translation().z() += 0.002;
+      --errs_after_touch;
+    }
     moved_s = clock_s;
     faded_n = relaxation * std::max(0.0, spring() - before);
     return Motion::done;
@@ -188,6 +194,16 @@ TEST(PushProtocol, StopsWhenContactIsLost) {
   const Result result = run(robot);
   EXPECT_EQ(result.report.stop, StopReason::contact_lost);
   for (const Step& step : result.push.steps) EXPECT_LE(force(step), 0.012 * 400 + 0.5);
+}
+
+// The arm's repeat error took the first touch away again: seen once in a hundred pushes of the software lab.
+TEST(PushProtocol, GoesOnWhereTheFirstTouchWasHardlyOne) {
+  SpringRobot robot;
+  robot.errs_after_touch = 1;
+  const Result result = run(robot);
+  EXPECT_EQ(robot.errs_after_touch, 0);
+  EXPECT_EQ(result.report.stop, StopReason::force_limit) << result.report.message;
+  EXPECT_NEAR(result.report.contact_m.z(), 0.1, 1.5e-3);
 }
 
 TEST(PushProtocol, GivesUpWhereNothingIsTouched) {

@@ -62,6 +62,14 @@ TermInput rays_in_scattered_light(const Scene& scene) {
   return observation;
 }
 
+/// One of several frames of a camera.
+TermInput rays_of_a_camera(const Scene& scene) {
+  RayObservation observation = std::get<RayObservation>(rays(scene));
+  observation.camera = "0";
+  observation.R_base_camera = Eigen::AngleAxisd(2.1, Vec3(0.48, -0.6, 0.64)).toRotationMatrix();
+  return observation;
+}
+
 TermInput markers(const Scene&) {
   Markers markers;
   markers.names = {"a", "b", "hidden"};
@@ -103,6 +111,8 @@ const std::vector<Case> cases{
     {"rays_tip", rays, 0, true},
     {"rays_as_points_tip", rays, 0, false},
     {"rays_plate", rays, 2, true},
+    {"rays_of_a_camera_tip", rays_of_a_camera, 0, true},
+    {"rays_of_a_camera_as_points_plate", rays_of_a_camera, 2, false},
     {"rays_in_scattered_light_tip", rays_in_scattered_light, 0, true},
     {"rays_in_scattered_light_plate", rays_in_scattered_light, 2, true},
     {"cloud_tip", cloud, 0, true},

@@ -76,6 +76,23 @@ TEST(BagWrite, ComesBackAsItWas) {
   }
 }
 
+TEST(BagWrite, APushThatTouchedNothingComesBackAsOne) {
+  const TemporaryFolder folder("bag_write");
+  Recording recording = made_up();
+  for (Step& step : recording.pushes[1].steps) {
+    step.loads.clear();
+    std::erase_if(step.observations, [](const Observation& one) { return std::holds_alternative<ToolTravel>(one); });
+  }
+  write_bag(recording, folder.path() / "bag");
+  const Recording back = read_back(folder.path() / "bag");
+  ASSERT_EQ(back.pushes.size(), 2u);
+  ASSERT_EQ(back.pushes[1].steps.size(), recording.pushes[1].steps.size());
+  for (const Step& step : back.pushes[1].steps) {
+    EXPECT_TRUE(step.loads.empty());
+    EXPECT_NE(observation<DepthFrame>(step), nullptr);
+  }
+}
+
 TEST(BagWrite, WhatATopicCannotSayIsRefused) {
   const TemporaryFolder folder("bag_refused");
   Recording imposed = made_up();

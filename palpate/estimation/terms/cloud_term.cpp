@@ -38,7 +38,7 @@ class CloudTerm : public Term {
     const Index count = static_cast<Index>(predicted.columns.size());
     TermRows rows;
     rows.unknowns = predicted.columns;
-    for (int k = 0; pose_ >= 0 && k < 6; ++k) rows.unknowns.push_back(pose_ + k);
+    for (int unknown : own_unknowns()) rows.unknowns.push_back(unknown);
     const FieldColumns field(predicted);
     field.append_unknowns(rows.unknowns);
     rows.jacobian.setZero(points_m_.rows(), static_cast<Index>(rows.unknowns.size()));
@@ -74,6 +74,11 @@ class CloudTerm : public Term {
         rows.surface[static_cast<std::size_t>(i)] = {hit.triangle, -normal / sigma_m_(i) * hit.barycentric.transpose()};
     }
     return rows;
+  }
+  std::vector<int> own_unknowns() const override {
+    std::vector<int> own;
+    for (int k = 0; pose_ >= 0 && k < 6; ++k) own.push_back(pose_ + k);
+    return own;
   }
   double typical_sigma() const override { return typical_; }
 

@@ -23,33 +23,35 @@ constexpr double grazing_cosine = 0.17;  // beyond 80 degrees a depth says littl
 
 class RayTerm : public Term {
  public:
-  RayTerm(const RayObservation& observation, std::shared_ptr<const geometry::TriangleTree> rest, int pose, int bias, int scatter)
+  RayTerm(const RayObservation& observation, std::shared_ptr<const geometry::TriangleTree> rest, int pose, int camera, int bias, int scatter)
       : rays_(observation.rays),
         lens_(observation.scatter.value_or(LensScatter{})),
+        R_base_camera_(observation.R_base_camera),
         pose_(pose),
+        camera_(camera),
         bias_(bias),
         scatter_(scatter),
         rest_tree_(std::move(rest)),
         rest_(rest_tree_->mesh()),
         hints_(static_cast<std::size_t>(rays_.range_m.size()), -1) {
+    centre_m_ = rest_.vertices_m.colwise().mean();
     for (Index i = 0; i < rays_.range_m.size(); ++i) pivot_m_ += point(i) / static_cast<double>(rays_.range_m.size());
     typical_ = rays_.sigma_m.mean();
   }
 
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const override {
     geometry::TriangleTree& tree = tree_at(predicted.surface_m);
-    const RigidMap frame = frame_pose(unknowns, pose_, pivot_m_);
+    const RigidMap frame = frame_pose(unknowns, pose_, pivot_m_), camera = camera_pose(unknowns);
     const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
     const Index count = static_cast<Index>(predicted.columns.size());
     const Index pose_column = count;
-    const Index bias_column = count + (pose_ >= 0 ? 6 : 0);
+    const Index camera_column = pose_column + (pose_ >= 0 ? 6 : 0);
+    const Index bias_column = camera_column + (camera_ >= 0 ? 6 : 0);
     const Index scatter_column = bias_column + (bias_ >= 0 ? 1 : 0);
     const double share = scatter_ >= 0 ? unknowns(scatter_) : 0;
     TermRows rows;
     rows.unknowns = predicted.columns;
-    for (int k = 0; pose_ >= 0 && k < 6; ++k) rows.unknowns.push_back(pose_ + k);
-    if (bias_ >= 0) rows.unknowns.push_back(bias_);
-    if (scatter_ >= 0) rows.unknowns.push_back(scatter_);
+    for (int unknown : own_unknowns()) rows.unknowns.push_back(unknown);
     const FieldColumns field(predicted);
     field.append_unknowns(rows.unknowns);
     rows.jacobian = MatrixX::Zero(rays_.range_m.size(), static_cast<Index>(rows.unknowns.size()));
@@ -69,8 +71,8 @@ class RayTerm : public Term {
       rows.cell[static_cast<std::size_t>(i)] = cell(i);
       // The measured point, with the sensor's common offset taken out, where the corrected camera pose puts it.
       const Vec3 measured = point(i) - bias_m * Vec3(rays_.directions.row(i));
-      const Vec3 observed = frame.apply(measured);
-      const Vec3 direction = frame.rotation() * rays_.directions.row(i).transpose();
+      const Vec3 observed = frame.apply(camera.apply(measured));
+      const Vec3 direction = frame.rotation() * (camera.rotation() * rays_.directions.row(i).transpose());
       rows.observed_m.row(i) = observed;
 
       Index triangle = -1;
@@ -85,7 +87,7 @@ class RayTerm : public Term {
         continue;
       }
       if (view.along_rays) {
-        if (const auto hit = tree.cast(frame.apply(rays_.origins_m.row(i)), direction, endless, hint)) {
+        if (const auto hit = tree.cast(frame.apply(camera.apply(rays_.origins_m.row(i))), direction, endless, hint)) {
           hint = hit->triangle;
           const Vec3 normal = face_normal(predicted.surface_m, hit->triangle);
           const double cosine = normal.dot(direction);
@@ -140,14 +142,37 @@ class RayTerm : public Term {
       }
       field.subtract(rows.jacobian, i, rest_.triangles.row(triangle), barycentric, gradient / sigma_m);
       if (pose_ >= 0) {
-        rows.jacobian.block<1, 6>(i, pose_column) = frame.slope(gradient / sigma_m, lever);
+        rows.jacobian.block<1, 6>(i, pose_column) = frame.slope(gradient / sigma_m, camera.apply(lever));
+      }
+      if (camera_ >= 0) {
+        const auto slope_of_base = camera.slope(frame.rotation().transpose() * gradient / sigma_m, lever);
+        rows.jacobian.block<1, 3>(i, camera_column) = slope_of_base.head<3>() * R_base_camera_;
+        rows.jacobian.block<1, 3>(i, camera_column + 3) = slope_of_base.tail<3>() * R_base_camera_;
       }
     }
     return rows;
   }
+  std::vector<int> own_unknowns() const override {
+    std::vector<int> own;
+    for (int k = 0; pose_ >= 0 && k < 6; ++k) own.push_back(pose_ + k);
+    for (int k = 0; camera_ >= 0 && k < 6; ++k) own.push_back(camera_ + k);
+    if (bias_ >= 0) own.push_back(bias_);
+    if (scatter_ >= 0) own.push_back(scatter_);
+    return own;
+  }
   double typical_sigma() const override { return typical_; }
 
  private:
+  /// What every frame of the camera errs by: a motion along and about the camera's axes, turning about the object's middle.
+  RigidMap camera_pose(const VectorX& unknowns) const {
+    RigidOffset offset;
+    offset.pivot_m = centre_m_;
+    if (camera_ >= 0) {
+      offset.translation_m = R_base_camera_ * unknowns.segment<3>(camera_);
+      offset.rotation_rad = R_base_camera_ * unknowns.segment<3>(camera_ + 3);
+    }
+    return RigidMap(offset);
+  }
   geometry::TriangleTree& tree_at(const Points& surface_m) const {
     if (!tree_) tree_.emplace(*rest_tree_);
     tree_->refit(surface_m);
@@ -188,8 +213,9 @@ class RayTerm : public Term {
 
   RayCloud rays_;
   LensScatter lens_;
-  int pose_, bias_, scatter_;
-  Vec3 pivot_m_ = Vec3::Zero();
+  Mat3 R_base_camera_;
+  int pose_, camera_, bias_, scatter_;
+  Vec3 pivot_m_ = Vec3::Zero(), centre_m_;
   double typical_ = 0;
   std::shared_ptr<const geometry::TriangleTree> rest_tree_;
   const TriMesh& rest_;
@@ -217,7 +243,8 @@ std::unique_ptr<Term> make_ray_term(const RayObservation& observation, const Ter
     scatter = context.shared[name];
   }
   const int pose = add_frame_pose(context, observation.pose_std_m, observation.pose_std_rad);
-  return std::make_unique<RayTerm>(observation, context.model.rest_tree(), pose, bias, scatter);
+  const int camera = add_camera_pose(context, observation.camera, observation.pose_std_m, observation.pose_std_rad);
+  return std::make_unique<RayTerm>(observation, context.model.rest_tree(), pose, camera, bias, scatter);
 }
 
 }  // namespace palpate::estimation

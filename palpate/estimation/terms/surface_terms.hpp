@@ -19,6 +19,8 @@ std::string step_suffix(const TermContext& context);
 
 /// Six unknowns of a frame's pose, or -1 when it is exactly known.
 int add_frame_pose(const TermContext& context, double pose_std_m, double pose_std_rad);
+/// Six unknowns of what all frames of a camera err by, or -1 when their pose is exactly known.
+int add_camera_pose(const TermContext& context, const std::string& camera, double pose_std_m, double pose_std_rad);
 
 /// The frame's pose at these unknowns, ready for many points. @param pose  of add_frame_pose
 RigidMap frame_pose(const VectorX& unknowns, int pose, const Vec3& pivot_m);

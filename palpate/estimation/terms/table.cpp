@@ -43,17 +43,29 @@ std::string step_suffix(const TermContext& context) {
   return "[" + context.model.push(context.step).name + ":" + std::to_string(context.model.index(context.step).step) + "]";
 }
 
+namespace {
+
+int add_pose(Unknowns& unknowns, const std::string& what, const std::string& suffix, double pose_std_m, double pose_std_rad) {
+  const int first = unknowns.size();
+  for (const char* axis : {"_x", "_y", "_z"})
+    unknowns.add({what + axis + suffix, "m", 0, pose_std_m, -1, 1, !(pose_std_m > 0)});
+  for (const char* axis : {"_x", "_y", "_z"})
+    unknowns.add({what + "_rotation" + axis + suffix, "rad", 0, pose_std_rad, -1, 1, !(pose_std_rad > 0)});
+  return first;
+}
+
+}  // namespace
+
 int add_frame_pose(const TermContext& context, double pose_std_m, double pose_std_rad) {
   if (!(pose_std_m > 0) && !(pose_std_rad > 0)) return -1;
-  const std::string suffix = step_suffix(context);
-  const int first = context.unknowns.size();
-  for (const char* axis : {"_x", "_y", "_z"}) {
-    context.unknowns.add({"frame" + std::string(axis) + suffix, "m", 0, pose_std_m, -1, 1, !(pose_std_m > 0)});
-  }
-  for (const char* axis : {"_x", "_y", "_z"}) {
-    context.unknowns.add({"frame_rotation" + std::string(axis) + suffix, "rad", 0, pose_std_rad, -1, 1, !(pose_std_rad > 0)});
-  }
-  return first;
+  return add_pose(context.unknowns, "frame", step_suffix(context), pose_std_m, pose_std_rad);
+}
+
+int add_camera_pose(const TermContext& context, const std::string& camera, double pose_std_m, double pose_std_rad) {
+  if (camera.empty() || (!(pose_std_m > 0) && !(pose_std_rad > 0))) return -1;
+  const auto [at, fresh] = context.shared.try_emplace("camera[" + camera + "]", -1);
+  if (fresh) at->second = add_pose(context.unknowns, "camera", "[" + camera + "]", pose_std_m, pose_std_rad);
+  return at->second;
 }
 
 RigidMap frame_pose(const VectorX& unknowns, int pose, const Vec3& pivot_m) {

@@ -23,6 +23,11 @@ struct RayObservation {
   double pose_std_m = 0, pose_std_rad = 0;
   double bias_std_m = 0;  ///< one common depth offset a push
   std::optional<LensScatter> scatter = {};  ///< nothing: the lens spreads no light. One share for all frames
+  /// The camera of several frames, whose pose errs alike in all of them, seen from itself; empty: this frame errs alone. What is
+  /// common and what is the frame's own have a standard deviation of pose_std each: a calibration errs in the one way, an arm
+  /// that carries the camera in the other, and the images tell which.
+  std::string camera = {};
+  Mat3 R_base_camera = Mat3::Identity();
 };
 
 using TermInput = std::variant<RayObservation, PointCloud, Markers, ToolTravel, Wrench>;
@@ -60,6 +65,9 @@ class Term {
  public:
   virtual ~Term() = default;
   virtual TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const = 0;
+  /// Unknowns of its own that rows with TermView::surface_slopes have beside the prediction's columns, without the modes of the rest
+  /// surface's error.
+  virtual std::vector<int> own_unknowns() const { return {}; }
   /// Standard deviation that residuals are divided by, a typical one (for the annealing of the robust loss).
   virtual double typical_sigma() const = 0;
 };
