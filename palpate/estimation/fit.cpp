@@ -248,7 +248,11 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     std::stable_sort(answer.budget.begin(), answer.budget.end(),
                      [](const auto& a, const auto& b) { return a.young_modulus_percent > b.young_modulus_percent; });
   };
-  if (mesh) widen_by("mesh", *mesh);
+  if (mesh) {
+    for (std::size_t r = 0; r < regions.size(); ++r)
+      move(regions[r], mesh->of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
+    widen_by("mesh", mesh->times(mesh_left_over));
+  }
   if (doubt != nullptr && doubt->effect) widen_by("unseen side", doubt->effect->shift);
   const auto region_name = [&](std::size_t r) {
     return object.region_names.empty() ? std::string() : object.region_names[r];

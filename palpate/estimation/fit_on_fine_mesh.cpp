@@ -16,7 +16,7 @@ namespace {
 /// What the mesh does to E, as a share; nothing where it is not known.
 std::optional<double> mesh_error(const Identification& answer) {
   for (const BudgetEntry& entry : answer.budget) {
-    if (entry.input == "mesh") return entry.young_modulus_percent / 100;
+    if (entry.input == "mesh") return entry.young_modulus_percent / 100 / mesh_left_over;
   }
   return std::nullopt;
 }
@@ -88,8 +88,8 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
     if (too_coarse && error) {
       answer.verdicts.push_back(
           {"mesh_too_coarse", "The mesh is estimated to put E off by " + percent(*error) +
-                                  ", and no finer one can be had: the interval holds that error; give a finer "
-                                  "volume mesh to be rid of it."});
+                                  ", and no finer one can be had: that is taken out of the answer, and the interval "
+                                  "holds half of it; give a finer volume mesh to be rid of it."});
     }
     return answer;
   }

@@ -69,7 +69,7 @@ class ForwardModel {
   /// @param response_tolerance  of a linear body's answers between the Poisson ratios that it is solved at, relative
   /// @throws Error when a load names no tool, or supports leave a motion free that a load works on.
   ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options = {},
-               std::shared_ptr<Solved> earlier = nullptr, double response_tolerance = 1e-7);
+               std::shared_ptr<Solved> earlier = nullptr, double response_tolerance = 1e-6);
   ~ForwardModel();
   const std::shared_ptr<Solved>& solved() const { return solved_; }
 

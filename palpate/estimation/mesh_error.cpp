@@ -110,6 +110,21 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
   return shift;
 }
 
+void move(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper) {
+  const Index size = static_cast<Index>(posterior.poisson.size());
+  const double variance = posterior.covariance(1, 1), close = 1e-9;
+  const bool at_bound = size < 2 || posterior.poisson(0) + std::min(shift.poisson, 0.0) < poisson_lower + close ||
+                        posterior.poisson(size - 1) + std::max(shift.poisson, 0.0) > poisson_upper - close;
+  if (at_bound) {
+    const double slope = variance > 0 ? posterior.covariance(0, 1) / variance : 0;
+    posterior.log_young_mean.array() += shift.log_young - slope * shift.poisson;
+  } else {
+    posterior.poisson.array() += shift.poisson;
+    posterior.log_young_mean.array() += shift.log_young;
+  }
+  update_covariance(posterior);
+}
+
 void widen(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper) {
   const double sd = std::abs(shift.poisson);
   const Index size = static_cast<Index>(posterior.poisson.size());

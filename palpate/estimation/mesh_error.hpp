@@ -17,6 +17,7 @@ struct AnswerShift {
   VectorX region_log_young;  ///< of further regions
   int load_cases = 0;        ///< that were solved to find it
   AnswerShift of_region(Index region) const { return {region == 0 ? log_young : region_log_young(region - 1), poisson, {}, 0}; }
+  AnswerShift times(double share) const { return {share * log_young, share * poisson, share * region_log_young, load_cases}; }
 };
 
 /// What the change of the simulated surfaces and travels between the two meshes, at the highest loads, does to the optimum: one
@@ -32,6 +33,14 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
                                       const Optimum& optimum, const Loss& loss, const FinerModel& finer, const FitOptions& options,
                                       const OnProgress& progress,
                                       std::shared_ptr<ForwardModel::Solved>* solved = nullptr);
+
+/// Of an answer that was moved by what its mesh does to it this share of the move is left as one standard deviation: the true change
+/// lies between a quarter of what is estimated and twice of it (fem.discretisation).
+inline constexpr double mesh_left_over = 0.5;
+
+/// Moves a posterior to where it would be without an error that is known. Bounds of nu are kept: a posterior that touches one keeps
+/// its nu, and its ridge log E(nu) moves.
+void move(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper);
 
 /// Adds an error of known direction and normally distributed size (one standard deviation: `shift`) to a posterior. Exact for
 /// normal posteriors; bounds of nu are kept.

@@ -85,6 +85,7 @@ class Objective {
   void set_reuse(double standard_deviations, bool rows = true) {
     reuse_ = standard_deviations;
     rows_wanted_ = rows;
+    if (reuse_ == 0) anchors_.clear();  // evaluations from here on leave them behind
   }
   double reuse() const { return reuse_; }
   Kept take_kept();  ///< and is without it, and without last_rows()

@@ -116,8 +116,9 @@ void LinearResponse::make_polynomial() const {
   const double low = poisson_to_z(options_.poisson_lower), high = poisson_to_z(options_.poisson_upper);
   const Range range{0.5 * (low + high), 0.5 * (high - low)};
   const double rate = convergence_rate(range);
-  // The last coefficients say whether it is enough.
-  double wanted = std::log(3 / options_.tolerance) / (2 * std::log(rate));
+  // The last coefficients say whether it is enough; of the bodies that were looked at they began at a fiftieth of the first one.
+  constexpr double begin = 0.3;
+  double wanted = std::log(begin / options_.tolerance) / (2 * std::log(rate));
   usable_ = false;
   while (wanted <= options_.max_factorisations) {
     const int nodes = std::max(3, static_cast<int>(std::ceil(wanted)));
