@@ -103,7 +103,7 @@ void tell(Session& session, const Options& given, const Identification& answer) 
     const bool known = error->second != "not estimated";
     const bool as_given = answer.provenance.at("refine") == "none";
     session.say(fmt::format("mesh               {}; its own error {}", mesh->second,
-                            known ? "is about " + error->second + " of E, inside the interval"
+                            known ? "of about " + error->second + " of E is taken out, half of it stays in the interval"
                                   : std::string("was not estimated and is not in the interval") +
                                         (as_given ? " (--refine auto does both)" : "")));
   }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "palpate/estimation/finer_model.hpp"
+#include "palpate/estimation/mesh_error.hpp"
 
 namespace palpate::estimation {
 namespace {

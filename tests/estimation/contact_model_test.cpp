@@ -188,7 +188,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, ContactDerivatives, testing::Range<std::size_t>
 StepPrediction predicted(const Recording& recording, const TetMesh& mesh, const std::string& material,
                          std::size_t step = 0) {
   Unknowns unknowns;
-  ForwardModel model(recording, simulated(mesh, material), unknowns, tight());
+  ForwardModel model(recording, simulated(mesh, material), unknowns, tight(), nullptr, 1e-10);
   VectorX at = unknowns.prior_mean();
   at(log_young) = std::log(2e4);
   at(poisson) = 0.3;

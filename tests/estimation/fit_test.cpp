@@ -241,7 +241,7 @@ TEST(PushedBlockFit, SameInputSameDigitsAndAnyStart) {
     const Identification far = fit(recording, coarse_block(), inputs, options);
     EXPECT_EQ(far.termination, Termination::converged) << factor << " " << far.message;
     for (std::size_t k = 0; k < 2; ++k) {
-      EXPECT_NEAR(far.parameters[k].value, first.parameters[k].value, 0.03 * first.parameters[k].std) << factor;
+      EXPECT_NEAR(far.parameters[k].value, first.parameters[k].value, 0.05 * first.parameters[k].std) << factor;
     }
   }
 }

@@ -56,8 +56,9 @@ class LinearResponseContract : public testing::TestWithParam<Case> {
     return rows;
   }
   // Near nu = 0.5 a step of nu is a huge one of the polynomial's variable z, with dnu/dz = (1 - 2 nu) / 2: a derivative to
-  // nu cannot have more digits than that leaves.
-  static double slope_tolerance(double nu, double slope, double value) { return 2e-5 * slope + 2e-6 * value / (1 - 2 * nu); }
+  // nu cannot have more digits than that leaves. And the slope of a polynomial of degree n that errs by 1e-7 may err by n^2 times
+  // that at its ends (Markov).
+  static double slope_tolerance(double nu, double slope, double value) { return 2e-5 * slope + 5e-6 * value / (1 - 2 * nu); }
   void compare(const Boundary& boundary, const VectorX& a, const VectorX& b) const {
     const Statics statics(mesh, "linear", boundary, options);
     const LinearResponse response(statics, everything(), range);
