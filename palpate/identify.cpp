@@ -21,6 +21,7 @@
 #include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/subdivide.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/free_space.hpp"
@@ -162,21 +163,26 @@ reconstruction::BuiltObject build_from_surface(const Recording& recording, recon
   return std::move(*best);
 }
 
+/// What a given surface, its supports and its tools ask of the mesh.
+reconstruction::BuildOptions fill_options(const Recording& recording) {
+  reconstruction::BuildOptions options;
+  options.mesh.tetrahedra = default_tetrahedra;
+  if (recording.model.refine != "auto") return options;
+  options.mesh.finer = finer_under_tools(recording);
+  for (const Support& support : recording.supports) {
+    if (!recording.rest.surface || (support.kind != SupportKind::plane && support.kind != SupportKind::table)) continue;
+    for (const auto& near : geometry::finer_at_feet(support.plane, *recording.rest.surface)) options.mesh.finer.push_back(near);
+  }
+  return options;
+}
+
 /// Volume mesh of a recording that gives a surface or views of one.
 void fill_with_tetrahedra(Recording& recording, reconstruction::Completion completion, std::vector<char>* seen,
                           const OnProgress& progress) {
   if (!recording.rest.surface && recording.rest.views.empty()) {
     throw Error("give the object's shape as rest.volume_mesh, rest.surface_mesh or rest.views", "rest");
   }
-  reconstruction::BuildOptions options;
-  options.mesh.tetrahedra = default_tetrahedra;
-  if (recording.model.refine == "auto") {
-    options.mesh.finer = finer_under_tools(recording);
-    for (const Support& support : recording.supports) {
-      if (!recording.rest.surface || (support.kind != SupportKind::plane && support.kind != SupportKind::table)) continue;
-      for (const auto& near : geometry::finer_at_feet(support.plane, *recording.rest.surface)) options.mesh.finer.push_back(near);
-    }
-  }
+  const reconstruction::BuildOptions options = fill_options(recording);
   auto built = recording.rest.surface
                    ? build_from_surface(recording, options, progress)
                    : build_from_views(recording, options, completion, progress);
@@ -359,6 +365,24 @@ double drop_unseen_side(const Recording& built, const std::vector<char>& seen, e
   return unseen;
 }
 
+estimation::FillAnew fill_anew(const Recording& given, const Recording& built) {
+  constexpr double same_outline = 1e-4;  // of the object's size, rms
+  if (given.rest.volume || !given.rest.surface || !built.rest.volume) return {};
+  const Points& vertices_m = given.rest.surface->vertices_m;
+  const geometry::TriangleTree outline(geometry::boundary_surface(*built.rest.volume).surface);
+  double sum_m2 = 0;
+  for (Index v = 0; v < vertices_m.rows(); ++v) sum_m2 += outline.closest(vertices_m.row(v).transpose()).squared_distance_m2;
+  const double size_m = (vertices_m.colwise().maxCoeff() - vertices_m.colwise().minCoeff()).norm();
+  if (sum_m2 < static_cast<double>(vertices_m.rows()) * std::pow(same_outline * size_m, 2)) return {};
+  return [given](const Recording& recording, double edge_share) {
+    reconstruction::BuildOptions options = fill_options(given);
+    options.mesh.tetrahedra = static_cast<Index>(static_cast<double>(recording.rest.volume->tetrahedra.rows()) / std::pow(edge_share, 3));
+    for (auto& near : options.mesh.finer) near.edge_m *= edge_share;
+    auto filled = reconstruction::build_object(*given.rest.surface, given.supports, options);
+    return estimation::Filled{std::move(filled.model.volume), std::move(filled.model.supports)};
+  };
+}
+
 estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share) {
   estimation::ShapeDoubt doubt;
   doubt.unseen_share = unseen_share;
@@ -389,7 +413,7 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
                    ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
                    : estimation::fit_on_fine_mesh(recording, object, observed, options.fit, options.mesh_tolerance,
-                                                  doubt ? &*doubt : nullptr, progress);
+                                                  doubt ? &*doubt : nullptr, progress, fill_anew(as_given, recording));
   for (std::size_t s = 0; s < out.answer.steps.size() && s < masked_m.size(); ++s) {
     out.answer.steps[s].masked_m = std::move(masked_m[s]);
   }

@@ -10,6 +10,7 @@
 #include "palpate/core/identification.hpp"
 #include "palpate/core/progress.hpp"
 #include "palpate/core/recording.hpp"
+#include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/shape_error.hpp"
 #include "palpate/reconstruction/fuse_views.hpp"
@@ -59,6 +60,12 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
 /// guess is nothing to compare with. Returns the share of its surface that was not seen; 0 where that is too little to matter.
 /// @param built  the recording as build_simulated_object left it, with `seen`
 double drop_unseen_side(const Recording& built, const std::vector<char>& seen, estimation::Inputs& observed);
+
+/// How a given surface is filled with a finer mesh than it was; empty where there is no such surface, or where the mesh follows it
+/// exactly, so that halving its edges shows all that is wrong with it.
+/// @param given  the recording before its object was built
+/// @param built  as build_simulated_object left it
+estimation::FillAnew fill_anew(const Recording& given, const Recording& built);
 
 /// What else may stand where nobody looked: all that was hidden, and less than what is fitted.
 /// @param given  the recording before its object was built

@@ -122,6 +122,7 @@ struct Load {
   Vec3 contact_m = Vec3::Zero();    ///< contact point on the rest surface (tools that are not `vertices` or `platen`)
   Vec3 direction = -Vec3::UnitZ();  ///< unit vector of the push, into the object
   double contact_std_m = 0;         ///< prior on the contact point, tangential
+  Vec3 contact_found_m = Vec3::Zero();  ///< from contact_m, across the push: a fit's own, around which it takes a shift as linear
 };
 
 struct Step {

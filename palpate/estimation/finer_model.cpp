@@ -15,6 +15,7 @@ namespace palpate::estimation {
 namespace {
 
 constexpr Index most_uniform = 5000;  // tetrahedra of a mesh that is halved everywhere
+constexpr double most_filled = 24000;  // of one that is filled anew
 constexpr Index most_growth = 4;      // of the number of nodes, where it is not
 constexpr Index most_corners = 4000;  // of a mesh that is fitted with
 
@@ -90,10 +91,27 @@ FinerModel on_volume(Recording finer, const Recording& recording, const Simulate
   return out;
 }
 
+/// The same object filled anew; how much finer it came out says the number of elements.
+FinerModel filled(const Recording& recording, const SimulatedObject& object, const FillAnew& fill_anew, double edge_share) {
+  Recording anew = recording;
+  Filled inside = fill_anew(recording, edge_share);
+  const double growth = static_cast<double>(inside.volume.tetrahedra.rows()) /
+                        static_cast<double>(recording.rest.volume->tetrahedra.rows());
+  anew.rest.volume = std::move(inside.volume);
+  anew.supports = std::move(inside.supports);
+  FinerModel out = on_volume(std::move(anew), recording, object);
+  out.edge_share = std::min(0.9, 1 / std::cbrt(growth));
+  return out;
+}
+
 }  // namespace
 
-std::optional<FinerModel> finer_model(const Recording& recording, const SimulatedObject& object) {
+std::optional<FinerModel> finer_model(const Recording& recording, const SimulatedObject& object, const FillAnew& fill_anew) {
   if (!may_be_finer(recording, object)) return std::nullopt;
+  if (fill_anew && !lists_nodes(recording)) {
+    const double share = std::max(0.5, std::cbrt(static_cast<double>(recording.rest.volume->tetrahedra.rows()) / most_filled));
+    if (share < 0.8) return filled(recording, object, fill_anew, share);
+  }
   Recording finer = recording;
   TetMesh& volume = *finer.rest.volume;
   if (!lists_nodes(recording) && volume.tetrahedra.rows() <= most_uniform) {
@@ -110,7 +128,8 @@ std::optional<FinerModel> finer_model(const Recording& recording, const Simulate
   return on_volume(std::move(finer), recording, object);
 }
 
-std::optional<FinerModel> refined_within(const Recording& recording, const SimulatedObject& object, double tolerance) {
+std::optional<FinerModel> refined_within(const Recording& recording, const SimulatedObject& object, double tolerance,
+                                         const FillAnew& fill_anew) {
   if (!may_be_finer(recording, object)) return std::nullopt;
   fem::DiscretisationOptions options;
   options.tolerance = tolerance;
@@ -133,6 +152,11 @@ std::optional<FinerModel> refined_within(const Recording& recording, const Simul
     if (chosen.base_young_error <= options.tolerance) continue;
     take(finer, chosen.linear);
     changed = true;
+  }
+  if (!changed && fill_anew && !lists_nodes(recording)) {
+    auto better = filled(recording, object, fill_anew, 2.0 / 3);
+    if (better.recording.rest.volume->nodes_m.rows() > most_corners) return std::nullopt;
+    return better;
   }
   if (!changed) {
     if (lists_nodes(recording) || recording.rest.volume->tetrahedra.rows() > most_uniform) return std::nullopt;

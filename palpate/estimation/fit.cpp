@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <list>
 #include <map>
 
 #include "palpate/core/error.hpp"
@@ -59,6 +60,30 @@ std::vector<Parameter> parameters_so_far(const VectorX& unknowns) {
           {"poisson_ratio", "", "1", unknowns(poisson), nan, nan, nan, true}};
 }
 
+/// Where a contact was found further off than this share of its tool's size from where its columns are right, they are made
+/// anew: a dent is as wide as its tool, and moves with it.
+constexpr double as_good_as_linear = 0.1;
+
+/// The same pushes with the contacts where these unknowns put them; nothing where that changes little.
+std::optional<std::vector<Push>> with_contacts_found(const Recording& recording, const ForwardModel& model, const VectorX& unknowns) {
+  double largest = 0;  // of the tool's size
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    for (std::size_t l = 0; l < model.step(s).loads.size(); ++l) {
+      const Load& load = model.step(s).loads[l];
+      const Tool& tool = model.tool(load.tool);
+      const double size_m = tool.radius_m > 0 ? tool.radius_m : tool.length_m;
+      if (size_m > 0) largest = std::max(largest, (model.contact_found_m(s, l, unknowns) - load.contact_found_m).norm() / size_m);
+    }
+  }
+  if (largest < as_good_as_linear) return std::nullopt;
+  std::vector<Push> found = recording.pushes;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    std::vector<Load>& loads = found[model.index(s).push].steps[model.index(s).step].loads;
+    for (std::size_t l = 0; l < loads.size(); ++l) loads[l].contact_found_m = model.contact_found_m(s, l, unknowns);
+  }
+  return found;
+}
+
 /// How many evaluations a fit takes is not known beforehand: the share done comes nearer to one with each of them.
 OnProgress paced(const OnProgress& progress) {
   constexpr double typical_evaluations = 30;
@@ -97,10 +122,12 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
   return statics;
 }
 
-Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
-                   const FitOptions& options, const OnProgress& on_progress, const FinerModel* finer, FitMemory* memory,
-                   ShapeDoubt* doubt) {
-  check(options);
+namespace {
+
+/// @param looks_again  how often it may start anew with contacts where it found them
+Identification fit_around(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
+                          const FitOptions& options, const OnProgress& on_progress, const FinerModel* finer, FitMemory* memory,
+                          ShapeDoubt* doubt, int looks_again) {
   const OnProgress progress = paced(on_progress);
   Unknowns unknowns;
   ForwardModel model(recording, object, unknowns, statics_options(recording, object, options),
@@ -161,6 +188,46 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
     return false;
   };
   if (!take()) return answer;
+
+  const auto found = looks_again > 0 && optimum.termination != Termination::cancelled
+                         ? with_contacts_found(recording, model, optimum.unknowns)
+                         : std::nullopt;
+  if (found) {
+    Recording there = recording;  // what is solved for there is of no use to a next fit: no memory of it
+    there.pushes = *found;
+    const auto moved = [&](const FinerModel* mesh) {
+      std::optional<FinerModel> out;
+      if (mesh != nullptr) out.emplace(*mesh).recording.pushes = *found;
+      return out;
+    };
+    const auto address = [](const std::optional<FinerModel>& mesh) { return mesh ? &*mesh : nullptr; };
+    struct Moved {
+      std::optional<FinerModel> mesh, finer;
+      FinerMesh both;
+    };
+    std::list<Moved> meshes;
+    FitOptions next = options;
+    next.young_start_pa = std::exp(optimum.unknowns(log_young));
+    next.poisson_start = optimum.unknowns(poisson);
+    next.start_is_answer = true;
+    if (options.take_finer) {
+      next.take_finer = [&](const std::vector<YoungDoubt>& doubts) -> const FinerMesh* {
+        const FinerMesh* better = options.take_finer(doubts);
+        if (better == nullptr) return nullptr;
+        Moved& mine = meshes.emplace_back(Moved{moved(better->mesh), moved(better->finer), {}});
+        mine.both = {address(mine.mesh), address(mine.finer)};
+        return &mine.both;
+      };
+    }
+    const std::optional<FinerModel> finer_there = moved(finer);
+    Identification there_found =
+        fit_around(there, object, inputs, next, on_progress, address(finer_there), nullptr, doubt, looks_again - 1);
+    for (FitIteration& iteration : there_found.trace) iteration.round += round;
+    there_found.trace.insert(there_found.trace.begin(), answer.trace.begin(), answer.trace.end());
+    there_found.fit.solves += model.solves();
+    there_found.fit.load_cases += model.load_cases();
+    return there_found;
+  }
 
   ResidualSummary residuals;
   const auto optimise_again = [&] {
@@ -291,6 +358,16 @@ Identification fit(const Recording& recording, const SimulatedObject& object, co
   answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   return answer;
+}
+
+}  // namespace
+
+Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
+                   const FitOptions& options, const OnProgress& progress, const FinerModel* finer, FitMemory* memory,
+                   ShapeDoubt* doubt) {
+  constexpr int looks_again = 2;  // at contacts that were found elsewhere: the second time to be sure
+  check(options);
+  return fit_around(recording, object, inputs, options, progress, finer, memory, doubt, looks_again);
 }
 
 }  // namespace palpate::estimation

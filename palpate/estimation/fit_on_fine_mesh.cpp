@@ -8,7 +8,6 @@
 #include <sstream>
 #include <string>
 
-#include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/mesh_error.hpp"
 
 namespace palpate::estimation {
@@ -31,7 +30,7 @@ std::string mesh_words(const SimulatedObject& object) {
 
 Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
                                 const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
-                                const OnProgress& progress) {
+                                const OnProgress& progress, const FillAnew& fill_anew) {
   constexpr int most_refinements = 3;
   constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
   const auto percent = [](double share) {
@@ -43,7 +42,7 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
   std::string history;
   for (int refinements = 0;;) {
     std::optional<FinerModel> finer;
-    if (recording.model.refine == "auto") finer = finer_model(recording, object);
+    if (recording.model.refine == "auto") finer = finer_model(recording, object, fill_anew);
     struct Taken {
       std::optional<FinerModel> mesh, finer;
       FinerMesh both;
@@ -60,13 +59,13 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
       if (!too_coarse || refinements == most_refinements) return nullptr;
       const Recording& at = taken.empty() ? recording : taken.back().mesh->recording;
       const SimulatedObject& on = taken.empty() ? object : taken.back().mesh->object;
-      std::optional<FinerModel> better = refined_within(at, on, mesh_tolerance);
+      std::optional<FinerModel> better = refined_within(at, on, mesh_tolerance, fill_anew);
       if (!better) return nullptr;
       ++refinements;
       history += mesh_words(on) + ": " + percent(error) + " of E; ";
       Taken& now = taken.emplace_back();
       now.mesh = std::move(better);
-      now.finer = finer_model(now.mesh->recording, now.mesh->object);
+      now.finer = finer_model(now.mesh->recording, now.mesh->object, fill_anew);
       now.both = {&*now.mesh, now.finer ? &*now.finer : nullptr};
       return &now.both;
     };

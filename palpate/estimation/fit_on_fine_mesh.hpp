@@ -2,6 +2,7 @@
 // A fit whose mesh is fine enough for its answer.
 #pragma once
 
+#include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/shape_error.hpp"
 
@@ -11,8 +12,9 @@ namespace palpate::estimation {
 /// `mesh_tolerance` (a share of E) and more than a third of all else that is not known of E. Leaves recording and object as
 /// they were fitted last; the answer's provenance says which meshes were taken.
 /// @param doubt  other shapes of a side that nobody saw; nullptr: none
+/// @param fill_anew  finer_model.hpp
 Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
                                 const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
-                                const OnProgress& progress);
+                                const OnProgress& progress, const FillAnew& fill_anew = {});
 
 }  // namespace palpate::estimation

@@ -144,6 +144,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
         const std::string shift = in_push + key_of(load);
         if (load.contact_std_m > 0 && has_place(recording, load) && shift_of.count(shift) == 0) {
           shift_of[shift] = unknowns.add_block("contact_shift" + in_push, "m", load.contact_std_m, {"_1", "_2"});
+          shift_direction_[shift_of[shift]] = load.direction;
         }
         const auto known = shift_of.find(shift);
         shifts.push_back(known == shift_of.end() ? -1 : known->second);

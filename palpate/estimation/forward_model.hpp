@@ -105,6 +105,9 @@ class ForwardModel {
   /// The largest square of such a share in the steps' last predictions: how far they are from solutions, relative.
   double reuse_error() const;
 
+  /// How far from Load::contact_m these unknowns put the contact of a step's load, across the push; zero where it cannot shift.
+  Vec3 contact_found_m(std::size_t s, std::size_t load, const VectorX& unknowns) const;
+
   /// True where answers are sums of answers to unit loads: a prediction costs next to nothing.
   bool superposes() const { return linear_; }
 
@@ -186,6 +189,7 @@ class ForwardModel {
   std::vector<int> clamp_;                       // a step: first of six unknowns, or -1
   std::vector<std::vector<int>> force_error_;    // a step and load: first of three unknowns, or -1
   std::vector<std::vector<int>> contact_shift_;  // a step and load: first of two unknowns, or -1
+  std::map<int, Vec3> shift_direction_;          // of the push that such two unknowns are across
   std::vector<std::vector<int>> patch_radius_;   // a step and load: the unknown, or -1
   std::vector<int> spread_;                      // a support that spreads: the unknown
   std::vector<double> effort_;                   // a step: its load as a share of the highest

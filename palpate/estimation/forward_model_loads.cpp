@@ -41,7 +41,8 @@ double read_force_n(const Step& step, const Load& load) {
 
 std::string key_of(const Load& load) {
   std::string key = load.tool;
-  for (int d = 0; d < 3; ++d) key += "," + std::to_string(load.contact_m(d));
+  const Vec3 place_m = touched_m(load);
+  for (int d = 0; d < 3; ++d) key += "," + std::to_string(place_m(d));
   return key;
 }
 
@@ -192,6 +193,13 @@ RigidOffset ForwardModel::clamp_offset(std::size_t s, const VectorX& unknowns) c
   return offset;
 }
 
+Vec3 ForwardModel::contact_found_m(std::size_t s, std::size_t l, const VectorX& unknowns) const {
+  const int shift = contact_shift_[s][l];
+  if (shift < 0) return Vec3::Zero();
+  const std::array<Vec3, 2> across = tangents(shift_direction_.at(shift));
+  return unknowns(shift) * across[0] + unknowns(shift + 1) * across[1];
+}
+
 std::vector<ForwardModel::LoadPart> ForwardModel::load_parts(std::size_t s, std::size_t l, const Body& body,
                                                              const VectorX& unknowns) const {
   const auto found = body.contacts.find(key_of(step(s).loads[l]));
@@ -199,7 +207,13 @@ std::vector<ForwardModel::LoadPart> ForwardModel::load_parts(std::size_t s, std:
   const Body::Contact& contact = found->second;
   std::vector<LoadPart> parts{{contact.force}};
   const int shift = contact_shift_[s][l];
-  for (int k = 0; shift >= 0 && k < 2; ++k) parts.push_back({contact.shift + 3 * k, unknowns(shift + k), shift + k});
+  if (shift >= 0) {
+    const std::array<Vec3, 2> across = tangents(contact.direction);
+    for (int k = 0; k < 2; ++k) {
+      const double from_found_m = unknowns(shift + k) - across[static_cast<std::size_t>(k)].dot(step(s).loads[l].contact_found_m);
+      parts.push_back({contact.shift + 3 * k, from_found_m, shift + k});
+    }
+  }
   if (const int radius = patch_radius_[s][l]; radius >= 0) parts.push_back({contact.radius, unknowns(radius), radius});
   return parts;
 }

@@ -37,10 +37,10 @@ Eigen::SparseMatrix<double> load_columns(const TetMesh& mesh, const Tool& tool, 
       return fem::spread_over_nodes(static_cast<Index>(mesh.nodes_m.rows()), tool.vertices);
     case ToolShape::sphere:
     case ToolShape::disc:
-      return fem::spread_over_patch(mesh, load.contact_m, tool.radius_m);
+      return fem::spread_over_patch(mesh, touched_m(load), tool.radius_m);
     case ToolShape::edge:
     case ToolShape::capsule:
-      return along_line(mesh, load.contact_m, tool.axis, tool.length_m);
+      return along_line(mesh, touched_m(load), tool.axis, tool.length_m);
     case ToolShape::mesh:
     case ToolShape::platen:
       break;
@@ -60,7 +60,7 @@ std::array<Vec3, 2> tangents(const Vec3& direction) {
 
 Eigen::SparseMatrix<double> shifted_columns(const TetMesh& mesh, const Tool& tool, const Load& load, const Vec3& tangent) {
   const double h = tool.radius_m > 0 ? tool.radius_m / 8 : std::max(tool.length_m, 1e-3) / 50;
-  Load ahead = load, behind = load;
+  Load ahead = load, behind = load;  // of where it acts
   ahead.contact_m += h * tangent;
   behind.contact_m -= h * tangent;
   return (load_columns(mesh, tool, ahead) - load_columns(mesh, tool, behind)) / (2 * h);

@@ -8,6 +8,9 @@
 
 namespace palpate::estimation {
 
+/// Where a load acts, as far as it is known.
+inline Vec3 touched_m(const Load& load) { return load.contact_m + load.contact_found_m; }
+
 /// Three columns of nodal forces, unit resultant along x, y, z, of a tool at its contact (vertices: spread equally; sphere and
 /// disc: uniform over the patch of that radius; edge and capsule: uniform along the line).
 /// @throws Error for a tool that the object is not under, or of a shape that needs contact search.

@@ -221,8 +221,9 @@ class Scene {
     Row shifts;
     shifts.contact_m = 1e-3;
     Recording pushed = with_push(shifts, 1);
+    const Recording given_recording = pushed;
     object_ = build_simulated_object(pushed);
-    finer_ = estimation::finer_model(pushed, object_);
+    finer_ = estimation::finer_model(pushed, object_, fill_anew(given_recording, pushed));
     // Columns for contacts that may have shifted serve every row.
     estimation::Unknowns unknowns;
     memory_.model = estimation::ForwardModel(pushed, object_, unknowns, statics_options(pushed, object_, {})).solved();
@@ -230,7 +231,7 @@ class Scene {
     recording_.pushes.clear();
 
     reconstruction::BuildOptions filling;
-    filling.mesh.tetrahedra = 8000;
+    filling.mesh.tetrahedra = 24000;
     filling.mesh.finer = {{spec_.contact_m, 1.1 * spec_.pad_radius_m, spec_.pad_radius_m / fine}};
     // Where a round object is glued is as sharp as the pad's rim: half the fit's edges.
     for (const Support& support : spec_.supports) {

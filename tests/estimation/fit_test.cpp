@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/load_columns.hpp"
 #include "pushed_block.hpp"
 
 namespace palpate::estimation {
@@ -257,6 +258,40 @@ TEST(PushedBlockFit, FixedNuStaysAndDoesNotWidenYoungsModulus) {
   EXPECT_EQ(parameter(held, "poisson_ratio").upper_95, 0.3);
   EXPECT_LE(parameter(held, "young_modulus").std, 1.01 * parameter(open, "young_modulus").std);
   expect_inside(parameter(held, "young_modulus"), 2e4);
+}
+
+// A dent moves with its tool: what is linear in a shift of the contact holds for a tenth of the tool's radius, not for most of it.
+TEST(ShiftedContact, IsFoundWhereItIsHoweverFarThatIs) {
+  const Vec3 shift_m(-0.008, 0.004, 0);
+  Recording truly = pushed_block_recording();
+  for (Step& step : truly.pushes[0].steps) step.loads[0].contact_m += shift_m;
+  PushedBlock truth;
+  truth.material = "linear";
+  truth.points = 1500;
+  const Inputs inputs = clouds_of(truth, truly);
+  Recording stated = pushed_block_recording();
+  for (Step& step : stated.pushes[0].steps) step.loads[0].contact_std_m = 0.006;
+  const Identification known = fit(truly, coarse_block("linear"), inputs, {});
+  const Identification found = fit(stated, coarse_block("linear"), inputs, {});
+  ASSERT_EQ(found.termination, Termination::converged) << found.message;
+  ASSERT_EQ(found.nuisances.size(), 2u);
+  Vec3 found_m = Vec3::Zero();
+  const auto across = tangents(stated.pushes[0].steps[0].loads[0].direction);
+  for (std::size_t k = 0; k < 2; ++k) {
+    found_m += found.nuisances[k].value * across[k];
+    EXPECT_LT(found.nuisances[k].std, 0.002);
+    EXPECT_NEAR(found.nuisances[k].value, shift_m.dot(across[k]), 4 * found.nuisances[k].std) << found.nuisances[k].name;
+    EXPECT_LT(std::abs(found.nuisances[k].pull), 4);
+  }
+  // As good as told, but for what the place leaves open.
+  truly = pushed_block_recording();
+  for (Step& step : truly.pushes[0].steps) step.loads[0].contact_m += found_m;
+  const Identification told = fit(truly, coarse_block("linear"), inputs, {});
+  EXPECT_NEAR(parameter(found, "young_modulus").value, parameter(told, "young_modulus").value, 0.05 * parameter(told, "young_modulus").std);
+  EXPECT_NEAR(parameter(found, "poisson_ratio").value, parameter(told, "poisson_ratio").value, 0.05 * parameter(told, "poisson_ratio").std);
+  EXPECT_NEAR(found.fit.chi2_per_dof, known.fit.chi2_per_dof, 0.01);
+  EXPECT_GT(parameter(found, "young_modulus").std, parameter(told, "young_modulus").std);
+  for (std::size_t i = 1; i < found.trace.size(); ++i) EXPECT_GE(found.trace[i].round, found.trace[i - 1].round);
 }
 
 PushedBlock with_displaced_clamp() {
