@@ -366,14 +366,19 @@ double drop_unseen_side(const Recording& built, const std::vector<char>& seen, e
 }
 
 estimation::FillAnew fill_anew(const Recording& given, const Recording& built) {
-  constexpr double same_outline = 1e-4;  // of the object's size, rms
+  constexpr double same_outline = 3e-4;  // of the object's size, rms: a ball of 3000 tetrahedra has 1e-3, boxes up to 2e-4
   if (given.rest.volume || !given.rest.surface || !built.rest.volume) return {};
-  const Points& vertices_m = given.rest.surface->vertices_m;
+  const TriMesh& surface = *given.rest.surface;
   const geometry::TriangleTree outline(geometry::boundary_surface(*built.rest.volume).surface);
-  double sum_m2 = 0;
-  for (Index v = 0; v < vertices_m.rows(); ++v) sum_m2 += outline.closest(vertices_m.row(v).transpose()).squared_distance_m2;
-  const double size_m = (vertices_m.colwise().maxCoeff() - vertices_m.colwise().minCoeff()).norm();
-  if (sum_m2 < static_cast<double>(vertices_m.rows()) * std::pow(same_outline * size_m, 2)) return {};
+  double sum_m4 = 0, area_m2 = 0;
+  for (Index t = 0; t < surface.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(surface.vertices_m.row(surface.triangles(t, k))); };
+    const double area = 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+    sum_m4 += area * outline.closest((corner(0) + corner(1) + corner(2)) / 3).squared_distance_m2;
+    area_m2 += area;
+  }
+  const double size_m = (surface.vertices_m.colwise().maxCoeff() - surface.vertices_m.colwise().minCoeff()).norm();
+  if (sum_m4 < area_m2 * std::pow(same_outline * size_m, 2)) return {};
   return [given](const Recording& recording, double edge_share) {
     reconstruction::BuildOptions options = fill_options(given);
     options.mesh.tetrahedra = static_cast<Index>(static_cast<double>(recording.rest.volume->tetrahedra.rows()) / std::pow(edge_share, 3));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "palpate/core/error.hpp"
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/discretisation.hpp"
@@ -91,10 +92,15 @@ FinerModel on_volume(Recording finer, const Recording& recording, const Simulate
   return out;
 }
 
-/// The same object filled anew; how much finer it came out says the number of elements.
-FinerModel filled(const Recording& recording, const SimulatedObject& object, const FillAnew& fill_anew, double edge_share) {
+/// The same object filled anew; how much finer it came out says the number of elements. Nothing where the mesher refuses.
+std::optional<FinerModel> filled(const Recording& recording, const SimulatedObject& object, const FillAnew& fill_anew, double edge_share) {
   Recording anew = recording;
-  Filled inside = fill_anew(recording, edge_share);
+  Filled inside;
+  try {
+    inside = fill_anew(recording, edge_share);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
   const double growth = static_cast<double>(inside.volume.tetrahedra.rows()) /
                         static_cast<double>(recording.rest.volume->tetrahedra.rows());
   anew.rest.volume = std::move(inside.volume);
@@ -110,7 +116,9 @@ std::optional<FinerModel> finer_model(const Recording& recording, const Simulate
   if (!may_be_finer(recording, object)) return std::nullopt;
   if (fill_anew && !lists_nodes(recording)) {
     const double share = std::max(0.5, std::cbrt(static_cast<double>(recording.rest.volume->tetrahedra.rows()) / most_filled));
-    if (share < 0.8) return filled(recording, object, fill_anew, share);
+    if (share < 0.8) {
+      if (auto anew = filled(recording, object, fill_anew, share)) return anew;
+    }
   }
   Recording finer = recording;
   TetMesh& volume = *finer.rest.volume;
@@ -155,7 +163,7 @@ std::optional<FinerModel> refined_within(const Recording& recording, const Simul
   }
   if (!changed && fill_anew && !lists_nodes(recording)) {
     auto better = filled(recording, object, fill_anew, 2.0 / 3);
-    if (better.recording.rest.volume->nodes_m.rows() > most_corners) return std::nullopt;
+    if (better && better->recording.rest.volume->nodes_m.rows() > most_corners) return std::nullopt;
     return better;
   }
   if (!changed) {

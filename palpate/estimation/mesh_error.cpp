@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 
 #include "palpate/estimation/held_body.hpp"
@@ -13,29 +12,7 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr std::size_t most_steps = 3;  // that are solved on the finer mesh: the highest load of as many pushes
 constexpr double order = 1.5;
-
-/// Highest load of each push; where gravity alone loads, its first step.
-std::vector<char> steps_that_matter(const ForwardModel& model, const std::vector<std::vector<TermRows>>& rows) {
-  std::map<std::size_t, std::pair<double, std::size_t>> highest;
-  for (std::size_t s = 0; s < model.step_count(); ++s) {
-    if (rows[s].empty()) continue;
-    double load_n = 1e-12;
-    for (const auto& load : model.step(s).loads) load_n += load.force_n.value_or(Vec3::Zero()).norm();
-    auto& [most, at] = highest[model.index(s).push];
-    if (load_n > most) {
-      most = load_n;
-      at = s;
-    }
-  }
-  std::vector<char> chosen(model.step_count(), 0);
-  std::size_t count = 0;
-  for (const auto& [push, best] : highest) {
-    if (best.first > 0 && count++ < most_steps) chosen[best.second] = 1;
-  }
-  return chosen;
-}
 
 }  // namespace
 
@@ -43,9 +20,11 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
                                       const Optimum& optimum, const Loss& loss, const FinerModel& finer,
                                       const FitOptions& options, const OnProgress& progress,
                                       std::shared_ptr<ForwardModel::Solved>* solved) {
-  Loss highest = loss;
-  highest.every = 1;
-  highest.steps = steps_that_matter(objective.model(), objective.last_rows());
+  // All steps, the unloaded ones too: they hold the nuisances that a change of the surface could else be taken for.
+  Loss all = loss;
+  all.every = 1;
+  all.steps.clear();
+  for (const auto& rows : objective.last_rows()) all.steps.push_back(rows.empty() ? 0 : 1);
   // What lifts off is held here, so the fit's own surfaces say nothing of the change.
   const bool linear = fem::material_law(object.material).is_linear() &&
                       std::none_of(recording.supports.begin(), recording.supports.end(), lifts_off);
@@ -68,7 +47,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
     if (kept) *solved = model.solved();
     std::vector<StepPrediction> predicted(model.step_count());
     for (std::size_t s = 0; s < model.step_count(); ++s) {
-      if (highest.steps[s] != 0) predicted[s] = model.predict(s, optimum.unknowns);
+      if (all.steps[s] != 0) predicted[s] = model.predict(s, optimum.unknowns);
     }
     load_cases += model.load_cases();
     return predicted;
@@ -80,16 +59,20 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
 
   std::vector<std::vector<TermRows>> changed(coarse.size());
   for (std::size_t s = 0; s < coarse.size(); ++s) {
-    if (highest.steps[s] == 0) continue;
-    StepPrediction moved = objective.last_predictions()[s];
+    if (all.steps[s] == 0) continue;
     const Points change_m = fine[s].surface_m - coarse[s].surface_m;
+    if (change_m.isZero(0) && fine[s].travel_m == coarse[s].travel_m) {
+      changed[s] = objective.last_rows()[s];
+      continue;
+    }
+    StepPrediction moved = objective.last_predictions()[s];
     moved.surface_m += change_m;
     if (moved.field != nullptr) moved.material_m += change_m;
     moved.travel_m += fine[s].travel_m - coarse[s].travel_m;
     changed[s] = objective.rows_of(s, moved, optimum.unknowns, loss);
   }
-  const Evaluation before = objective.assemble(objective.last_rows(), optimum.unknowns, highest);
-  const Evaluation after = objective.assemble(changed, optimum.unknowns, highest);
+  const Evaluation before = objective.assemble(objective.last_rows(), optimum.unknowns, all);
+  const Evaluation after = objective.assemble(changed, optimum.unknowns, all);
   const std::vector<int> moving = free_unknowns(objective.unknowns());
   const VectorX change = MatrixX(before.curvature(moving, moving))
                              .ldlt()

@@ -20,9 +20,9 @@ struct AnswerShift {
   AnswerShift times(double share) const { return {share * log_young, share * poisson, share * region_log_young, load_cases}; }
 };
 
-/// What the change of the simulated surfaces and travels between the two meshes, at the highest loads, does to the optimum: one
-/// step of Gauss and Newton. Small strains are used for the change, one factorisation each. Where the error falls with the
-/// power p of the edge length, the coarse mesh is off by the change over 1 - 2^-p; p = 1.5 lies between the first order at the
+/// What the change of the simulated surfaces and travels between the two meshes does to the optimum: one step of Gauss and
+/// Newton. Small strains are used for the change, one factorisation each. Where the error falls with the power p of the edge
+/// length, the coarse mesh is off by the change over 1 - r^p, r the ratio of the edges; p = 1.5 lies between the first order at the
 /// rim of a tool and the second of smooth regions (fem.discretisation).
 /// The objective's last evaluation must be the optimum's.
 /// @param object  on the mesh that its answers are those of, with the recording that names its nodes

@@ -8,7 +8,11 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
+#include "palpate/lab/box_surface.hpp"
+#include "palpate/lab/implicit_surface.hpp"
 #include "pushed_block.hpp"
 
 namespace palpate::estimation {
@@ -97,6 +101,48 @@ TEST_F(FinerMesh, IsEverywhereWhereToolsAreFineEnough) {
   IdentifyOptions options;
   options.mesh_tolerance = 0;
   EXPECT_THROW(identify(recording, options), Error);
+}
+
+// A ball's facets are not the ball: halving them would leave its outline as it is. A box has none that could be better.
+TEST(FinerOutline, IsTheObjectsOwnWhereTheMeshCutsItOff) {
+  constexpr double radius_m = 0.04;
+  Recording given;
+  given.rest.surface = lab::implicit_surface([](const Vec3& p) { return p.norm() - radius_m; },
+                                             {Vec3::Constant(-0.045), Vec3::Constant(0.045), 0.003});
+  const auto round_off = [&](const TetMesh& mesh) {  // of the surface's vertices, rms
+    const geometry::TriangleTree boundary({mesh.nodes_m, fem::boundary_triangles(mesh)});
+    double sum = 0;
+    for (const auto& vertex : given.rest.surface->vertices_m.rowwise()) sum += boundary.closest(vertex.transpose()).squared_distance_m2;
+    return std::sqrt(sum / static_cast<double>(given.rest.surface->vertices_m.rows()));
+  };
+  given.free = true;
+  Recording ball = given;
+  const SimulatedObject object = build_simulated_object(ball);
+  const FillAnew anew = fill_anew(given, ball);
+  ASSERT_TRUE(anew);
+  const auto halves = finer_model(ball, object), filled = finer_model(ball, object, anew);
+  ASSERT_TRUE(halves && filled);
+  EXPECT_EQ(halves->edge_share, 0.5);
+  EXPECT_NEAR(filled->edge_share, 0.5, 0.1);
+  EXPECT_LT(round_off(*filled->recording.rest.volume), 0.7 * round_off(*halves->recording.rest.volume));
+  EXPECT_EQ(filled->object.surface.vertex_count(), object.surface.vertex_count());
+
+  int asked = 0;
+  const FillAnew refuses = [&](const Recording&, double) -> Filled {
+    ++asked;
+    throw Error("is too thin", "surface");
+  };
+  const auto otherwise = finer_model(ball, object, refuses);
+  ASSERT_TRUE(otherwise);
+  EXPECT_EQ(asked, 1);
+  EXPECT_EQ(otherwise->object.mesh.tetrahedra.rows(), halves->object.mesh.tetrahedra.rows());
+
+  Recording box = given;
+  box.rest.surface = lab::box_surface(Vec3::Zero(), block_size_m, 2);
+  const Recording given_box = box;
+  build_simulated_object(box);
+  EXPECT_FALSE(fill_anew(given_box, box));
+  EXPECT_FALSE(fill_anew(box, box)) << "a volume was given";
 }
 
 }  // namespace

@@ -268,8 +268,11 @@ TEST(ShiftedContact, IsFoundWhereItIsHoweverFarThatIs) {
   PushedBlock truth;
   truth.material = "linear";
   truth.points = 1500;
+  truth.sigma_m = 3e-4;
+  truly.model.poisson_fixed = truth.poisson;  // or E would follow a nu that these data hardly know
   const Inputs inputs = clouds_of(truth, truly);
   Recording stated = pushed_block_recording();
+  stated.model.poisson_fixed = truth.poisson;
   for (Step& step : stated.pushes[0].steps) step.loads[0].contact_std_m = 0.006;
   const Identification known = fit(truly, coarse_block("linear"), inputs, {});
   const Identification found = fit(stated, coarse_block("linear"), inputs, {});
@@ -284,11 +287,9 @@ TEST(ShiftedContact, IsFoundWhereItIsHoweverFarThatIs) {
     EXPECT_LT(std::abs(found.nuisances[k].pull), 4);
   }
   // As good as told, but for what the place leaves open.
-  truly = pushed_block_recording();
-  for (Step& step : truly.pushes[0].steps) step.loads[0].contact_m += found_m;
+  for (Step& step : truly.pushes[0].steps) step.loads[0].contact_m += found_m - shift_m;
   const Identification told = fit(truly, coarse_block("linear"), inputs, {});
   EXPECT_NEAR(parameter(found, "young_modulus").value, parameter(told, "young_modulus").value, 0.05 * parameter(told, "young_modulus").std);
-  EXPECT_NEAR(parameter(found, "poisson_ratio").value, parameter(told, "poisson_ratio").value, 0.05 * parameter(told, "poisson_ratio").std);
   EXPECT_NEAR(found.fit.chi2_per_dof, known.fit.chi2_per_dof, 0.01);
   EXPECT_GT(parameter(found, "young_modulus").std, parameter(told, "young_modulus").std);
   for (std::size_t i = 1; i < found.trace.size(); ++i) EXPECT_GE(found.trace[i].round, found.trace[i - 1].round);
