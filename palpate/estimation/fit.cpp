@@ -124,14 +124,34 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 
 namespace {
 
-/// @param looks_again  how often it may start anew with contacts where it found them
+/// What a fit knows that starts anew, with contacts where the last one found them.
+struct Looks {
+  int left = 2;  // the second time to be sure
+  std::optional<std::pair<double, double>> poisson_expected;
+};
+
+/// Where nu will be looked for once an optimum is known: far beyond what its own curvature says.
+std::pair<double, double> around(const Optimum& optimum, const Unknowns& unknowns) {
+  constexpr double far = 10, at_least = 0.03;
+  const std::vector<int> moving = free_unknowns(unknowns);
+  const auto place = std::find(moving.begin(), moving.end(), static_cast<int>(poisson));
+  double reach = at_least;
+  if (place != moving.end()) {
+    const Index nu = place - moving.begin();
+    const MatrixX information = optimum.evaluation.hessian(moving, moving);
+    const double variance = information.ldlt().solve(VectorX::Unit(information.rows(), nu))(nu);
+    reach = std::isfinite(variance) && variance > 0 ? std::max(at_least, far * std::sqrt(variance)) : 1;
+  }
+  return {optimum.unknowns(poisson) - reach, optimum.unknowns(poisson) + reach};
+}
+
 Identification fit_around(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
                           const FitOptions& options, const OnProgress& on_progress, const FinerModel* finer, FitMemory* memory,
-                          ShapeDoubt* doubt, int looks_again) {
+                          ShapeDoubt* doubt, Looks looks) {
   const OnProgress progress = paced(on_progress);
   Unknowns unknowns;
   ForwardModel model(recording, object, unknowns, statics_options(recording, object, options),
-                     memory != nullptr ? memory->model : nullptr);
+                     memory != nullptr ? memory->model : nullptr, 1e-6, looks.poisson_expected);
   if (memory != nullptr) memory->model = model.solved();
   Objective objective(model, inputs, unknowns);
   if (recording.model.poisson_fixed) unknowns[poisson].fixed = true;
@@ -189,7 +209,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   };
   if (!take()) return answer;
 
-  const auto found = looks_again > 0 && optimum.termination != Termination::cancelled
+  const auto found = looks.left > 0 && optimum.termination != Termination::cancelled
                          ? with_contacts_found(recording, model, optimum.unknowns)
                          : std::nullopt;
   if (found) {
@@ -221,7 +241,8 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     }
     const std::optional<FinerModel> finer_there = moved(finer);
     Identification there_found =
-        fit_around(there, object, inputs, next, on_progress, address(finer_there), nullptr, doubt, looks_again - 1);
+        fit_around(there, object, inputs, next, on_progress, address(finer_there), nullptr, doubt,
+                   {looks.left - 1, around(optimum, unknowns)});
     for (FitIteration& iteration : there_found.trace) iteration.round += round;
     there_found.trace.insert(there_found.trace.begin(), answer.trace.begin(), answer.trace.end());
     there_found.fit.solves += model.solves();
@@ -365,9 +386,8 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
                    const FitOptions& options, const OnProgress& progress, const FinerModel* finer, FitMemory* memory,
                    ShapeDoubt* doubt) {
-  constexpr int looks_again = 2;  // at contacts that were found elsewhere: the second time to be sure
   check(options);
-  return fit_around(recording, object, inputs, options, progress, finer, memory, doubt, looks_again);
+  return fit_around(recording, object, inputs, options, progress, finer, memory, doubt, {});
 }
 
 }  // namespace palpate::estimation

@@ -53,7 +53,8 @@ bool ForwardModel::Solved::holds_for(const Solved& other) const {
 }
 
 ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options,
-                           std::shared_ptr<Solved> earlier, double response_tolerance)
+                           std::shared_ptr<Solved> earlier, double response_tolerance,
+                           std::optional<std::pair<double, double>> poisson_expected)
     : recording_(&recording), object_(std::move(object)), options_(options) {
   // From a hundredth of a pascal to diamond: beyond that the fit has lost its way.
   unknowns.add({"young_modulus", "log Pa", 0, std::numeric_limits<double>::infinity(), std::log(1e-2), std::log(1.2e12)});
@@ -173,6 +174,10 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   poisson_lower_ = unknowns[poisson].lower;
   poisson_upper_ =
       recording.model.poisson_fixed ? poisson_lower_ : unknowns[poisson].upper;  // one ratio needs no polynomial
+  if (poisson_expected && poisson_upper_ > poisson_lower_) {
+    poisson_lower_ = std::max(poisson_lower_, poisson_expected->first);
+    poisson_upper_ = std::min(poisson_upper_, poisson_expected->second);
+  }
   // Steps share the threads; the solves in them use what is left over.
   if (!linear_) options_.threads = std::max(1, options_.threads / static_cast<int>(workers_));
   solved_->material = object_.material;

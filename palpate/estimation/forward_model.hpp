@@ -67,9 +67,11 @@ class ForwardModel {
   /// @param earlier  of a model of the same object, held in the same way, that has done its work: it is used again where law,
   ///                 options and contacts are the same, else made anew
   /// @param response_tolerance  of a linear body's answers between the Poisson ratios that it is solved at, relative
+  /// @param poisson_expected  a linear body is made ready for these ratios alone; others cost a factorisation each
   /// @throws Error when a load names no tool, or supports leave a motion free that a load works on.
   ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options = {},
-               std::shared_ptr<Solved> earlier = nullptr, double response_tolerance = 1e-6);
+               std::shared_ptr<Solved> earlier = nullptr, double response_tolerance = 1e-6,
+               std::optional<std::pair<double, double>> poisson_expected = std::nullopt);
   ~ForwardModel();
   const std::shared_ptr<Solved>& solved() const { return solved_; }
 
