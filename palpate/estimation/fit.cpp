@@ -9,6 +9,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/answer_parts.hpp"
+#include "palpate/estimation/contacts_found.hpp"
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/doubts.hpp"
 #include "palpate/estimation/error_budget.hpp"
@@ -58,30 +59,6 @@ std::vector<Parameter> parameters_so_far(const VectorX& unknowns) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   return {{"young_modulus", "", "Pa", std::exp(unknowns(log_young)), nan, nan, nan, true},
           {"poisson_ratio", "", "1", unknowns(poisson), nan, nan, nan, true}};
-}
-
-/// Where a contact was found further off than this share of its tool's size from where its columns are right, they are made
-/// anew: a dent is as wide as its tool, and moves with it.
-constexpr double as_good_as_linear = 0.1;
-
-/// The same pushes with the contacts where these unknowns put them; nothing where that changes little.
-std::optional<std::vector<Push>> with_contacts_found(const Recording& recording, const ForwardModel& model, const VectorX& unknowns) {
-  double largest = 0;  // of the tool's size
-  for (std::size_t s = 0; s < model.step_count(); ++s) {
-    for (std::size_t l = 0; l < model.step(s).loads.size(); ++l) {
-      const Load& load = model.step(s).loads[l];
-      const Tool& tool = model.tool(load.tool);
-      const double size_m = tool.radius_m > 0 ? tool.radius_m : tool.length_m;
-      if (size_m > 0) largest = std::max(largest, (model.contact_found_m(s, l, unknowns) - load.contact_found_m).norm() / size_m);
-    }
-  }
-  if (largest < as_good_as_linear) return std::nullopt;
-  std::vector<Push> found = recording.pushes;
-  for (std::size_t s = 0; s < model.step_count(); ++s) {
-    std::vector<Load>& loads = found[model.index(s).push].steps[model.index(s).step].loads;
-    for (std::size_t l = 0; l < loads.size(); ++l) loads[l].contact_found_m = model.contact_found_m(s, l, unknowns);
-  }
-  return found;
 }
 
 /// How many evaluations a fit takes is not known beforehand: the share done comes nearer to one with each of them.
@@ -209,23 +186,18 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   };
   if (!take()) return answer;
 
-  const auto found = looks.left > 0 && optimum.termination != Termination::cancelled
-                         ? with_contacts_found(recording, model, optimum.unknowns)
-                         : std::nullopt;
-  if (found) {
-    Recording there = recording;  // what is solved for there is of no use to a next fit: no memory of it
-    there.pushes = *found;
-    const auto moved = [&](const FinerModel* mesh) {
-      std::optional<FinerModel> out;
-      if (mesh != nullptr) out.emplace(*mesh).recording.pushes = *found;
-      return out;
+  std::optional<Recording> there;
+  if (looks.left > 0 && optimum.termination != Termination::cancelled)
+    there = with_contacts_found(recording, model, optimum.unknowns);
+  if (there) {
+    std::list<FinerModel> meshes;
+    const auto pushed_there = [&](const FinerModel* mesh) -> const FinerModel* {
+      if (mesh == nullptr) return nullptr;
+      meshes.push_back(*mesh);
+      meshes.back().recording.pushes = there->pushes;
+      return &meshes.back();
     };
-    const auto address = [](const std::optional<FinerModel>& mesh) { return mesh ? &*mesh : nullptr; };
-    struct Moved {
-      std::optional<FinerModel> mesh, finer;
-      FinerMesh both;
-    };
-    std::list<Moved> meshes;
+    std::list<FinerMesh> taken;
     FitOptions next = options;
     next.young_start_pa = std::exp(optimum.unknowns(log_young));
     next.poisson_start = optimum.unknowns(poisson);
@@ -234,20 +206,18 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
       next.take_finer = [&](const std::vector<YoungDoubt>& doubts) -> const FinerMesh* {
         const FinerMesh* better = options.take_finer(doubts);
         if (better == nullptr) return nullptr;
-        Moved& mine = meshes.emplace_back(Moved{moved(better->mesh), moved(better->finer), {}});
-        mine.both = {address(mine.mesh), address(mine.finer)};
-        return &mine.both;
+        taken.push_back({pushed_there(better->mesh), pushed_there(better->finer)});
+        return &taken.back();
       };
     }
-    const std::optional<FinerModel> finer_there = moved(finer);
-    Identification there_found =
-        fit_around(there, object, inputs, next, on_progress, address(finer_there), nullptr, doubt,
-                   {looks.left - 1, around(optimum, unknowns)});
-    for (FitIteration& iteration : there_found.trace) iteration.round += round;
-    there_found.trace.insert(there_found.trace.begin(), answer.trace.begin(), answer.trace.end());
-    there_found.fit.solves += model.solves();
-    there_found.fit.load_cases += model.load_cases();
-    return there_found;
+    // What is solved for there is of no use to a next fit: no memory of it.
+    Identification at_last = fit_around(*there, object, inputs, next, on_progress, pushed_there(finer), nullptr, doubt,
+                                        {looks.left - 1, around(optimum, unknowns)});
+    for (FitIteration& iteration : at_last.trace) iteration.round += round;
+    at_last.trace.insert(at_last.trace.begin(), answer.trace.begin(), answer.trace.end());
+    at_last.fit.solves += model.solves();
+    at_last.fit.load_cases += model.load_cases();
+    return at_last;
   }
 
   ResidualSummary residuals;
