@@ -62,6 +62,8 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--stated-compliance", lab.stated_compliance_m_per_n, "what the recording says of it, m/N (default: the truth)")
       ->check(CLI::NonNegativeNumber);
+  app.add_option("--stated-compliance-std", lab.stated_compliance_std_m_per_n, "how well the recording says that it is known, m/N (default: exactly)")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--relaxation", lab.relaxation, "share of each rise of the force that fades after the motion")
       ->check(CLI::Range(0.0, 0.95))
       ->capture_default_str();

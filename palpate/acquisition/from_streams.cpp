@@ -7,6 +7,7 @@
 #include <set>
 
 #include "palpate/acquisition/force_track.hpp"
+#include "palpate/acquisition/step_force.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/plane_mask.hpp"
 #include "palpate/sensing/robot_mask.hpp"
@@ -58,7 +59,11 @@ class Assembly {
     if (!clock.estimate) return clock.offset_s;
     const ClockOffset found = estimate();
     out_.clocks.push_back(found);
-    if (found.usable) return found.offset_s;
+    if (found.usable) {
+      double& left_s = out_.recording.time_offset_std_s;
+      left_s = std::hypot(left_s, found.std_s);
+      return found.offset_s;
+    }
     out_.notes.push_back("the clock of " + found.sensor +
                          " could not be aligned with the arm's (too little that both saw): taken as it is");
     return 0;
@@ -160,28 +165,14 @@ class Assembly {
     return all;
   }
 
-  struct MeanForce {
-    Vec3 force_n = Vec3::Zero();
-    double std_n = 0;  ///< of the mean, per axis
-  };
-  std::optional<MeanForce> force_at(double time_s) const {
+  std::optional<StepForce> force_at(double time_s, double seen_s) const {
     const auto& samples = track_.samples;
-    MeanForce mean;
-    Vec3 square = Vec3::Zero();
-    double count = 0;
+    const auto later = [](double t, const sensing::ContactSample& s) { return t < s.time_s; };
     // Times have come through integers: the sample at the step's own time belongs to it.
-    const auto last = std::upper_bound(samples.begin(), samples.end(), time_s + 1e-6,
-                                       [](double t, const sensing::ContactSample& s) { return t < s.time_s; });
-    for (auto s = std::make_reverse_iterator(last); s != samples.rend() && s->time_s >= time_s - plan_.window_s; ++s) {
-      mean.force_n += s->force_n;
-      ++count;
-    }
-    if (count == 0) return std::nullopt;
-    mean.force_n /= count;
-    auto s = std::make_reverse_iterator(last);
-    for (double k = 0; k < count; ++k, ++s) square += (s->force_n - mean.force_n).cwiseAbs2();
-    if (count > 1) mean.std_n = std::sqrt(square.mean() / (count - 1) / count);
-    return mean;
+    const auto last = std::upper_bound(samples.begin(), samples.end(), time_s + 1e-6, later);
+    auto first = last;
+    while (first != samples.begin() && std::prev(first)->time_s >= time_s - plan_.window_s) --first;
+    return step_force({first, last}, seen_s);
   }
 
   void add_push(const PushTimes& times) {
@@ -210,9 +201,12 @@ class Assembly {
     Vec3 direction = plan.direction ? *plan.direction : Vec3::Zero();
     double highest_n = 0, deepest_m = 0;
     std::size_t loaded_steps = 0;
+    std::vector<double> moving;  // times of steps whose force had not settled
     for (const StepTime& at : times.steps) {
-      const auto force = force_at(at.time_s);
-      const auto tip = tree_.lookup(plan_.base_frame, plan_.tip_frame, at.time_s);
+      const double seen_s = seen_at(at.time_s);
+      const auto force = force_at(at.time_s, seen_s);
+      const bool on_its_way = force && !force->rate_n_s.isZero(0);
+      const auto tip = tree_.lookup(plan_.base_frame, plan_.tip_frame, on_its_way ? seen_s : at.time_s);
       if (!force && at.loaded.value_or(true)) {
         out_.notes.push_back(push.name + ": no force within " + seconds(plan_.window_s) + " before " + seconds(at.time_s) +
                              ": step left out");
@@ -245,6 +239,8 @@ class Assembly {
         load.force_n = pressing;
         load.force_std_n = plan.force_std_n ? *plan.force_std_n : force->std_n;
         load.force_relative_std = plan.force_relative_std;
+        load.force_rate_n_s = force->rate_n_s;
+        if (on_its_way) moving.push_back(step.time_s);
         load.contact_m = contact;
         load.direction = direction;
         load.contact_std_m = plan.contact_std_m;
@@ -257,7 +253,29 @@ class Assembly {
       look(step);
       push.steps.push_back(std::move(step));
     }
+    if (!moving.empty())
+      out_.notes.push_back(push.name + ": the force was changing in " + std::to_string(moving.size()) +
+                           (moving.size() == 1 ? " step" : " steps") + ", the first at " + seconds(moving.front()) +
+                           "; taken at the time of the image, with its rate" +
+                           (out_.recording.time_offset_std_s > 0
+                                ? ""
+                                : " (state time_offset_std_s, or what the clocks of force and camera differ by is taken as exactly known)"));
     if (!push.steps.empty()) out_.recording.pushes.push_back(std::move(push));
+  }
+
+  /// When the image that will belong to a step was taken; without one, the step's own time.
+  double seen_at(double time_s) const {
+    for (std::size_t c = 0; c < streams_.cameras.size(); ++c) {
+      std::set<std::size_t> used = used_images_[c];
+      const auto image = nearest(streams_.cameras[c].times_s, camera_offset_s_[c], time_s, used);
+      if (image) return streams_.cameras[c].times_s[*image] + camera_offset_s_[c];
+    }
+    for (std::size_t c = 0; c < streams_.clouds.size(); ++c) {
+      std::set<std::size_t> used = used_clouds_[c];
+      const auto cloud = nearest(streams_.clouds[c].times_s, cloud_offset_s_, time_s, used);
+      if (cloud) return streams_.clouds[c].times_s[*cloud] + cloud_offset_s_;
+    }
+    return time_s;
   }
 
   /// Index of the sample nearest to a time, if near enough and not used by another step.

@@ -110,6 +110,7 @@ struct Tool {
   ContactLaw contact = ContactLaw::bonded;
   double friction_coefficient = 0;
   double compliance_m_per_n = 0;  ///< of stick and arm between encoder and tip
+  double compliance_std_m_per_n = 0;  ///< its prior standard deviation; 0 = exactly known
 };
 
 /// What acts on the object in one step. Either the force is imposed (measured) or the motion is.
@@ -118,6 +119,7 @@ struct Load {
   std::optional<Vec3> force_n;      ///< resultant on the object, base frame
   double force_std_n = 0;           ///< absolute part of its prior standard deviation, per axis
   double force_relative_std = 0;    ///< relative part, independent from step to step (0.02 = 2 %)
+  Vec3 force_rate_n_s = Vec3::Zero();  ///< how fast force_n was changing when the step was seen; zero once it has settled
   std::optional<double> travel_m;   ///< motion imposed along the tool's direction (platen: its plane normal)
   Vec3 contact_m = Vec3::Zero();    ///< contact point on the rest surface (tools that are not `vertices` or `platen`)
   Vec3 direction = -Vec3::UnitZ();  ///< unit vector of the push, into the object
@@ -228,6 +230,7 @@ struct Recording {
   double density_kg_m3 = 0;  ///< 0 = unknown and not needed
   double density_std_kg_m3 = 0;
   double force_scale_std = 0;  ///< prior of the sensor's common scale error (0.01 = 1 %)
+  double time_offset_std_s = 0;  ///< prior of what is left between the clocks of force and camera
   ModelDefaults model;
   std::vector<Push> pushes;
   std::string source;                               ///< path it was read from

@@ -66,6 +66,16 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   }
   parameters_ = unknowns.parameter_count();
   force_scale_ = unknowns.add_block("force_scale", "1", recording.force_scale_std, {""});
+  const bool moves = std::any_of(recording.pushes.begin(), recording.pushes.end(), [](const Push& push) {
+    return std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) {
+      return std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) { return !load.force_rate_n_s.isZero(0); });
+    });
+  });
+  if (moves) time_offset_ = unknowns.add_block("time_offset", "s", recording.time_offset_std_s, {""});
+  for (const Tool& one : recording.tools) {
+    if (one.compliance_std_m_per_n > 0)
+      compliance_[one.name] = unknowns.add({"compliance[" + one.name + "]", "m/N", 0, one.compliance_std_m_per_n});
+  }
   const bool weight_acts = recording.rest.state == RestState::stress_free && recording.environment.gravity_m_s2.norm() > 0;
   if (weight_acts) {
     if (!(recording.density_kg_m3 > 0)) throw Error("gravity acts, so the density is needed", "density_kg_m3");

@@ -80,6 +80,11 @@ class ForwardModel {
   const Push& push(std::size_t s) const;
   /// @throws Error when no tool has this name.
   const Tool& tool(const std::string& name) const;
+  /// What stick and arm behind a tool yield more than stated, m/N; -1 where that is exactly known.
+  int compliance_unknown(const std::string& tool) const {
+    const auto known = compliance_.find(tool);
+    return known == compliance_.end() ? -1 : known->second;
+  }
   StepIndex index(std::size_t s) const { return steps_[s]; }
   const SimulatedObject& object() const { return object_; }
   /// Of the surface at rest, made when it is first asked for (by one thread): others copy it.
@@ -197,7 +202,8 @@ class ForwardModel {
   std::vector<double> effort_;                   // a step: its load as a share of the highest
   std::vector<int> tare_, travel_offset_;        // a push: first of three, the one; or -1
   std::vector<Vec3> tare_axis_;                  // a push: zero = three unknowns, else one along this axis
-  int force_scale_ = -1, density_ = -1;
+  int force_scale_ = -1, time_offset_ = -1, density_ = -1;
+  std::map<std::string, int> compliance_;  // a tool whose compliance is not exactly known
   int parameters_ = first_ratio;  ///< log E, nu and the regions' ratios: the first columns of every derivative
   const SurfaceField* field_ = nullptr;  // of solved_; nullptr: none
   int field_unknown_ = -1;

@@ -254,7 +254,12 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     const Load& load = now.loads[l];
     if (load.travel_m) {
       const int at = body.motion_column.at(load.tool);
-      c.motion(at) = *load.travel_m - tool(load.tool).compliance_m_per_n * read_force_n(now, load);
+      const double read_n = read_force_n(now, load);
+      c.motion(at) = *load.travel_m - tool(load.tool).compliance_m_per_n * read_n;
+      if (const int yields = compliance_unknown(load.tool); yields >= 0) {
+        c.motion(at) -= unknowns(yields) * read_n;
+        c.d_motion(at, column(yields)) = -read_n;
+      }
       if (travel_offset_[p] >= 0) {
         c.motion(at) += unknowns(travel_offset_[p]);
         const int offset = column(travel_offset_[p]);
@@ -267,6 +272,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     const int error = force_error_[s][l];
     Vec3 measured = load.force_n.value_or(Vec3::Zero());
     if (error >= 0) measured += unknowns.segment<3>(error);
+    if (time_offset_ >= 0) measured += unknowns(time_offset_) * load.force_rate_n_s;
     const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
     Vec3 tare = Vec3::Zero();
     if (tare_[p] >= 0) tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
@@ -279,6 +285,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
       };
       for (int k = 0; error >= 0 && k < 3; ++k) add_derivative(error + k, scale * Vec3::Unit(k));
       if (force_scale_ >= 0) add_derivative(force_scale_, measured);
+      if (time_offset_ >= 0) add_derivative(time_offset_, scale * load.force_rate_n_s);
       const bool one_axis = tare_axis_[p].norm() > 0;
       for (int k = 0; tare_[p] >= 0 && k < (one_axis ? 1 : 3); ++k) {
         add_derivative(tare_[p] + k, one_axis ? tare_axis_[p] : Vec3(Vec3::Unit(k)));

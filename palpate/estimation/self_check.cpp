@@ -286,14 +286,14 @@ Problem problem_of(const Recording& recording, const TriMesh& surface, const Inp
   return p;
 }
 
-/// Of the stated compliance, where all tools agree.
-double stated_compliance(const Recording& recording) {
+/// Whose compliance is stated: the first tool that touches (all are taken to agree).
+Tool touching_tool(const Recording& recording) {
   for (const auto& push : recording.pushes)
     for (const auto& step : push.steps)
       for (const auto& load : step.loads)
         for (const auto& tool : recording.tools)
-          if (tool.name == load.tool) return tool.compliance_m_per_n;
-  return 0;
+          if (tool.name == load.tool) return tool;
+  return {};
 }
 
 void judge(const Problem& p, SelfCheck& check) {
@@ -307,7 +307,7 @@ void judge(const Problem& p, SelfCheck& check) {
           " % too much, which is as much error in Young's modulus: calibrate it, or state force_scale_std";
     else if (group == "compliance")
       said["compliance_off"] = "stick and arm give way by " + std::to_string(1e3 * error.value) +
-                               " mm per newton more than tools.compliance_m_per_n says: add it there";
+                               " mm per newton more than tools.compliance_m_per_n says: add it there, and how well it is known as compliance_std_m_per_n";
     else if (group == "force_tare")
       said["force_tare_off"] =
           "the force's zero is off by more than force_tare_std_n allows: tare just before each push, away from the object";
@@ -414,7 +414,8 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
     check.errors.push_back(error);
   };
   add("force_scale", "1", scale, recording.force_scale_std);
-  add("compliance", "m/N", compliance, 0, stated_compliance(recording));
+  const Tool tool = touching_tool(recording);
+  add("compliance", "m/N", compliance, tool.compliance_std_m_per_n, tool.compliance_m_per_n);
   const char* axes[] = {"x", "y", "z"};
   for (int d = 0; d < 3; ++d) add(std::string("hand_eye_") + axes[d], "m", camera + d, pose_std_m);
   for (int d = 0; d < 3; ++d) add(std::string("hand_eye_rotation_") + axes[d], "rad", camera_turn + d, pose_std_rad);

@@ -140,6 +140,7 @@ class BagWriter {
     const Load& load = step.loads.front();
     if (step.loads.size() != 1) refuse("has several loads", step);
     if (!load.force_n) refuse("the travel is imposed, not the force", step);
+    if (!load.force_rate_n_s.isZero(0)) refuse("the force was changing (force_rate_n_s); a bag of steps holds settled ones", step);
     if (load.tool != first.tool || load.contact_m != first.contact_m || load.direction != first.direction ||
         load.force_relative_std != first.force_relative_std || load.contact_std_m != first.contact_std_m)
       refuse("tool, contact, direction or priors of the load differ from those of the push's first load", step);

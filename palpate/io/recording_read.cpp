@@ -81,6 +81,7 @@ void read_object(YamlKeys& keys, RecordingContext& context) {
   recording.description = keys.text_or("description", "");
   recording.accept_size = keys.boolean_or("accept_size", false);
   recording.force_scale_std = keys.non_negative_or("force_scale_std", 0);
+  recording.time_offset_std_s = keys.non_negative_or("time_offset_std_s", 0);
   read_density(keys, recording);
   read_environment(keys, recording);
   // Keys are asked for in an order that lets each part refer to what it needs, and all before any is missed, so that a

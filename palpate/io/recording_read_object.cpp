@@ -249,6 +249,7 @@ void read_tools(const YamlField& field, RecordingContext& context) {
     }
     tool.contact = read_contact(keys, tool.shape != ToolShape::vertices, tool.friction_coefficient);
     tool.compliance_m_per_n = keys.non_negative_or("compliance_m_per_n", 0);
+    tool.compliance_std_m_per_n = keys.non_negative_or("compliance_std_m_per_n", 0);
     keys.finish();
     context.recording.tools.push_back(std::move(tool));
   }

@@ -373,6 +373,11 @@ Load read_load(const YamlField& field, const TableRow* row, bool alone, const Re
   load.force_std_n = keys.non_negative_or("force_std_n", 0);
   load.force_relative_std = keys.non_negative_or("force_relative_std", 0);
   load.contact_std_m = keys.non_negative_or("contact_std_m", 0);
+  const auto rate = vector("force_rate", "_n_s");
+  const auto rate_field = keys.optional("force_rate_n_s");
+  if ((rate || rate_field) && !load.force_n) keys.required("force_n", "a rate belongs to a force that is given");
+  if (rate) load.force_rate_n_s = *rate;
+  else if (rate_field) load.force_rate_n_s = rate_field->vector3();
   keys.finish();
   return load;
 }

@@ -140,6 +140,7 @@ std::string load_text(const Load& load) {
   line.vector("contact_m", load.contact_m).vector("direction", load.direction);
   line.number_unless(0, "force_std_n", load.force_std_n).number_unless(0, "force_relative_std", load.force_relative_std);
   line.number_unless(0, "contact_std_m", load.contact_std_m);
+  if (!load.force_rate_n_s.isZero(0)) line.vector("force_rate_n_s", load.force_rate_n_s);
   return line.str();
 }
 
@@ -260,7 +261,8 @@ std::string RecordingWriter::Pages::tool_text(const Tool& tool, std::size_t numb
     }
   }
   put_contact(line, tool.contact, tool.friction_coefficient);
-  line.number_unless(0, "compliance_m_per_n", tool.compliance_m_per_n);
+  line.number_unless(0, "compliance_m_per_n", tool.compliance_m_per_n)
+      .number_unless(0, "compliance_std_m_per_n", tool.compliance_std_m_per_n);
   return line.str();
 }
 
@@ -291,6 +293,7 @@ void RecordingWriter::Pages::set_head(const Recording& recording) {
   if (!recording.tools.empty()) head += "tools:\n";
   for (std::size_t i = 0; i < recording.tools.size(); ++i) head += "  - " + tool_text(recording.tools[i], i + 1) + "\n";
   head += fmt::format("force_scale_std: {}\n", recording.force_scale_std);
+  if (recording.time_offset_std_s != 0) head += fmt::format("time_offset_std_s: {}\n", recording.time_offset_std_s);
   if (recording.robot) {
     std::string joints;
     for (const std::string& joint : recording.joint_names) joints += (joints.empty() ? "" : ", ") + yaml_word(joint);

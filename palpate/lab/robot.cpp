@@ -103,6 +103,7 @@ void check(const LabOptions& o) {
   need(o.relaxation_s > 0, "relaxation_s", "must be positive");
   need(o.slip_at_m > 0, "slip_at_m", "must be positive");
   need(o.compliance_m_per_n >= 0, "compliance_m_per_n", "must not be negative");
+  need(o.stated_compliance_std_m_per_n >= 0, "stated_compliance_std_m_per_n", "must not be negative");
   need(!o.stated_compliance_m_per_n || *o.stated_compliance_m_per_n >= 0, "stated_compliance_m_per_n", "must not be negative");
   need(o.slides_at_n > 0, "slides_at_n", "must be positive");
   check(o.force);
@@ -346,6 +347,7 @@ Recording LabRobot::scene() const {
   pad.shape = ToolShape::disc;
   pad.radius_m = lab.object.pad_radius_m;
   pad.compliance_m_per_n = lab.options.stated_compliance_m_per_n.value_or(lab.options.compliance_m_per_n);
+  pad.compliance_std_m_per_n = lab.options.stated_compliance_std_m_per_n;
   recording.tools.push_back(pad);
   recording.joint_names = lab.mask.kinematics().free_joints();
   recording.robot = lab.mask.kinematics().robot();

@@ -28,6 +28,7 @@ struct LabOptions {
   double slip_at_m = 1e9;             ///< travel at which the tip slides off sideways by 5 mm
   double compliance_m_per_n = 0;      ///< of stick and arm: the tip stays behind the encoders by this times the force
   std::optional<double> stated_compliance_m_per_n;  ///< what the recording says of it; not given: the truth
+  double stated_compliance_std_m_per_n = 0;         ///< and how well it is said to be known
   /// Sideways force at which the object starts to slide on the table; it then moves with the push, at this force, and stays
   /// where it was pushed to (Coulomb friction; without turning, and the tip keeps its place on the object).
   double slides_at_n = 1e9;

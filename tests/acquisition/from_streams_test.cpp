@@ -192,6 +192,35 @@ TEST(FromStreams, TimesAndMarksChooseTheSteps) {
   EXPECT_TRUE(marked[0].steps[2].unloading) << "the mark says so";
 }
 
+TEST(FromStreams, AForceOnItsWayIsThatOfTheImage) {
+  StreamPlan moving = plan();
+  moving.steps_by = StepsBy::times;
+  moving.pushes = {moving.any_push};
+  moving.pushes[0].name = "away";
+  moving.pushes[0].at_s = {23.5, 24.79};  // standing; going back at 10 mm/s, the image is of 24.8 s
+  const FromStreams made = recording_from(moving, lab());
+  const auto& steps = made.recording.pushes.at(0).steps;
+  ASSERT_EQ(steps.size(), 2u);
+  EXPECT_TRUE(steps[0].loads.at(0).force_rate_n_s.isZero(0));
+  const Load& load = steps[1].loads.at(0);
+  EXPECT_NEAR(load.force_n->z(), -force_n(24.8), 0.02) << "the mean over half a second is a newton more";
+  EXPECT_NEAR(load.force_rate_n_s.z(), 4, 0.1);
+  EXPECT_LT(load.force_rate_n_s.head<2>().norm(), 0.1);
+  EXPECT_GT(load.force_std_n, 1e-3);
+  EXPECT_LT(load.force_std_n, 0.01) << "of a line through a hundred samples of 0.02 N, at its end";
+  EXPECT_NEAR(travel_of(steps[0]) - travel_of(steps[1]), height_m(24.8) - height_m(23.5), 1e-4);
+  EXPECT_THAT(made.notes, testing::Contains(HasSubstr("the force was changing in 1 step, the first at 24.790 s")));
+}
+
+TEST(FromStreams, WhatEstimatedClocksLeaveIsStated) {
+  StreamPlan aligned = plan();
+  aligned.camera_clock.estimate = true;
+  aligned.recording.time_offset_std_s = 0.003;
+  const FromStreams made = recording_from(aligned, lab());
+  ASSERT_EQ(made.clocks.size(), 1u);
+  EXPECT_NEAR(made.recording.time_offset_std_s, std::hypot(0.003, made.clocks[0].std_s), 1e-12);
+}
+
 TEST(FromStreams, LateClocksAreFoundAndTakenOff) {
   for (const double late_s : {-0.21, 0.0, 0.13}) {
     LabOptions options;

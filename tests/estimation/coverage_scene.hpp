@@ -11,9 +11,12 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "fem/calculix.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/fem/boundary.hpp"
@@ -207,6 +210,8 @@ class Scene {
  public:
   static constexpr double sigma_m = 2e-3;
   static constexpr int levels = 6, points = 2000;
+  /// Truths are solved by CalculiX (C3D10) instead of our own solver, on the same mesh of theirs.
+  bool by_calculix = false;
 
   /// @param fine  elements across the pad's radius of the true mesh (the fit's has three)
   Scene(SceneSpec given, int fine) : spec_(std::move(given)) {
@@ -377,15 +382,17 @@ class Scene {
     return recording;
   }
 
+  std::vector<Index> held_nodes() const {
+    std::set<Index> held;
+    for (const Support& support : supports_) {
+      for (Index node : fem::support_nodes(mesh_, support)) held.insert(node);
+    }
+    return {held.begin(), held.end()};
+  }
+
   std::unique_ptr<fem::Statics> statics_at(const Vec3& contact_m, Eigen::SparseMatrix<double>& watched) const {
     fem::Boundary boundary;
-    std::vector<char> held(static_cast<std::size_t>(mesh_.nodes_m.rows()), 0);
-    for (const Support& support : supports_) {
-      for (Index node : fem::support_nodes(mesh_, support)) held[static_cast<std::size_t>(node)] = 1;
-    }
-    for (std::size_t node = 0; node < held.size(); ++node) {
-      if (held[node] != 0) boundary.constraints.push_back({static_cast<Index>(node), Mat3::Identity(), 3});
-    }
+    for (Index node : held_nodes()) boundary.constraints.push_back({node, Mat3::Identity(), 3});
     boundary.forces = fem::spread_over_patch(mesh_, contact_m, spec_.pad_radius_m);
     boundary.motions.resize(boundary.forces.rows(), 0);
     Eigen::SparseMatrix<double, Eigen::RowMajor> rows = surface_.rows(static_cast<Index>(mesh_.nodes_m.rows()));
@@ -400,7 +407,20 @@ class Scene {
 
   Unit unit_response(const Vec3& contact_m, double poisson) {
     Unit out;
-    if (contact_m == spec_.contact_m) {
+    if (by_calculix) {
+      constexpr double young_pa = 1e4;  // its digits are few, but not those of the exponent
+      Eigen::SparseMatrix<double> watched;
+      const auto statics = statics_at(contact_m, watched);
+      const Eigen::SparseMatrix<double> forces = fem::spread_over_patch(mesh_, contact_m, spec_.pad_radius_m);
+      MatrixX moved(watched.rows(), 3);
+      for (int axis = 0; axis < 3; ++axis) {
+        const VectorX u = fem::calculix_displacements(mesh_, held_nodes(), VectorX(forces.col(axis)), false, young_pa, poisson);
+        if (!u.allFinite()) throw std::runtime_error("CalculiX (ccx) gave no displacements");
+        moved.col(axis) = young_pa * (watched * u);
+      }
+      out.moved = moved.topRows(moved.rows() - 3);
+      out.pad = moved.bottomRows<3>();
+    } else if (contact_m == spec_.contact_m) {
       const auto known = response_->at(poisson);
       out.moved = known->force.topRows(known->force.rows() - 3);
       out.pad = known->force.bottomRows<3>();

@@ -3,7 +3,8 @@
 // How often the intervals hold the truth, how far off the answers are, and how near they come to the Cramer-Rao bound: the table
 // of docs/uncertainty.md. A few recordings a row by default;
 //   PALPATE_SEEDS=200 PALPATE_ROW=pose,rest PALPATE_SCENE=ball_top estimation_coverage_test
-// for figures that mean something (PALPATE_FIRST_SEED to go on elsewhere, PALPATE_EACH=1 for a line a recording).
+// for figures that mean something (PALPATE_FIRST_SEED to go on elsewhere, PALPATE_EACH=1 for a line a recording, PALPATE_TRUTH=calculix for
+// truths by CalculiX).
 #include <gtest/gtest.h>
 #include <time.h>
 
@@ -100,12 +101,16 @@ TEST(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
   const int seeds = from_environment("PALPATE_SEEDS", 3), first = from_environment("PALPATE_FIRST_SEED", 1);
   const int fine = from_environment("PALPATE_FINE", 6);
   const bool each = std::getenv("PALPATE_EACH") != nullptr;
+  const char* solver = std::getenv("PALPATE_TRUTH");
+  const bool by_calculix = solver != nullptr && std::string(solver) == "calculix";
+  if (by_calculix && !fem::calculix_is_there()) GTEST_SKIP() << "CalculiX (ccx) is not installed";
   estimation::FitOptions options;
   options.cross_checks = options.stresses = false;
   std::printf("| scene       | row        |    |    n | 68 %%| 95 %%| pull   | bias     | rms     | bound   | stated  | rms / bound |\n");
   for (const SceneSpec& spec : scenes()) {
     if (!wanted("PALPATE_SCENE", spec.name)) continue;
     Scene scene(spec, fine);
+    scene.by_calculix = by_calculix;
     if (each) {
       std::printf("%s: %d tetrahedra, the truth has %d, its own error over nu is %.1e\n", spec.name.c_str(),
                   int(scene.object().mesh.tetrahedra.rows()), int(scene.true_tetrahedra()), scene.solver_error());

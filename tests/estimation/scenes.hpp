@@ -106,6 +106,7 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
     recording.density_std_kg_m3 = 50;
   }
   recording.force_scale_std = 0.02;
+  recording.time_offset_std_s = 0.02;
 
   Tool tip;
   tip.name = "tip";
@@ -122,6 +123,8 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   disc.shape = ToolShape::disc;
   disc.radius_m = 0.012;
   disc.radius_std_m = 1.5e-3;
+  disc.compliance_std_m_per_n = 2e-3;
+  plate.compliance_std_m_per_n = 3e-4;
   recording.tools = {tip, plate, disc};
   recording.rest.surface_std_m = 4e-4;
   recording.rest.surface_correlation_m = 0.03;
@@ -136,6 +139,7 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   force.direction = Vec3(0.2, 0.1, -1).normalized();
   force.force_std_n = 0.005;
   force.force_relative_std = 0.02;
+  force.force_rate_n_s = Vec3(0.02, -0.01, -0.3);
   by_tip.steps.resize(2);
   by_tip.steps[0].loads = {force};
 
@@ -149,6 +153,11 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   travel.direction = -Vec3::UnitZ();
   by_plate.steps.resize(1);
   by_plate.steps[0].loads = {travel};
+  Wrench read;  // what the plate's compliance works on
+  read.tool = "plate";
+  read.force_n = Vec3(0.1, 0, -1.5);
+  read.force_sigma_n = 0.05;
+  by_plate.steps[0].observations = {read};
 
   Push by_disc;
   by_disc.name = "disc";

@@ -58,8 +58,9 @@ regions:
 environment: {gravity_m_s2: [0, 0, -9.81], planes: [{point_m: [0, 0, 0], normal: [0, 0, 1]}]}
 density_kg_m3: {value: 1070, std: 10}
 force_scale_std: 0.01
+time_offset_std_s: 0.004
 tools:
-  - {name: ball, shape: sphere, radius_m: 0.01, radius_std_m: 0.002, contact: frictionless, compliance_m_per_n: 0.0001}
+  - {name: ball, shape: sphere, radius_m: 0.01, radius_std_m: 0.002, contact: frictionless, compliance_m_per_n: 0.0001, compliance_std_m_per_n: 0.00002}
   - {name: line, shape: edge, axis: [0, 1, 0], length_m: 0.1, contact: bonded}
   - {name: plate, shape: platen, point_m: [0, 0, 0.1], normal: [0, 0, -1], contact: frictionless}
   - {name: stamp, shape: mesh, file: stamp.ply, contact: bonded}
@@ -95,7 +96,7 @@ pushes:
         joints_rad: [0.1, 0.2]
         T_base_tip: [[1, 0, 0, 0.05], [0, 1, 0, 0], [0, 0, 1, 0.1], [0, 0, 0, 1]]
         loads:
-          - {tool: ball, force_n: 3, direction: [0, 0, -1], contact_m: [0.05, 0.05, 0.1], force_std_n: 0.05, contact_std_m: 0.001}
+          - {tool: ball, force_n: 3, direction: [0, 0, -1], contact_m: [0.05, 0.05, 0.1], force_std_n: 0.05, contact_std_m: 0.001, force_rate_n_s: [0, 0.1, -2]}
           - {tool: plate, travel_m: 0.002}
         observations:
           - {kind: travel, tool: ball, travel_m: 0.004, sigma_m: 0.0001}
@@ -160,6 +161,8 @@ TEST(ReadRecording, EveryKindOfKey) {
   EXPECT_EQ(recording.supports[0].pose_varies, PoseVaries::push);
   EXPECT_EQ(recording.supports[0].spread_std_m, 0.001);
   EXPECT_EQ(recording.tools.at(0).radius_std_m, 0.002);
+  EXPECT_EQ(recording.tools[0].compliance_std_m_per_n, 0.00002);
+  EXPECT_EQ(recording.time_offset_std_s, 0.004);
   EXPECT_EQ(recording.supports.at(2).contact, ContactLaw::friction);
   EXPECT_EQ(recording.density_std_kg_m3, 10);
   ASSERT_EQ(recording.regions.size(), 3u);
@@ -185,6 +188,7 @@ TEST(ReadRecording, EveryKindOfKey) {
   const Step& second = recording.pushes[0].steps.at(1);
   EXPECT_TRUE(second.unloading);
   EXPECT_EQ(*second.loads.at(0).force_n, Vec3(0, 0, -3));
+  EXPECT_EQ(second.loads[0].force_rate_n_s, Vec3(0, 0.1, -2));
   EXPECT_EQ(*second.loads.at(1).travel_m, 0.002);
   EXPECT_EQ(second.loads[1].direction, Vec3(0, 0, -1));
   const auto& axial = std::get<Wrench>(second.observations.at(1));
@@ -216,6 +220,9 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
   EXPECT_EQ(back.supports[0].pose_std_rad, recording.supports[0].pose_std_rad);
   EXPECT_EQ(back.supports[0].spread_std_m, recording.supports[0].spread_std_m);
   EXPECT_EQ(back.tools[0].radius_std_m, recording.tools[0].radius_std_m);
+  EXPECT_EQ(back.tools[0].compliance_std_m_per_n, recording.tools[0].compliance_std_m_per_n);
+  EXPECT_EQ(back.time_offset_std_s, recording.time_offset_std_s);
+  EXPECT_EQ(back.pushes[0].steps[1].loads[0].force_rate_n_s, recording.pushes[0].steps[1].loads[0].force_rate_n_s);
   ASSERT_EQ(back.regions.size(), recording.regions.size());
   for (std::size_t r = 0; r < back.regions.size(); ++r) {
     EXPECT_EQ(back.regions[r].name, recording.regions[r].name);

@@ -57,7 +57,10 @@ TEST(Mishaps, AYieldingArmStaysBehindItsEncodersByForceTimesCompliance) {
   EXPECT_NEAR(along_of_tip(yielding.read(), plan), 0.006, 1e-5) << "the encoders know nothing of it";
   EXPECT_EQ(yielding.scene().tools[0].compliance_m_per_n, 8e-4);
   options.stated_compliance_m_per_n = 0;
-  EXPECT_EQ(LabRobot(options, small_ball()).scene().tools[0].compliance_m_per_n, 0);
+  options.stated_compliance_std_m_per_n = 5e-4;
+  const Tool stated = LabRobot(options, small_ball()).scene().tools[0];
+  EXPECT_EQ(stated.compliance_m_per_n, 0);
+  EXPECT_EQ(stated.compliance_std_m_per_n, 5e-4);
 }
 
 TEST(Mishaps, AnObjectThatSlidesBearsNoMoreThanFrictionAndIsSeenToHaveMoved) {
@@ -105,6 +108,7 @@ TEST(Mishaps, BadOptionsAreNamed) {
   EXPECT_TRUE(refused([](O& o) { o.slip_at_m = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.compliance_m_per_n = -1; }));
   EXPECT_TRUE(refused([](O& o) { o.stated_compliance_m_per_n = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.stated_compliance_std_m_per_n = -1; }));
   EXPECT_TRUE(refused([](O& o) { o.slides_at_n = 0; }));
 }
 

@@ -126,9 +126,11 @@ void expect_same_object(const Recording& a, const Recording& b) {
     EXPECT_EQ(a.tools[i].radius_m, b.tools[i].radius_m);
     EXPECT_EQ(a.tools[i].contact, b.tools[i].contact);
     EXPECT_EQ(a.tools[i].compliance_m_per_n, b.tools[i].compliance_m_per_n);
+    EXPECT_EQ(a.tools[i].compliance_std_m_per_n, b.tools[i].compliance_std_m_per_n);
   }
   EXPECT_EQ(a.density_kg_m3, b.density_kg_m3);
   EXPECT_EQ(a.force_scale_std, b.force_scale_std);
+  EXPECT_EQ(a.time_offset_std_s, b.time_offset_std_s);
   EXPECT_EQ(a.model.mesh, b.model.mesh);
   EXPECT_EQ(a.model.element, b.model.element);
   EXPECT_EQ(a.model.refine, b.model.refine);

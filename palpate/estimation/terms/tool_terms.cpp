@@ -10,20 +10,25 @@ namespace {
 
 class TravelTerm : public Term {
  public:
-  TravelTerm(double travel_m, double sigma_m, Index load, int offset)
-      : travel_m_(travel_m), sigma_m_(sigma_m), load_(load), offset_(offset) {}
+  /// @param pressed_n  read along the push: the encoder goes on by this times what the compliance is more than stated
+  TravelTerm(double travel_m, double sigma_m, Index load, int offset, int compliance, double pressed_n)
+      : travel_m_(travel_m), sigma_m_(sigma_m), pressed_n_(pressed_n), load_(load), offset_(offset), compliance_(compliance) {}
 
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView&) const override {
     TermRows rows;
     rows.unknowns = predicted.columns;
     rows.jacobian = -predicted.d_travel.row(load_) / sigma_m_;
     rows.residual.setConstant(1, (travel_m_ - predicted.travel_m(load_)) / sigma_m_);
-    if (offset_ >= 0) {  // the encoder's zero is not where contact began: reading = true travel + offset
-      rows.residual(0) -= unknowns(offset_) / sigma_m_;
-      rows.unknowns.push_back(offset_);
+    // The encoder's zero is not where contact began, and what is behind it yields: reading = true travel + offset + compliance * force.
+    const auto add = [&](int unknown, double share) {
+      if (unknown < 0) return;
+      rows.residual(0) -= share * unknowns(unknown) / sigma_m_;
+      rows.unknowns.push_back(unknown);
       rows.jacobian.conservativeResize(1, rows.jacobian.cols() + 1);
-      rows.jacobian(0, rows.jacobian.cols() - 1) = -1 / sigma_m_;
-    }
+      rows.jacobian(0, rows.jacobian.cols() - 1) = -share / sigma_m_;
+    };
+    add(offset_, 1);
+    add(compliance_, pressed_n_);
     rows.sigma.setConstant(1, sigma_m_);
     rows.unit = "m";
     return rows;
@@ -31,9 +36,9 @@ class TravelTerm : public Term {
   double typical_sigma() const override { return sigma_m_; }
 
  private:
-  double travel_m_, sigma_m_;
+  double travel_m_, sigma_m_, pressed_n_;
   Index load_;
-  int offset_;
+  int offset_, compliance_;
 };
 
 class WrenchTerm : public Term {
@@ -86,9 +91,10 @@ std::unique_ptr<Term> make_travel_term(const ToolTravel& travel, const TermConte
   }
   // The encoder reads the tip's motion plus what stick and arm give way.
   const Load& loaded = context.model.step(context.step).loads[load];
-  const double yielded_m =
-      context.model.tool(loaded.tool).compliance_m_per_n * loaded.force_n.value_or(Vec3::Zero()).dot(loaded.direction.normalized());
-  return std::make_unique<TravelTerm>(travel.travel_m - yielded_m, travel.sigma_m, static_cast<Index>(load), offset);
+  const double pressed_n = loaded.force_n.value_or(Vec3::Zero()).dot(loaded.direction.normalized());
+  const double yielded_m = context.model.tool(loaded.tool).compliance_m_per_n * pressed_n;
+  return std::make_unique<TravelTerm>(travel.travel_m - yielded_m, travel.sigma_m, static_cast<Index>(load), offset,
+                                      context.model.compliance_unknown(loaded.tool), pressed_n);
 }
 
 std::unique_ptr<Term> make_wrench_term(const Wrench& wrench, const TermContext& context) {
