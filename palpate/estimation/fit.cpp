@@ -128,7 +128,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   const OnProgress progress = paced(on_progress);
   Unknowns unknowns;
   ForwardModel model(recording, object, unknowns, statics_options(recording, object, options),
-                     memory != nullptr ? memory->model : nullptr, 1e-6, looks.poisson_expected);
+                     memory != nullptr ? memory->model : nullptr, small_response_error, looks.poisson_expected);
   if (memory != nullptr) memory->model = model.solved();
   Objective objective(model, inputs, unknowns);
   if (recording.model.poisson_fixed) unknowns[poisson].fixed = true;

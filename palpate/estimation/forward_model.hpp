@@ -56,6 +56,9 @@ struct SimulatedObject {
   std::vector<std::string> region_names;  ///< empty: one
 };
 
+/// Of a linear body's answers between the Poisson ratios that it is solved at, relative to the largest: 0.2 micrometres of 20 mm.
+inline constexpr double small_response_error = 1e-5;
+
 class ForwardModel {
  public:
   /// What was solved for and does not depend on what was measured: bodies, a linear one's answers to unit loads over nu, the
@@ -70,7 +73,7 @@ class ForwardModel {
   /// @param poisson_expected  a linear body is made ready for these ratios alone; others cost a factorisation each
   /// @throws Error when a load names no tool, or supports leave a motion free that a load works on.
   ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options = {},
-               std::shared_ptr<Solved> earlier = nullptr, double response_tolerance = 1e-6,
+               std::shared_ptr<Solved> earlier = nullptr, double response_tolerance = small_response_error,
                std::optional<std::pair<double, double>> poisson_expected = std::nullopt);
   ~ForwardModel();
   const std::shared_ptr<Solved>& solved() const { return solved_; }
