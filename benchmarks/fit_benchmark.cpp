@@ -143,7 +143,7 @@ void sample(benchmark::State& state) {
   options.cross_checks = options.stresses = false;
   estimation::GrowingFit before(options);
   for (std::size_t k = 1; k < count; ++k) before.update(scene.first(k), scene.object, scene.seen(k));
-  double error = 0, evaluated = 0;
+  double error = 0, evaluated = 0, iterations = 0;
   double nudge_m = 0;  // so that no answer of an earlier round is asked for again
   for (auto _ : state) {
     state.PauseTiming();
@@ -156,10 +156,12 @@ void sample(benchmark::State& state) {
     const Identification answer = now.update(recording, scene.object, inputs);
     error = std::log(answer.parameters[0].value / young_pa);
     evaluated = now.steps_evaluated();
+    iterations = answer.fit.iterations;
     before.memory() = now.memory();
   }
   state.counters["E_error_percent"] = 100 * error;
   state.counters["steps_evaluated"] = evaluated;
+  state.counters["iterations"] = iterations;
 }
 
 BENCHMARK(set_up)->ArgName("automatic")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);

@@ -59,6 +59,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   optimiser.max_iterations = options_.max_iterations;
   // Solutions that are followed this far are right to some millionths; a last one on top would not be asked for, since equations
   // of steps that have not moved are kept.
+  optimiser.enough_gain = 1e-4;  // a hundredth of a standard deviation
   optimiser.reuse = 0.003;
   optimiser.reuse_error = 1;
   Optimum optimum;
