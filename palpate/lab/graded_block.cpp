@@ -18,7 +18,8 @@ std::vector<double> graded(std::vector<double> uniform, double length, double ce
   std::vector<double> steps;
   double sum = 0;
   while (sum < rest) {
-    cell = std::min(cell * options.growth, options.largest_cell_m);
+    const double to_edge = options.edge_cell_m + (options.growth - 1) * std::max(0.0, rest - sum);
+    cell = std::min({cell * options.growth, options.largest_cell_m, to_edge});
     steps.push_back(cell);
     sum += cell;
   }
@@ -58,6 +59,7 @@ TetMesh graded_block(const GradedBlockOptions& o) {
   if (o.cells_in_radius < 1) bad("cells_in_radius", "must be at least 1");
   if (!(o.growth >= 1 && o.growth <= 3)) bad("growth", "must be between 1 and 3");
   if (!(o.largest_cell_m > 0)) bad("largest_cell_m", "must be positive");
+  if (!(o.edge_cell_m > 0)) bad("edge_cell_m", "must be positive");
   if (!(o.contact_radius_m > 0)) bad("contact_radius_m", "must be positive");
   if (!((o.max_m - o.min_m).minCoeff() > 0)) bad("max_m", "must be above min_m");
   if (std::abs(o.contact_m.z() - o.max_m.z()) > 1e-9) bad("contact_m", "must lie on the top face");

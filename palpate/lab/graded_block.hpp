@@ -15,7 +15,8 @@ struct GradedBlockOptions {
   double contact_radius_m = 0.015;
   int cells_in_radius = 3;  ///< element edges across the contact radius
   double growth = 1.35;     ///< ratio of neighbouring cells away from the contact
-  double largest_cell_m = 0.02;
+  double largest_cell_m = 0.01;
+  double edge_cell_m = 0.004;  ///< at the walls and the foot: where a face is held stresses are singular along its edges
 };
 
 /// Linear tetrahedra (six a cell, mirrored at the contact's axis so that the split suits the round rim).

@@ -31,6 +31,8 @@ struct PressedBlock::Impl {
     block.contact_m = {options.site_m, 0, block.max_m.z()};
     block.contact_radius_m = options.pad_radius_m;
     block.cells_in_radius = options.cells_in_radius;
+    block.largest_cell_m *= options.cell_share;
+    block.edge_cell_m *= options.cell_share;
     mesh_ = fem::to_quadratic(graded_block(block));
     const std::vector<Index> under_pad = contact_nodes(mesh_, block);
 

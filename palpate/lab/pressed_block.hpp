@@ -19,6 +19,7 @@ struct PressedBlockOptions {
   Vec3 direction = -Vec3::UnitZ();           ///< of the push, in the plane y = 0; at the side it must be given
   Vec3 base_centre_m = Vec3(0.6, 0.0, 0.0);  ///< of the face on the table, base frame
   int cells_in_radius = 3;
+  double cell_share = 1;  ///< of the usual cells away from the pad: smaller is finer
   std::string material = "neo_hookean";
   double young_modulus_pa = 15e3, poisson_ratio = 0.3;
   std::vector<double> extra;  ///< further parameters of the material, in its table's order
