@@ -166,13 +166,20 @@ class Assembly {
   }
 
   std::optional<StepForce> force_at(double time_s, double seen_s) const {
-    const auto& samples = track_.samples;
-    const auto later = [](double t, const sensing::ContactSample& s) { return t < s.time_s; };
-    // Times have come through integers: the sample at the step's own time belongs to it.
-    const auto last = std::upper_bound(samples.begin(), samples.end(), time_s + 1e-6, later);
-    auto first = last;
-    while (first != samples.begin() && std::prev(first)->time_s >= time_s - plan_.window_s) --first;
-    return step_force({first, last}, seen_s);
+    const auto before = [&](double end_s) {
+      const auto& samples = track_.samples;
+      const auto later = [](double t, const sensing::ContactSample& s) { return t < s.time_s; };
+      // Times have come through integers: the sample at the step's own time belongs to it.
+      const auto last = std::upper_bound(samples.begin(), samples.end(), end_s + 1e-6, later);
+      auto first = last;
+      while (first != samples.begin() && std::prev(first)->time_s >= end_s - plan_.window_s) --first;
+      return step_force({first, last}, std::min(seen_s, end_s));
+    };
+    const auto force = before(time_s);
+    if (!force || force->rate_n_s.isZero(0) || seen_s <= time_s) return force;
+    // An image that came later: the line is not drawn beyond what was measured, the tool may have stopped.
+    const auto then = before(seen_s);
+    return then && !then->rate_n_s.isZero(0) ? then : force;
   }
 
   void add_push(const PushTimes& times) {

@@ -17,7 +17,7 @@ struct StepForce {
 
 /// The samples' mean while the tool stands. Where it is on its way (a line through at least 8 samples changes over them by more than
 /// a hundredth of the force and by ten standard errors, and its two halves rise alike), the line at `seen_s`, when the step was
-/// seen, and its slope: a mean over half a second lags behind the picture by a quarter. Nothing without samples.
+/// seen (within the samples), and its slope: a mean over half a second lags behind the picture by a quarter. Nothing without samples.
 std::optional<StepForce> step_force(std::span<const sensing::ContactSample> samples, double seen_s);
 
 }  // namespace palpate::acquisition
