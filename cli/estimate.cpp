@@ -29,7 +29,8 @@ struct Options {
   std::filesystem::path recording, mapping, out;
   std::string method = "palpate", material, element, refine, regions = "recorded";
   std::vector<double> poisson_range;
-  double poisson_ratio = -2, young_start_pa = 0, mesh_tolerance = 0.01;
+  std::optional<double> poisson_ratio, young_start_pa;
+  double mesh_tolerance = 0.01;
   int max_iterations = 60;
   bool budget = false;
   LiveOptions live;
@@ -63,8 +64,8 @@ IdentifyOptions identify_options(const Options& given, const Session& session) {
   if (!given.element.empty()) options.element = given.element;
   if (!given.refine.empty()) options.refine = given.refine;
   if (given.poisson_range.size() == 2) options.poisson_range = {given.poisson_range[0], given.poisson_range[1]};
-  if (given.poisson_ratio > -1.5) options.poisson_fixed = given.poisson_ratio;
-  if (given.young_start_pa > 0) options.fit.young_start_pa = given.young_start_pa;
+  if (given.poisson_ratio) options.poisson_fixed = *given.poisson_ratio;
+  if (given.young_start_pa) options.fit.young_start_pa = *given.young_start_pa;
   options.mesh_tolerance = given.mesh_tolerance;
   options.fit.max_iterations = given.max_iterations;
   options.fit.threads = session.thread_count();
@@ -175,7 +176,8 @@ Run verbs::estimate(CLI::App& app) {
       ->check(CLI::IsMember({"recorded", "by-site", "none"}));
   app.add_option("--poisson-range", given->poisson_range, "range of the uniform prior on nu, e.g. 0.3 0.4995")->expected(2);
   app.add_option("--poisson-ratio", given->poisson_ratio, "take nu as known");
-  app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)");
+  app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)")
+      ->check(CLI::PositiveNumber);
   app.add_option("--max-iterations", given->max_iterations, "most iterations of the fit")->check(CLI::PositiveNumber);
   app.add_flag("--budget", given->budget, "print what each input's uncertainty does to E and nu");
   given->live.add_to(app);

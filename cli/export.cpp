@@ -37,8 +37,12 @@ io::ExportModel model_of(const Options& given, const LearnedObject& learned) {
   model.young_modulus_pa = elasticity.young_modulus_pa;
   model.poisson_ratio = elasticity.poisson_ratio;
   model.density_kg_m3 = given.density_kg_m3 > 0 ? given.density_kg_m3 : learned.object.density_kg_m3;
-  model.gravity_m_s2 = given.gravity.size() == 3 ? Vec3(given.gravity[0], given.gravity[1], given.gravity[2])
-                                                 : learned.object.environment.gravity_m_s2;
+  // A shape that was measured with its weight on has sagged already: under gravity it would sag once more.
+  const bool sags = learned.object.rest.state == RestState::stress_free;
+  if (given.gravity.size() == 3)
+    model.gravity_m_s2 = Vec3(given.gravity[0], given.gravity[1], given.gravity[2]);
+  else
+    model.gravity_m_s2 = sags ? learned.object.environment.gravity_m_s2 : Vec3(Vec3::Zero());
   model.fixed = held_nodes(learned.object);
   return model;
 }
@@ -69,6 +73,13 @@ VectorX solved_here(const io::ExportModel& model, int threads) {
   return statics.solve(model.young_modulus_pa, model.poisson_ratio, VectorX::Ones(1), VectorX(0)).displacement_m;
 }
 
+/// One word for the shell.
+std::string quoted(const std::string& text) {
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return word + "'";
+}
+
 /// CalculiX solves its own file under a test load; largest difference over the largest displacement.
 double difference_to_calculix(io::ExportModel model, const fs::path& folder, int threads) {
   if (std::system("command -v ccx > /dev/null 2>&1") != 0)
@@ -78,7 +89,7 @@ double difference_to_calculix(io::ExportModel model, const fs::path& folder, int
   fs::create_directories(folder);
   for (const auto& [name, bytes] : io::export_files(io::exporter_named("calculix"), model))
     io::write_file(folder / name, bytes);
-  if (std::system(("cd '" + folder.string() + "' && ccx object > ccx.log 2>&1").c_str()) != 0)
+  if (std::system(("cd " + quoted(folder.string()) + " && ccx object > ccx.log 2>&1").c_str()) != 0)
     throw Error("ccx failed; see ccx.log", folder.string());
   const VectorX ours = solved_here(model, threads);
   std::istringstream lines(io::read_file(folder / "object.dat"));
@@ -113,6 +124,12 @@ int run(const Options& given, Session& session) {
   if (coarser)
     session.warn(
         "linear tetrahedra of the same corners were written: they act stiffer than the quadratic ones that were fitted");
+  if (learned.object.rest.state != RestState::stress_free && learned.object.environment.gravity_m_s2.norm() > 0) {
+    if (given.gravity.empty())
+      session.say("gravity is left out: the shape was measured with its weight on and has sagged already");
+    else if (model.gravity_m_s2.norm() > 0)
+      session.warn("the shape was measured with its weight on: under gravity it sags once more");
+  }
   session.say(fmt::format("open {}", (given.out / exporter.main_file).string()));
   nlohmann::json json = {{"to", exporter.name},
                          {"files", names},
@@ -149,7 +166,7 @@ Run verbs::export_(CLI::App& app) {
   app.add_option("-o,--out", given->out, "folder for its files")->required();
   app.add_option("--density", given->density_kg_m3, "kg/m3, for simulators of motion (that of the recording)")
       ->check(CLI::PositiveNumber);
-  app.add_option("--gravity", given->gravity, "X Y Z in m/s2 (that of the recording)")->expected(3)->type_name("");
+  app.add_option("--gravity", given->gravity, "X Y Z in m/s2 (that of the recording; none where the shape was measured with its weight on)")->expected(3)->type_name("");
   app.add_flag("--verify", given->verify, "calculix: let ccx solve the exported model under a test load and compare");
   return [given](Session& session) { return run(*given, session); };
 }

@@ -49,6 +49,7 @@ DepthFrame LoggedRobot::take_depth_image() {
       io::encode(io::RosCameraInfo{{stamp, "camera"}, frame.camera}));
   put("/camera/depth/image", "sensor_msgs/msg/Image", frame.time_s,
       io::encode(io::RosImage{{stamp, "camera"}, frame.depth_m}));
+  masked_ = masked_ && frame.mask.size() > 0;
   if (frame.mask.size() > 0)
     put("/camera/mask", "sensor_msgs/msg/Image", frame.time_s, io::encode(io::RosHeader{stamp, "camera"}, frame.mask));
   camera_ = frame;
@@ -62,6 +63,7 @@ void LoggedRobot::write_bag(const Recording& scene, const std::filesystem::path&
   std::filesystem::create_directories(folder);
   std::string mapping = "format: palpate-mapping/1\n" + io::object_text(scene, folder);
   mapping += "topics:\n  wrench: /wrench\n";
+  if (scene.robot && !joint_names_.empty()) mapping += "  joints: /joint_states\n";
   if (camera_.camera.width_px > 0)
     mapping += fmt::format(
         "  depth:\n    - {{image: /camera/depth/image, info: /camera/depth/camera_info{}, noise: {}, pose_std_m: {}, "

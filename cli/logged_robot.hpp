@@ -29,6 +29,9 @@ class LoggedRobot : public acquisition::Robot {
   void wait(double duration_s) override { robot_.wait(duration_s); }
   double travel_sigma_m() const override { return robot_.travel_sigma_m(); }
 
+  /// True when every image so far said which of its pixels show the robot.
+  bool is_masked() const { return masked_; }
+
   /// Writes FOLDER/FOLDER.mcap and FOLDER/mapping.yaml, by which steps are found in it again.
   /// @param scene  object, supports, tools and robot, without pushes
   void write_bag(const Recording& scene, const std::filesystem::path& folder);
@@ -42,6 +45,7 @@ class LoggedRobot : public acquisition::Robot {
   DepthFrame camera_;  ///< of the last image, without its pixels
   std::vector<std::string> joint_names_;
   double later_s_ = 0;
+  bool masked_ = true;
 };
 
 }  // namespace palpate::cli

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "cli/driver_library.hpp"
@@ -111,9 +112,13 @@ class FromDriver : public PushRobot {
 }  // namespace
 
 void add_robot_options(CLI::App& app, RobotArguments& arguments) {
+  const auto before = app.get_options();
   add_lab_options(app, arguments.lab);
-  app.add_option("--driver", arguments.driver,
+  const auto of_the_lab = app.get_options();
+  CLI::Option* const driver = app.add_option("--driver", arguments.driver,
                  "a robot of your own in place of the lab's: a shared library as palpate/acquisition/driver.h says");
+  for (CLI::Option* option : of_the_lab)
+    if (std::find(before.begin(), before.end(), option) == before.end()) driver->excludes(option);
   app.add_option("--driver-settings", arguments.settings, "handed to the driver as it is: an address, a file, ...")->needs("--driver");
   app.add_option("--scene", arguments.scene, "with --driver: a recording without pushes: object, supports, tools, table, robot")
       ->needs("--driver");

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "cli/logged_robot.hpp"
@@ -135,8 +136,10 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
                           truth ? "; the truth is in " + truth_file.string() : "", arguments.output));
   if (!arguments.raw_bag.empty()) {
     Recording scene = robot->scene();
-    scene.robot.reset();  // the masks are in the bag
-    scene.joint_names.clear();
+    if (logged.is_masked()) {  // the masks are in the bag
+      scene.robot.reset();
+      scene.joint_names.clear();
+    }
     logged.write_bag(scene, arguments.raw_bag);
     session.say(fmt::format("{}: all that the sensors said, as a robot's recorder keeps it", arguments.raw_bag));
   }
@@ -177,7 +180,7 @@ Run verbs::record(CLI::App& app) {
   arguments->push.travel_limit_m = arguments->push.force_step_n = 0;
   add_robot_options(app, arguments->robot);
   add_contact_options(app, arguments->robot);
-  app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
+  CLI::Option* const demo = app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
   app.add_option("-o,--out,--output", arguments->output, "folder to write; must not exist or be empty")->required();
   app.add_option("--views", arguments->views,
                  "look at the untouched object from this many sides and let `estimate` build its shape from that; 0: its shape is given")
@@ -193,6 +196,12 @@ Run verbs::record(CLI::App& app) {
   app.add_option("--raw-bag", arguments->raw_bag,
                  "also write what the sensors said all the while (MCAP), as a robot's own recorder does");
   app.add_flag("--resume", arguments->resume, "go on with a recording that was cut off");
+  // What the built-in recording cannot do is refused, not passed over.
+  const std::set<std::string> of_the_demo{"--help", "--out", "--truth", "--young-modulus", "--poisson-ratio", "--bag"};
+  for (CLI::Option* option : app.get_options()) {
+    const bool known = std::any_of(of_the_demo.begin(), of_the_demo.end(), [&](const auto& name) { return option->check_name(name); });
+    if (option != demo && !known) demo->excludes(option);
+  }
   return [arguments](Session& session) {
     std::error_code code;
     must_take_files(arguments->output);
@@ -200,10 +209,6 @@ Run verbs::record(CLI::App& app) {
       if (!bag.empty() && std::filesystem::exists(bag, code) && !std::filesystem::is_empty(bag, code))
         throw Error("is there already; choose another folder or remove it", bag);
     }
-    if (arguments->demo && !arguments->robot.driver.empty())
-      throw Error("the built-in recording is made without a robot; leave --demo out", "--driver");
-    if (arguments->demo && !arguments->raw_bag.empty())
-      throw Error("the built-in recording is made without a robot; leave --demo out", "--raw-bag");
     const int outcome = arguments->demo ? record_demo(session, *arguments) : record_pushes(session, *arguments);
     if (!arguments->bag.empty()) {
       io::write_bag(io::read_recording_unchecked(arguments->output), arguments->bag);

@@ -181,7 +181,8 @@ Run verbs::suggest(CLI::App& app) {
   app.add_option("--contact", given->contact, "rate this place instead, X Y Z in metres, base frame")
       ->expected(3)
       ->type_name("");
-  app.add_option("--direction", given->direction, "of that push, into the object (0 0 -1)")->expected(3)->type_name("");
+  app.add_option("--direction", given->direction, "of that push, into the object (0 0 -1)")->expected(3)->type_name("")
+      ->needs("--contact");
   app.add_option("--tool", given->suggest.tool, "tool of the recording (its only round one)");
   app.add_option("--young-modulus", given->suggest.young_modulus_pa, "guess before the first touch, Pa")
       ->check(CLI::PositiveNumber)

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "palpate/core/error.hpp"
 
 namespace palpate::acquisition {
 namespace {
@@ -63,7 +66,11 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
   FreeAir fixed;
   if (plan.tare == Tare::between) {
     const std::size_t a = first_after(track, plan.tare_from_s), b = first_after(track, plan.tare_to_s);
-    if (b > a) fixed = {sums.mean(a, b), sums.std_of(a, b), b - a};
+    if (b <= a)
+      throw Error("no force was measured between from_s and to_s; the forces run from " +
+                      std::to_string(samples.front().time_s) + " to " + std::to_string(samples.back().time_s) + " s",
+                  plan.source + ": wrench.tare");
+    fixed = {sums.mean(a, b), sums.std_of(a, b), b - a};
   }
   std::size_t free_since = 0, window_begin = 0, window_end = 0;
   int run = 0;

@@ -61,6 +61,10 @@ Track tip_track(const StreamPlan& plan, const SensorStreams& streams, const Fram
 
 }  // namespace
 
+bool knows(const RobotModel& robot, const std::string& joint) {
+  return std::any_of(robot.joints.begin(), robot.joints.end(), [&](const RobotJoint& one) { return one.name == joint; });
+}
+
 FrameTree tree_of(const StreamPlan& plan, const SensorStreams& streams) {
   FrameTree tree(streams.frames);
   std::vector<std::string> wanted{plan.tip_frame};
@@ -86,9 +90,7 @@ FrameTree tree_of(const StreamPlan& plan, const SensorStreams& streams) {
     std::vector<std::size_t> used;
     std::vector<std::string> names;
     for (std::size_t k = 0; k < streams.joint_names.size(); ++k) {
-      const bool known = std::any_of(robot->joints.begin(), robot->joints.end(),
-                                     [&](const RobotJoint& j) { return j.name == streams.joint_names[k]; });
-      if (known) used.push_back(k), names.push_back(streams.joint_names[k]);
+      if (knows(*robot, streams.joint_names[k])) used.push_back(k), names.push_back(streams.joint_names[k]);
     }
     for (const JointSample& sample : streams.joints) {
       std::vector<double> positions;
@@ -118,11 +120,11 @@ Track track_of(const StreamPlan& plan, const SensorStreams& streams, const Frame
     const auto at_sensor =
         sensor == plan.base_frame ? std::optional(Pose(Pose::Identity())) : tree.lookup(plan.base_frame, sensor, time);
     if (!tip || !at_sensor) continue;
-    Vec3 force = at_sensor->linear() * sample.force_n;
-    if (!plan.force_on_object) {
-      const sensing::WrenchReading reading{time, sample.force_n, sample.torque_nm, at_sensor->linear()};
-      force = sensing::wrench_at_tip(reading, weight, plan.gravity_m_s2, at_sensor->inverse() * tip->translation()).force_n;
-    }
+    // A sensor that reports the force on the object has turned the sign of all that it felt, the tool's weight with it.
+    const double sign = plan.force_on_object ? -1 : 1;
+    const sensing::WrenchReading reading{time, sign * sample.force_n, sign * sample.torque_nm, at_sensor->linear()};
+    const Vec3 force =
+        sensing::wrench_at_tip(reading, weight, plan.gravity_m_s2, at_sensor->inverse() * tip->translation()).force_n;
     track.samples.push_back({time, force, tip->translation()});
     track.direction.push_back(tip->linear().col(2).normalized());
   }

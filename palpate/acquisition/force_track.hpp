@@ -29,6 +29,9 @@ ClockOffset wrench_offset(const StreamPlan& plan, const SensorStreams& streams, 
 ClockOffset camera_offset(const StreamPlan& plan, const SensorStreams& streams, const FrameTree& tree,
                           const DepthStream& camera);
 
+/// True when a robot's description has a joint of that name.
+bool knows(const RobotModel& robot, const std::string& joint);
+
 /// Joints at a time, interpolated; nothing away from any sample.
 std::optional<std::vector<double>> joints_at(const SensorStreams& streams, double time_s);
 

@@ -9,6 +9,7 @@
 #include "palpate/acquisition/force_track.hpp"
 #include "palpate/acquisition/step_force.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/plane_mask.hpp"
 #include "palpate/sensing/robot_mask.hpp"
 
@@ -39,7 +40,8 @@ class Assembly {
     out_.recording = plan.recording;
     out_.recording.source = plan.source;
     out_.recording.warnings.insert(out_.recording.warnings.end(), streams.warnings.begin(), streams.warnings.end());
-    if (out_.recording.joint_names.empty() && out_.recording.robot) out_.recording.joint_names = streams.joint_names;
+    // Which pixels show the robot is settled here, where its base's pose is known: the steps carry no joints.
+    out_.recording.joint_names.clear();
     used_images_.resize(streams.cameras.size());
     used_clouds_.resize(streams.clouds.size());
   }
@@ -70,6 +72,10 @@ class Assembly {
   }
 
   void align_clocks() {
+    if (plan_.camera_clock.estimate && streams_.cameras.empty())
+      out_.notes.push_back(
+          "camera_offset_s: estimate needs depth images, and there are clouds only: they are taken at their own times (give "
+          "the offset in seconds, or let one camera's images in)");
     wrench_offset_s_ = clock_of(plan_.wrench_clock, [&] { return wrench_offset(plan_, streams_, tree_); });
     for (const DepthStream& camera : streams_.cameras)
       camera_offset_s_.push_back(
@@ -231,8 +237,6 @@ class Assembly {
       step.time_s = at.time_s;
       step.source = plan_.source + ": " + push.name + " at " + seconds(at.time_s);
       step.T_base_tip = tip;
-      if (const auto joints = joints_at(streams_, at.time_s); joints && out_.recording.joint_names == streams_.joint_names)
-        step.joints_rad = *joints;
       const Vec3 pressing = force ? Vec3(force->force_n - tare) : Vec3(Vec3::Zero());
       const double along = pressing.dot(direction), travel = tip ? direction.dot(tip->translation() - contact) : 0;
       const double noise = times.span != nullptr ? 5 * times.span->free_air_std_n : 0;
@@ -325,7 +329,9 @@ class Assembly {
                              " cannot be used: " + error.message());
         continue;
       }
-      if (camera.mask_robot) frame = without_robot(std::move(frame));
+      const auto& robot = plan_.recording.robot;
+      if (camera.mask_robot.value_or(robot && sensing::has_shapes(*robot) && !streams_.joints.empty()))
+        frame = without_robot(std::move(frame));
       step.observations.emplace_back(std::move(frame));
     }
     for (std::size_t c = 0; c < streams_.clouds.size(); ++c) {
@@ -364,12 +370,25 @@ class Assembly {
     const sensing::Kinematics& kinematics = mask_->kinematics();
     const std::string root = kinematics.robot().links[std::size_t(kinematics.root_link())].name;
     const auto base = pose_of(root, frame.time_s);
-    if (!joints || !base) {
-      out_.notes.push_back("the robot is not masked at " + seconds(frame.time_s) + ": its joints or the pose of '" + root +
-                           "' are not known");
+    // Joints that the description does not know (a gripper on the same topic) have no say; one that is missing leaves no pose.
+    std::vector<std::string> names;
+    std::vector<double> positions;
+    for (std::size_t k = 0; joints && k < streams_.joint_names.size(); ++k) {
+      if (!knows(kinematics.robot(), streams_.joint_names[k])) continue;
+      names.push_back(streams_.joint_names[k]);
+      positions.push_back((*joints)[k]);
+    }
+    const auto& free = kinematics.free_joints();
+    const auto missing = std::find_if(free.begin(), free.end(), [&](const std::string& one) {
+      return std::find(names.begin(), names.end(), one) == names.end();
+    });
+    if (missing != free.end() || !base) {
+      out_.notes.push_back("the robot is not masked at " + seconds(frame.time_s) + ": " +
+                           (base ? "its joint '" + *missing + "' is not in the joint states"
+                                 : "the pose of '" + root + "' is not known"));
       return frame;
     }
-    return sensing::with_mask(frame, mask_->mask(frame, streams_.joint_names, *joints, *base));
+    return sensing::with_mask(frame, mask_->mask(frame, names, positions, *base));
   }
 
   const StreamPlan& plan_;

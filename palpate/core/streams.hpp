@@ -46,7 +46,7 @@ struct DepthStream {
   std::string name;   ///< for messages
   std::string frame;  ///< optical frame of the camera
   DepthFrame like;    ///< camera, noise and pose priors of every image
-  bool mask_robot = false;
+  std::optional<bool> mask_robot;  ///< absent: where the robot is described and its pose is known
   std::vector<double> times_s;                   ///< rise
   std::function<DepthImage(std::size_t)> image;  ///< @throws Error when the message is damaged
   std::function<MaskImage(std::size_t)> mask;    ///< absent, or of the image of that number; an empty mask is none

@@ -34,7 +34,8 @@ void read_depth(const YamlField& list, BagMapping& mapping) {
     camera.info = topic_of(keys.required("info", "the topic of their CameraInfo"));
     camera.mask = topic_or_none(keys, "mask");
     camera.frame = keys.text_or("frame", "");
-    camera.mask_robot = keys.boolean_or("mask_robot", false);
+    if (const auto wanted = keys.optional("mask_robot")) camera.mask_robot = wanted->boolean();
+    if (const auto straight = keys.optional("rectified")) camera.rectified = straight->boolean();
     camera.like.pose_std_m = keys.non_negative_or("pose_std_m", 0);
     camera.like.pose_std_rad = keys.non_negative_or("pose_std_rad", 0);
     camera.like.noise = read_depth_noise(keys.required("noise", "e.g. {model: constant, sigma_m: 0.002}"));

@@ -22,7 +22,8 @@ struct MappedCamera {
   std::optional<MappedTopic> mask;
   std::string frame;  ///< empty = what the images say
   DepthFrame like;    ///< noise and pose priors
-  bool mask_robot = false;
+  std::optional<bool> mask_robot;  ///< absent: where its description, joints and pose are known
+  std::optional<bool> rectified;   ///< absent: told by the topic's name
 };
 
 struct MappedCloud {

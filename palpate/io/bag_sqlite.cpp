@@ -35,9 +35,9 @@ bool mend(std::string& bytes) {
   bytes[18] = bytes[19] = 1;  // write-ahead log: there is none beside a file in memory
   const auto stored = load<std::uint16_t>(bytes.data() + 16, std::endian::big);
   const std::size_t page = stored == 1 ? 65536 : stored, pages = load<std::uint32_t>(bytes.data() + 28, std::endian::big);
-  constexpr std::size_t largest_mended = std::size_t{1} << 33;
-  if (page < 512 || pages > largest_mended / page || bytes.size() >= page * pages)
-    return bytes.size() % std::max<std::size_t>(page, 1) != 0;
+  if (page < 512 || bytes.size() >= page * pages) return bytes.size() % std::max<std::size_t>(page, 1) != 0;
+  constexpr std::size_t most = 64;  // of a bag of which less is left there is nothing to be read
+  if (pages > most * bytes.size() / page + most) return true;
   bytes.resize(page * pages, '\0');
   return true;
 }

@@ -14,7 +14,10 @@
 namespace palpate::io {
 namespace {
 
-constexpr double foreign_clock_s = 60;  // recorders are not that late: the headers then count from another zero
+constexpr double foreign_clock_s = 1;  // recorders are not that late: the headers then count from another zero
+
+/// ROS 1 let frames start with a slash.
+std::string plain(const std::string& frame) { return frame.starts_with("/") ? frame.substr(1) : frame; }
 
 class StreamReader {
  public:
@@ -118,32 +121,43 @@ void read_wrenches(const StreamReader& reader, const StreamReader::Topic& topic,
     const RosWrench one = decode_wrench(message.data, reader.where(topic), topic.about->encoding);
     if (!one.force_n.allFinite() || !one.torque_nm.allFinite()) throw Error("holds NaN", reader.where(topic));
     streams.wrenches.push_back({reader.seconds(one.header, message), one.force_n, one.torque_nm});
-    if (streams.wrench_frame.empty()) streams.wrench_frame = one.header.frame;
+    if (streams.wrench_frame.empty()) streams.wrench_frame = plain(one.header.frame);
   });
   sort_by_time(streams.wrenches);
 }
 
-/// Messages may name the joints in any order, and several senders may share the topic: a sample is given when the joints of
-/// the first are all there.
+/// Several senders (an arm, its gripper) may share the topic and name their joints in any order: every message gives a sample
+/// of all joints, those that it does not name as they were last seen, or will first be seen.
 void read_joints(const StreamReader& reader, const StreamReader::Topic& topic, SensorStreams& streams) {
+  struct Seen {
+    double time_s = 0;
+    std::vector<std::pair<std::size_t, double>> positions;  // joint and its position
+  };
+  std::vector<Seen> all;
+  std::vector<std::string>& names = streams.joint_names;
   reader.each(topic, streams.warnings, [&](const Message& message) {
     const RosJointState one = decode_joint_state(message.data, reader.where(topic), topic.about->encoding);
-    if (streams.joint_names.empty()) streams.joint_names = one.names;
-    JointSample sample{reader.seconds(one.header, message), {}};
-    for (const std::string& name : streams.joint_names) {
-      const auto place = std::find(one.names.begin(), one.names.end(), name);
-      if (place == one.names.end()) return;
-      sample.positions.push_back(one.position[static_cast<std::size_t>(place - one.names.begin())]);
+    Seen seen{reader.seconds(one.header, message), {}};
+    for (std::size_t k = 0; k < one.names.size(); ++k) {
+      const auto place = std::find(names.begin(), names.end(), one.names[k]);
+      seen.positions.emplace_back(static_cast<std::size_t>(place - names.begin()), one.position[k]);
+      if (place == names.end()) names.push_back(one.names[k]);
     }
-    streams.joints.push_back(std::move(sample));
+    all.push_back(std::move(seen));
   });
-  sort_by_time(streams.joints);
+  sort_by_time(all);
+  std::vector<double> now(names.size(), 0.0);
+  for (auto one = all.rbegin(); one != all.rend(); ++one)
+    for (const auto& [joint, position] : one->positions) now[joint] = position;  // ends at the first that was seen
+  for (const Seen& one : all) {
+    for (const auto& [joint, position] : one.positions) now[joint] = position;
+    streams.joints.push_back({one.time_s, now});
+  }
 }
 
 void read_transforms(const StreamReader& reader, const StreamReader::Topic& topic,
                      std::map<std::pair<std::string, std::string>, FrameLink>& links, SensorStreams& streams) {
   const bool fixed = topic.about->name.ends_with("tf_static");
-  const auto plain = [](const std::string& frame) { return frame.starts_with("/") ? frame.substr(1) : frame; };
   reader.each(topic, streams.warnings, [&](const Message& message) {
     for (const RosTransform& one : decode_transforms(message.data, reader.where(topic), topic.about->encoding)) {
       FrameLink& link = links[{plain(one.header.frame), plain(one.child)}];
@@ -164,7 +178,18 @@ void read_camera(const StreamReader& reader, const MappedCamera& mapped, const M
   camera.like = mapped.like;
   camera.mask_robot = mapped.mask_robot;
   if (infos.messages.empty()) throw Error("the topic holds no message: the camera is not known", mapped.info.where);
-  camera.like.camera = decode_camera_info(infos.messages.front()->data, reader.where(infos), infos.about->encoding).camera;
+  const RosCameraInfo info = decode_camera_info(infos.messages.front()->data, reader.where(infos), infos.about->encoding);
+  camera.like.camera = info.camera;
+  if (info.camera.distortion != DistortionModel::none) {
+    // The same CameraInfo stands beside raw and rectified images; image_proc tells them apart by the topic's name.
+    const bool straight = mapped.rectified.value_or(mapped.image.name.find("image_rect") != std::string::npos);
+    if (straight && !(info.rectified.fx_px > 0 && info.rectified.fy_px > 0))
+      throw Error("the images are rectified, but P of the CameraInfo is empty", mapped.info.where);
+    if (straight) camera.like.camera = info.rectified;
+    if (!mapped.rectified)
+      streams.warnings.push_back(mapped.image.name + " is taken as " + (straight ? "rectified" : "not rectified") +
+                                 ", by its name, though its CameraInfo has a distortion; say so with rectified: true or false");
+  }
 
   struct Kept {
     std::shared_ptr<const void> memory;
@@ -183,7 +208,7 @@ void read_camera(const StreamReader& reader, const MappedCamera& mapped, const M
   std::vector<std::pair<double, std::string_view>> found;
   reader.each(images, streams.warnings, [&](const Message& message) {
     const RosHeader header = decode_header(message.data, kept->where, kept->encoding);
-    if (camera.frame.empty()) camera.frame = header.frame;
+    if (camera.frame.empty()) camera.frame = plain(header.frame);
     found.emplace_back(reader.seconds(header, message), message.data);
   });
   std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -233,7 +258,7 @@ void read_cloud(const StreamReader& reader, const MappedCloud& mapped, const Mes
   const MessageEncoding encoding = topic.about->encoding;
   reader.each(topic, streams.warnings, [&](const Message& message) {
     const RosHeader header = decode_header(message.data, where, encoding);
-    if (stream.frame.empty()) stream.frame = header.frame;
+    if (stream.frame.empty()) stream.frame = plain(header.frame);
     found.emplace_back(reader.seconds(header, message), message.data);
   });
   std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -268,6 +293,13 @@ SensorStreams read_streams(const MessageSource& bag, BagMapping& mapping) {
   }
   for (const MappedTopic& one : transforms)
     read_transforms(reader, reader.topic(one, {"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"}), links, streams);
+  std::map<std::string, std::string> parents;
+  for (const auto& [name, link] : links) {
+    const auto [place, is_new] = parents.emplace(link.child, link.parent);
+    if (!is_new)
+      streams.warnings.push_back("the frame '" + link.child + "' has two parents, '" + place->second + "' and '" + link.parent +
+                                 "': the first is taken at all times");
+  }
   for (auto& [name, link] : links) {
     sort_by_time(link.samples);
     streams.frames.push_back(std::move(link));
@@ -287,7 +319,7 @@ SensorStreams read_streams(const MessageSource& bag, BagMapping& mapping) {
     if (description.messages.empty()) throw Error("the topic holds no message", mapping.robot_description->where);
     const std::string urdf =
         decode_string(description.messages.front()->data, reader.where(description), description.about->encoding);
-    mapping.plan.recording.robot = parse_urdf(urdf, reader.where(description), mapping.root);
+    mapping.plan.recording.robot = parse_urdf(urdf, reader.where(description), mapping.root, &streams.warnings);
   }
   streams.end_s = static_cast<double>(bag.messages.back().log_time_ns - bag.messages.front().log_time_ns) * 1e-9;
   return streams;

@@ -106,7 +106,8 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
   text += "frames: {base: " + base +
           ", tip: " + guess_frame(frames, {"tool_tip", "tip", "tcp", "tool", "ee", "hand", "flange"}) + "}\n";
   text += "wrench: {reports: force_on_sensor}   # check: or force_on_object; the sign shows in one push\n";
-  return text + "clocks: {camera_offset_s: estimate}\nsteps: {by: detection, travel_sigma_m: 0.0005}\n";
+  if (!depth.empty()) text += "clocks: {camera_offset_s: estimate}\n";
+  return text + "steps: {by: detection, travel_sigma_m: 0.0005}\n";
 }
 
 }  // namespace

@@ -204,7 +204,11 @@ void read_wrench_observation(YamlKeys& keys, const TableRow* row, const std::str
   wrench.time_s = keys.number_or("time_s", step.time_s);
   const auto file = keys.optional("file"), force = keys.optional("force_n"), torque = keys.optional("torque_nm"),
              axis = keys.optional("along");
-  if (file) return read_wrench_file(*file, wrench, context, step);
+  if (file) {
+    if (force || torque || axis)
+      (force ? force : torque ? torque : axis)->fail("stands beside 'file', which holds the numbers: give one of the two");
+    return read_wrench_file(*file, wrench, context, step);
+  }
   const auto along = [&](double value, const std::string& where) {
     if (axis) {
       wrench.along = axis->unit_vector();

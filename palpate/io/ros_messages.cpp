@@ -167,7 +167,8 @@ RosCameraInfo decode_camera_info(std::string_view message, const std::string& wh
   for (std::size_t i = in.count(8); i > 0; --i) camera.distortion_coefficients.push_back(in.number<double>());
   double k[9];
   for (double& value : k) value = in.number<double>();
-  for (int i = 0; i < 9 + 12; ++i) in.number<double>();    // rectification and projection
+  double p[9 + 12];  // rectification, then the projection of what is rectified
+  for (double& value : p) value = in.number<double>();
   for (int i = 0; i < 6; ++i) in.number<std::uint32_t>();  // binning and region of interest
   in.number<std::uint8_t>();
   camera.fx_px = k[0], camera.cx_px = k[2], camera.fy_px = k[4], camera.cy_px = k[5];
@@ -184,6 +185,10 @@ RosCameraInfo decode_camera_info(std::string_view message, const std::string& wh
     camera.distortion = DistortionModel::fisheye;
   else
     in.fail("has an unknown distortion model '" + model.substr(0, 40) + "'");
+  result.rectified = camera;
+  result.rectified.distortion = DistortionModel::none;
+  result.rectified.distortion_coefficients.clear();
+  result.rectified.fx_px = p[9], result.rectified.cx_px = p[11], result.rectified.fy_px = p[14], result.rectified.cy_px = p[15];
   return result;
 }
 

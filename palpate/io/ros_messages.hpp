@@ -28,7 +28,8 @@ struct RosImage {
 };
 struct RosCameraInfo {
   RosHeader header;
-  Camera camera;
+  Camera camera;     ///< K and D: of the images as they were taken
+  Camera rectified{};  ///< P: of the images after rectification, without distortion; focal lengths 0 where P is empty
 };
 struct RosJointState {
   RosHeader header;

@@ -18,7 +18,8 @@ namespace fs = std::filesystem;
 
 class UrdfReader {
  public:
-  UrdfReader(std::string name, fs::path mesh_root) : name_(std::move(name)), mesh_root_(std::move(mesh_root)) {}
+  UrdfReader(std::string name, fs::path mesh_root, std::vector<std::string>* left_out)
+      : name_(std::move(name)), mesh_root_(std::move(mesh_root)), left_out_(left_out) {}
 
   RobotModel read(std::string_view bytes) {
     const XmlElement root = parse_xml(bytes, name_);
@@ -120,7 +121,13 @@ class UrdfReader {
     };
     if (kind.name == "mesh") {
       result.kind = RobotShape::Kind::mesh;
-      result.mesh = mesh(kind);
+      try {
+        result.mesh = mesh(kind);
+      } catch (const Error& error) {
+        if (left_out_ == nullptr) throw;
+        left_out_->push_back("a " + element.name + " shape of the robot is left out (" + error.what() + ")");
+        return std::nullopt;
+      }
     } else if (kind.name == "box") {
       result.kind = RobotShape::Kind::box;
       result.size_m = vector(kind, "size", Vec3::Zero());
@@ -144,8 +151,9 @@ class UrdfReader {
       if (other.name == link.name) fail(element, "link '" + link.name + "' is there twice");
     }
     for (const XmlElement& child : element.children) {
-      if (child.name == "visual") link.visual.push_back(*shape(child));
-      if (child.name == "collision") link.collision.push_back(*shape(child));
+      if (child.name != "visual" && child.name != "collision") continue;
+      const auto one = shape(child);
+      if (one) (child.name == "visual" ? link.visual : link.collision).push_back(*one);
     }
     robot_.links.push_back(std::move(link));
   }
@@ -224,13 +232,15 @@ class UrdfReader {
 
   std::string name_;
   fs::path mesh_root_;
+  std::vector<std::string>* left_out_;
   RobotModel robot_;
 };
 
 }  // namespace
 
-RobotModel parse_urdf(std::string_view bytes, const std::string& name, const fs::path& mesh_root) {
-  return UrdfReader(name, mesh_root).read(bytes);
+RobotModel parse_urdf(std::string_view bytes, const std::string& name, const fs::path& mesh_root,
+                      std::vector<std::string>* left_out) {
+  return UrdfReader(name, mesh_root, left_out).read(bytes);
 }
 
 RobotModel read_urdf(const fs::path& path) { return parse_urdf(read_file(path), path.string(), path.parent_path()); }

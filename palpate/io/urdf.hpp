@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "palpate/core/recording.hpp"
 
@@ -13,7 +14,9 @@ namespace palpate::io {
 /// Links with their visual and collision shapes and joints of a URDF (ROS wiki, urdf/XML). Meshes are read at once:
 /// `package://NAME/PATH` and relative names are looked for under `mesh_root` (with and without NAME); STL, OBJ and PLY.
 /// Throws Error naming file and line: unknown joint types (floating, planar), links that are not there, two roots, loops.
-RobotModel parse_urdf(std::string_view bytes, const std::string& name, const std::filesystem::path& mesh_root);
+/// @param left_out  given: a shape whose mesh is not there or of another format is left out, and why is put here
+RobotModel parse_urdf(std::string_view bytes, const std::string& name, const std::filesystem::path& mesh_root,
+                      std::vector<std::string>* left_out = nullptr);
 RobotModel read_urdf(const std::filesystem::path& path);
 
 /// The model as a URDF (`STEM.urdf`) and a PLY for each mesh: file name -> bytes.

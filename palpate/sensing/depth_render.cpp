@@ -95,14 +95,38 @@ DepthImage render_depth(const std::vector<PosedMesh>& bodies, const Camera& came
   const bool distorted = camera.distortion != DistortionModel::none;
   std::vector<Vec3> points;
   std::vector<Corner> corners;
+  constexpr double unseen = -1;  // in place of the inverse depth: so far aside that the lens has no image of it
   const auto see = [&](const Vec3& p) {
     if (distorted) {
       const auto pixel = project(camera, p);
-      return Corner{pixel->x(), pixel->y(), 1 / p.z()};
+      return pixel ? Corner{pixel->x(), pixel->y(), 1 / p.z()} : Corner{0, 0, unseen};
     }
     const double inverse = 1 / p.z();
     return Corner{camera.fx_px * p.x() * inverse + camera.cx_px, camera.fy_px * p.y() * inverse + camera.cy_px, inverse};
   };
+  const auto is_seen = [](const Corner& a, const Corner& b, const Corner& c) {
+    return a.inverse_depth > 0 && b.inverse_depth > 0 && c.inverse_depth > 0;
+  };
+  // A triangle that reaches out of what the lens can see is halved, along its longest edge, until its pieces are in or out.
+  const auto draw_pieces = [&](const Vec3& p, const Vec3& q, const Vec3& r, int halvings, const auto& again) -> void {
+    const Corner a = see(p), b = see(q), c = see(r);
+    if (is_seen(a, b, c)) return buffer.draw(a, b, c);
+    const double pq = (q - p).norm(), qr = (r - q).norm(), rp = (p - r).norm(), longest = std::max({pq, qr, rp});
+    const bool all_out = !(a.inverse_depth > 0 || b.inverse_depth > 0 || c.inverse_depth > 0);
+    constexpr double fine_m = 0.005, coarse_m = 0.2;  // a piece that is out with all its corners and small is out
+    if (halvings == 0 || longest < (all_out ? coarse_m : fine_m)) return;
+    if (longest == pq) {
+      const Vec3 m = 0.5 * (p + q);
+      again(p, m, r, halvings - 1, again), again(m, q, r, halvings - 1, again);
+    } else if (longest == qr) {
+      const Vec3 m = 0.5 * (q + r);
+      again(p, q, m, halvings - 1, again), again(p, m, r, halvings - 1, again);
+    } else {
+      const Vec3 m = 0.5 * (r + p);
+      again(p, q, m, halvings - 1, again), again(m, q, r, halvings - 1, again);
+    }
+  };
+  constexpr int most_halvings = 12;
   for (const PosedMesh& body : bodies) {
     const Pose T_camera_mesh = T_base_camera.inverse() * body.T_base_mesh;
     const Points& vertices = body.mesh->vertices_m;
@@ -118,19 +142,23 @@ DepthImage render_depth(const std::vector<PosedMesh>& bodies, const Camera& came
       const std::array<std::size_t, 3> id{std::size_t(triangle(0)), std::size_t(triangle(1)), std::size_t(triangle(2))};
       const int behind = (points[id[0]].z() < near_m) + (points[id[1]].z() < near_m) + (points[id[2]].z() < near_m);
       if (behind == 0) {
-        buffer.draw(corners[id[0]], corners[id[1]], corners[id[2]]);
+        if (is_seen(corners[id[0]], corners[id[1]], corners[id[2]]))
+          buffer.draw(corners[id[0]], corners[id[1]], corners[id[2]]);
+        else
+          draw_pieces(points[id[0]], points[id[1]], points[id[2]], most_halvings, draw_pieces);
       } else if (behind < 3) {
-        std::vector<Corner> polygon;  // the part in front of the near plane: 3 or 4 corners
+        std::vector<Vec3> polygon;  // the part in front of the near plane: 3 or 4 corners
         for (int k = 0; k < 3; ++k) {
           const Vec3 &p = points[id[k]], &q = points[id[(k + 1) % 3]];
-          if (p.z() >= near_m) polygon.push_back(see(p));
+          if (p.z() >= near_m) polygon.push_back(p);
           if ((p.z() >= near_m) != (q.z() >= near_m)) {
             Vec3 cut = p + (near_m - p.z()) / (q.z() - p.z()) * (q - p);
             cut.z() = near_m;
-            polygon.push_back(see(cut));
+            polygon.push_back(cut);
           }
         }
-        for (std::size_t k = 2; k < polygon.size(); ++k) buffer.draw(polygon[0], polygon[k - 1], polygon[k]);
+        for (std::size_t k = 2; k < polygon.size(); ++k)
+          draw_pieces(polygon[0], polygon[k - 1], polygon[k], most_halvings, draw_pieces);
       }
     }
   }

@@ -327,6 +327,99 @@ TEST(FromStreams, PixelsOfTheRobotAreLeftOut) {
   EXPECT_THROW(recording_from(masked, streams), Error) << "no description, no mask";
 }
 
+TEST(FromStreams, TheRobotIsMaskedWhereItStandsAndOnceAndOnlyIfItIsWanted) {
+  SensorStreams streams = lab();
+  // A gripper shares the topic; the column stands 10 m aside, far out of the picture.
+  for (const PoseSample& sample : streams.frames[0].samples)
+    streams.joints.push_back({sample.time_s, {0.02, height_m(sample.time_s)}});
+  streams.joint_names = {"gripper", "lift"};
+  Pose aside = Pose::Identity();
+  aside.translation() = Vec3(10, 0, 0);
+  StreamPlan masked = plan();
+  masked.recording.robot = column();
+  masked.recording.robot->links.front().name = masked.recording.robot->joints.front().parent = "root";
+  streams.frames.push_back({"base", "root", true, {{0, aside}}});
+  const auto masked_pixels = [](const FromStreams& made) {
+    int sum = 0;
+    for (const Step& step : made.recording.pushes[0].steps) {
+      EXPECT_TRUE(step.joints_rad.empty()) << "else it would be masked again, as if it stood at the base";
+      for (const Observation& one : step.observations)
+        if (const auto* frame = std::get_if<DepthFrame>(&one); frame && frame->mask.size() > 0) sum += frame->mask.cast<int>().sum();
+    }
+    return sum;
+  };
+  streams.cameras[0].mask_robot = true;
+  EXPECT_EQ(masked_pixels(recording_from(masked, streams)), 0);
+  streams.frames.back().samples[0].T_parent_child = Pose::Identity();
+  streams.frames[2].samples[0].T_parent_child.linear() = tip_at(0).linear();
+  streams.frames[2].samples[0].T_parent_child.translation() = Vec3(0.3, 0.1, 0.5);
+  streams.cameras[0].image = [](std::size_t) { return DepthImage(DepthImage::Constant(48, 64, 0.5f)); };
+  EXPECT_GT(masked_pixels(recording_from(masked, streams)), 80);
+  streams.cameras[0].mask_robot.reset();
+  EXPECT_GT(masked_pixels(recording_from(masked, streams)), 80) << "it is described and its pose is known";
+  streams.cameras[0].mask_robot = false;
+  EXPECT_EQ(masked_pixels(recording_from(masked, streams)), 0);
+
+  streams.cameras[0].mask_robot = true;
+  streams.joint_names = {"gripper", "finger"};
+  EXPECT_THAT(recording_from(masked, streams).notes, testing::Contains(HasSubstr("joint 'lift' is not in the joint states")));
+}
+
+TEST(FromStreams, ATareWhereNothingWasMeasuredIsRefused) {
+  StreamPlan wrong = plan();
+  wrong.tare = Tare::between;
+  wrong.tare_from_s = 1000;
+  wrong.tare_to_s = 1001;
+  try {
+    recording_from(wrong, lab());
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr("wrench.tare"), HasSubstr("no force was measured"), HasSubstr("29.99")));
+  }
+}
+
+/// The same sensor with its sign turned by its driver, a tool of 2 kg on it: either report gives the force on the object.
+TEST(FromStreams, TheToolsWeightIsTakenOffWhateverTheSensorReports) {
+  LabOptions quiet;
+  quiet.bias_n.setZero();
+  SensorStreams streams = lab(quiet);
+  const Vec3 weight(0, 0, -2 * 9.81);
+  const Mat3 R_tip_sensor = streams.frames[1].samples[0].T_parent_child.linear();
+  for (WrenchSample& sample : streams.wrenches) sample.force_n += (tip_at(sample.time_s).linear() * R_tip_sensor).transpose() * weight;
+  StreamPlan heavy = plan();
+  heavy.tare = Tare::none;
+  heavy.tool_mass_kg = 2;
+  const auto on_sensor = recording_from(heavy, streams).recording.pushes.at(0);
+  for (WrenchSample& sample : streams.wrenches) sample.force_n *= -1;
+  heavy.force_on_object = true;
+  const auto on_object = recording_from(heavy, streams).recording.pushes.at(0);
+  ASSERT_EQ(on_sensor.steps.size(), on_object.steps.size());
+  for (std::size_t i = 1; i + 1 < on_object.steps.size(); ++i) {
+    const Vec3 force = *on_object.steps[i].loads.at(0).force_n;
+    EXPECT_LT((force - *on_sensor.steps[i].loads.at(0).force_n).norm(), 1e-9);
+    EXPECT_NEAR(force.z(), -force_n(on_object.steps[i].time_s), 0.05);
+  }
+}
+
+TEST(FromStreams, AClockThatCloudsCannotTellIsSaid) {
+  SensorStreams streams = lab();
+  CloudStream clouds;
+  clouds.name = "/points";
+  clouds.frame = "camera";
+  clouds.sigma_m = 0.001;
+  clouds.times_s = streams.cameras[0].times_s;
+  clouds.cloud = [](std::size_t) {
+    PointCloud cloud;
+    cloud.points_m.setZero(1, 3);
+    return cloud;
+  };
+  streams.cameras.clear();
+  streams.clouds.push_back(clouds);
+  StreamPlan late = plan();
+  late.camera_clock.estimate = true;
+  EXPECT_THAT(recording_from(late, streams).notes, testing::Contains(HasSubstr("there are clouds only")));
+}
+
 TEST(FromStreams, CloudsComeIntoTheBaseFrame) {
   SensorStreams streams = lab();
   Pose pose = Pose::Identity();

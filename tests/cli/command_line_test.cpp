@@ -90,6 +90,16 @@ TEST(CommandLine, MistypedOptionGetsSuggestionAndUsageCode) {
   EXPECT_THAT(outcome.err, HasSubstr("Did you mean `--threads`?"));
 }
 
+TEST(CommandLine, OptionsThatWouldHaveNoSayAreRefused) {
+  for (const char* wrong : {"record --demo --object ball -o nowhere", "record --demo --force-limit 3 -o nowhere",
+                            "record --demo --resume -o nowhere", "record --driver x.so --object ball -o nowhere",
+                            "suggest nowhere --direction 0 0 -1", "estimate nowhere -o out --young-modulus-start -5"}) {
+    const Outcome outcome = palpate(wrong);
+    EXPECT_EQ(outcome.exit_code, 2) << wrong;
+    EXPECT_THAT(outcome.err, HasSubstr("--")) << wrong;
+  }
+}
+
 TEST(CommandLine, FarFetchedWordGetsNoSuggestion) {
   const Outcome outcome = palpate("xylophone");
   EXPECT_EQ(outcome.exit_code, 2);

@@ -5,12 +5,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <deque>
+
 #include "io/bag_files.hpp"
 #include "io/made_up_recording.hpp"
 #include "io/read_back.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_survey.hpp"
 #include "palpate/io/bag_write.hpp"
+#include "palpate/io/ros_messages.hpp"
 
 namespace palpate::io {
 namespace {
@@ -120,6 +123,82 @@ TEST_F(Mapping, StampsOfASimulationAreBroughtToTheRecordersClock) {
   const Recording back = acquisition::recording_from(mapping.plan, streams).recording;
   EXPECT_EQ(back.pushes[0].steps[1].loads.size(), 1u);
   EXPECT_NEAR(back.pushes[0].steps[1].loads[0].force_n->z(), -1.7, 1e-12);
+}
+
+/// A recorder that starts its clock by another computer's: marks are told by the recorder, forces by their headers.
+TEST_F(Mapping, ClocksThatDifferBySecondsAreBroughtTogether) {
+  MessageSource late = read_bag(folder.path() / "bag");
+  for (Message& one : late.messages) one.log_time_ns += 20'000'000'000;
+  BagMapping mapping = read_mapping(folder.path() / "bag/mapping.yaml");
+  const SensorStreams streams = read_streams(late, mapping);
+  EXPECT_THAT(streams.warnings, Contains(HasSubstr("differ by")));
+  EXPECT_NEAR(acquisition::recording_from(mapping.plan, streams).recording.pushes[0].steps[1].loads.at(0).force_n->z(), -1.7, 1e-12);
+}
+
+/// The same CameraInfo stands beside images as they were taken (K and D) and rectified ones (P).
+TEST_F(Mapping, RectifiedImagesAreNotUndistortedAgain) {
+  const MessageSource bag = read_bag(folder.path() / "bag");
+  const Camera taken{64, 48, 525, 526, 31, 23, DistortionModel::plumb_bob, {0.18, -0.4, 0, 0, 0}};
+  std::string info = encode(RosCameraInfo{{1, "camera_1"}, taken});
+  const double fx = 525, fx_rectified = 540;
+  info.replace(info.rfind(std::string(reinterpret_cast<const char*>(&fx), 8)), 8, reinterpret_cast<const char*>(&fx_rectified), 8);
+  const auto camera_by = [&](const std::string& key, const std::string& topic, std::string* said = nullptr) {
+    MessageSource changed = bag;
+    for (Message& one : changed.messages)
+      if (changed.topics[one.topic].name == "/camera_1/depth/camera_info") one.data = info;
+    for (MessageTopic& one : changed.topics)
+      if (one.name == "/camera_1/depth/image") one.name = topic;
+    std::string mapping_text = text;
+    const std::string image = "image: /camera_1/depth/image";
+    mapping_text.replace(mapping_text.find(image), image.size(), key + "image: " + topic);
+    folder.put("bag/changed.yaml", mapping_text);
+    BagMapping mapping = read_mapping(folder.path() / "bag/changed.yaml");
+    const SensorStreams streams = read_streams(changed, mapping);
+    if (said != nullptr)
+      for (const std::string& one : streams.warnings) *said += one;
+    return streams.cameras.at(0).like.camera;
+  };
+  const std::string plain = "/camera_1/depth/image", straight = "/camera_1/depth/image_rect";
+  EXPECT_EQ(camera_by("rectified: true, ", plain).fx_px, 540);
+  EXPECT_EQ(camera_by("rectified: true, ", plain).distortion, DistortionModel::none);
+  EXPECT_EQ(camera_by("rectified: false, ", straight).fx_px, 525);
+  EXPECT_EQ(camera_by("rectified: false, ", straight).distortion, DistortionModel::plumb_bob);
+  std::string said;
+  EXPECT_EQ(camera_by("", straight, &said).fx_px, 540);
+  EXPECT_THAT(said, AllOf(HasSubstr("taken as rectified"), HasSubstr("rectified: true or false")));
+  EXPECT_EQ(camera_by("", plain, &said).fx_px, 525);
+  EXPECT_THAT(said, HasSubstr("taken as not rectified"));
+}
+
+/// An arm and its gripper on one topic, the gripper first.
+TEST_F(Mapping, JointsOfSeveralSendersComeTogether) {
+  MessageSource bag = read_bag(folder.path() / "bag");
+  std::deque<std::string> data;
+  const auto tell = [&](double time_s, const std::vector<std::string>& names, const std::vector<double>& positions) {
+    const auto stamp = bag.messages.front().log_time_ns + static_cast<std::int64_t>(time_s * 1e9);
+    data.push_back(encode(RosJointState{{stamp, ""}, names, positions}));
+    bag.messages.push_back({bag.topics.size(), stamp, data.back()});
+  };
+  tell(0.0, {"finger"}, {0.01});
+  tell(0.1, {"j2", "j1"}, {2, 1});
+  tell(0.2, {"finger"}, {0.02});
+  tell(0.3, {"j1", "j2"}, {3, 4});
+  MessageTopic topic;
+  topic.name = "/joint_states";
+  topic.type = "sensor_msgs/msg/JointState";
+  topic.messages = 4;
+  topic.encoding = MessageEncoding::cdr;
+  bag.topics.push_back(topic);
+  std::string changed = text;
+  changed.replace(changed.find("wrench: /wrench"), 15, "joints: /joint_states\n  wrench: /wrench");
+  folder.put("bag/changed.yaml", changed);
+  BagMapping mapping = read_mapping(folder.path() / "bag/changed.yaml");
+  const SensorStreams streams = read_streams(bag, mapping);
+  EXPECT_THAT(streams.joint_names, testing::ElementsAre("finger", "j2", "j1"));
+  ASSERT_EQ(streams.joints.size(), 4u);
+  EXPECT_THAT(streams.joints[0].positions, testing::ElementsAre(0.01, 2, 1)) << "not seen yet: as they will first be seen";
+  EXPECT_THAT(streams.joints[2].positions, testing::ElementsAre(0.02, 2, 1));
+  EXPECT_THAT(streams.joints[3].positions, testing::ElementsAre(0.02, 4, 3));
 }
 
 TEST_F(Mapping, ASurveySuggestsAMappingThatNamesWhatIsThere) {

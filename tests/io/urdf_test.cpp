@@ -96,6 +96,20 @@ TEST(Urdf, MeshesAreFoundBesideIt) {
   EXPECT_THROW(parse_urdf(with("package://my_robot/../../etc/passwd.stl"), "r.urdf", folder.path()), Error);
 }
 
+TEST(Urdf, AShapeThatCannotBeReadIsLeftOutWithAWordWhereTheCallerWantsIt) {
+  const std::string text =
+      "<robot name='r'><link name='a'><visual><geometry><mesh filename='package://r/meshes/a.dae'/></geometry></visual>"
+      "<collision><geometry><box size='1 1 1'/></geometry></collision></link></robot>";
+  EXPECT_THROW(parse_urdf(text, "r.urdf", "."), Error);
+  std::vector<std::string> left_out;
+  const RobotModel robot = parse_urdf(text, "r.urdf", ".", &left_out);
+  EXPECT_TRUE(robot.links[0].visual.empty());
+  EXPECT_EQ(robot.links[0].collision.size(), 1u);
+  ASSERT_EQ(left_out.size(), 1u);
+  EXPECT_NE(left_out[0].find("visual"), std::string::npos) << left_out[0];
+  EXPECT_NE(left_out[0].find("a.dae"), std::string::npos) << left_out[0];
+}
+
 TEST(Urdf, WhatMakesNoTreeIsRefused) {
   for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
            {"child link=\"upper\"", "child link=\"nowhere\""},

@@ -105,6 +105,16 @@ TEST(Camera, NothingBehindOrBeyondTheFold) {
   const Points directions = pixel_directions(folded);
   EXPECT_TRUE(std::isnan(directions(0, 0)));
   EXPECT_TRUE(std::isfinite(directions(240 * 640 + 320, 0)));
+  // What lies farther out has no image: the polynomial would put it back into the picture, at x = 1.2 left of the middle.
+  EXPECT_TRUE(project(folded, Vec3(0.57, 0, 1)));
+  for (const double x : {0.58, 0.9, 1.2, 5.0}) EXPECT_FALSE(project(folded, Vec3(x, 0, 1))) << x;
+  // k2 turns the polynomial up again, 1 - 3 r^2 + 1.75 r^4 = 0 at r = 0.67: beyond it is seen by nobody all the same.
+  const Camera wavy = with(DistortionModel::plumb_bob, {-1, 0.35, 0, 0});
+  EXPECT_TRUE(project(wavy, Vec3(0, 0.66, 1)));
+  for (const double y : {0.68, 1.0, 1.5, 3.0}) EXPECT_FALSE(project(wavy, Vec3(0, y, 1))) << y;
+  const Camera fisheye = with(DistortionModel::fisheye, {-0.3, 0, 0, 0});  // theta - 0.3 theta^3 turns at 1.054
+  EXPECT_TRUE(project(fisheye, Vec3(std::sin(1.05), 0, std::cos(1.05))));
+  EXPECT_FALSE(project(fisheye, Vec3(std::sin(1.06), 0, std::cos(1.06))));
 }
 
 TEST(Camera, BadFieldsAreNamed) {

@@ -153,5 +153,29 @@ TEST(RenderMask, BadInputIsNamed) {
   EXPECT_NO_THROW(mask_rendered(flat_frame(1), rendered, options));
 }
 
+TEST(DepthRender, WhatIsFarAsideOfABentLensIsNotDrawnIntoThePicture) {
+  Camera camera = small_camera();
+  camera.distortion = DistortionModel::plumb_bob;
+  camera.distortion_coefficients = {-0.3, 0, 0, 0};  // turns back 46 degrees off the axis
+  const auto plate = [](double from_m, double to_m) {
+    TriMesh mesh;
+    mesh.vertices_m.resize(4, 3);
+    mesh.vertices_m << from_m, -0.02, 0.5, to_m, -0.02, 0.5, to_m, 0.02, 0.5, from_m, 0.02, 0.5;
+    mesh.triangles.resize(2, 3);
+    mesh.triangles << 0, 1, 2, 0, 2, 3;
+    return mesh;
+  };
+  const TriMesh aside = plate(0.88, 0.92), reaching_in = plate(0, 0.92), inside = plate(0, 0.5);
+  const auto seen = [&](const TriMesh& mesh) {
+    return render_depth({{&mesh, Pose::Identity()}}, camera, Pose::Identity());
+  };
+  EXPECT_EQ((seen(aside).array() > 0).count(), 0);
+  // What of it can be seen is drawn as if the rest were not there.
+  const DepthImage part = seen(reaching_in), whole = seen(inside);
+  EXPECT_GT((whole.array() > 0).count(), 500);
+  // Edges are drawn straight between corners, which the lens bends: the outline differs where the pieces are finer.
+  EXPECT_LT(((part.array() > 0) != (whole.array() > 0)).count(), 30);
+}
+
 }  // namespace
 }  // namespace palpate::sensing
