@@ -24,6 +24,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/sensing/back_projection.hpp"
+#include "palpate/sensing/camera.hpp"
 #include "palpate/sensing/free_space.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/lens_scatter.hpp"
@@ -240,6 +241,7 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
   };
   demand(model.element == "tet4" || model.element == "tet10" || model.element == "auto", "model.element " + model.element,
          "the elements are tet4, tet10 and auto");
+  demand(options.method == "palpate" || options.method == "paper", "method " + options.method, "the methods are palpate and paper");
   demand(options.regions == "recorded" || options.regions == "by-site" || options.regions == "none", "regions " + options.regions,
          "regions are those of the recording (recorded), one around each pushed site (by-site), or none");
   demand(options.mesh_tolerance > 0 && std::isfinite(options.mesh_tolerance), "mesh_tolerance",
@@ -257,12 +259,8 @@ namespace {
 /// Names of the frames' cameras, told by their intrinsics: one that stands at a place, or one that is carried around. "" for a
 /// camera of one frame.
 std::vector<std::string> cameras_of(const std::vector<const DepthFrame*>& frames) {
-  const auto intrinsics = [](const DepthFrame& frame) {
-    const Camera& c = frame.camera;
-    return std::tie(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.distortion, c.distortion_coefficients);
-  };
   const auto same_place = [&](const DepthFrame& a, const DepthFrame& b) {
-    return intrinsics(a) == intrinsics(b) && a.T_base_camera.matrix().isApprox(b.T_base_camera.matrix(), 1e-9);
+    return sensing::same_intrinsics(a.camera, b.camera) && a.T_base_camera.matrix().isApprox(b.T_base_camera.matrix(), 1e-9);
   };
   std::vector<bool> stands;
   for (const DepthFrame* one : frames)
@@ -271,7 +269,7 @@ std::vector<std::string> cameras_of(const std::vector<const DepthFrame*>& frames
   for (std::size_t i = 0; i < frames.size(); ++i) {
     std::size_t first = frames.size(), count = 0;
     for (std::size_t j = 0; j < frames.size(); ++j) {
-      const bool belongs = stands[i] ? same_place(*frames[i], *frames[j]) : !stands[j] && intrinsics(*frames[i]) == intrinsics(*frames[j]);
+      const bool belongs = stands[i] ? same_place(*frames[i], *frames[j]) : !stands[j] && sensing::same_intrinsics(frames[i]->camera, frames[j]->camera);
       if (belongs && ++count == 1) first = j;
     }
     names.push_back(count > 1 ? std::to_string(first) : "");

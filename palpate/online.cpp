@@ -5,11 +5,24 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/finer_model.hpp"
+#include "palpate/sensing/camera.hpp"
 
 namespace palpate {
 namespace {
 
 bool forces(const Load& load) { return load.travel_m || (load.force_n && load.force_n->norm() > 0); }
+
+/// True where an input tells more than what was imposed on the object does.
+bool is_seen(const estimation::TermInput& input, const Step& step) {
+  const auto imposed = [&](const std::string& tool, bool travel) {
+    return std::any_of(step.loads.begin(), step.loads.end(), [&](const Load& load) {
+      return (tool.empty() || load.tool == tool) && load.travel_m.has_value() == travel;
+    });
+  };
+  if (const auto* wrench = std::get_if<Wrench>(&input)) return imposed(wrench->tool, true);
+  if (const auto* travel = std::get_if<ToolTravel>(&input)) return imposed(travel->tool, false);
+  return true;
+}
 
 /// True where a step so far has both a load (or the object's weight) and something that was seen.
 bool says_something(const Recording& recording, const estimation::Inputs& inputs) {
@@ -18,7 +31,7 @@ bool says_something(const Recording& recording, const estimation::Inputs& inputs
   for (const Push& push : recording.pushes) {
     for (const Step& step : push.steps) {
       const bool loaded = weight || std::any_of(step.loads.begin(), step.loads.end(), forces);
-      if (loaded && !inputs[s].empty()) return true;
+      if (loaded && std::any_of(inputs[s].begin(), inputs[s].end(), [&](const auto& one) { return is_seen(one, step); })) return true;
       ++s;
     }
   }
@@ -29,8 +42,50 @@ bool says_something(const Recording& recording, const estimation::Inputs& inputs
 
 OnlineEstimator::OnlineEstimator(const Recording& scene, const IdentifyOptions& options)
     : options_(options), recording_(with_overrides(scene, options)), fit_(options.fit) {
-  inputs_ = observe(recording_);
+  const auto demand = [](bool fine, const std::string& where, const std::string& cure) {
+    if (!fine) throw Error(cure, where);
+  };
+  demand(options.method == "palpate", "method " + options.method, "the paper's method wants all steps at once: call identify");
+  demand(options.regions != "by-site" || !recording_.regions.empty(), "regions by-site",
+         "no site has been pushed yet: give the recording its regions");
+  take_in(recording_);
   estimate_.message = "no step was taken in";
+}
+
+void OnlineEstimator::take_in(const Recording& part) {
+  auto all = observe(part);
+  std::size_t s = 0;
+  for (const Push& push : part.pushes) {
+    for (const Step& step : push.steps) {
+      std::vector<const DepthFrame*> frames;
+      for (const Observation& one : step.observations)
+        if (const auto* frame = std::get_if<DepthFrame>(&one)) frames.push_back(frame);
+      std::size_t frame = 0;
+      for (estimation::TermInput& input : all[s])
+        if (auto* rays = std::get_if<estimation::RayObservation>(&input)) rays->camera = camera_of(*frames[frame++]);
+      ++s;
+    }
+  }
+  for (auto& terms : all) inputs_.push_back(std::move(terms));
+}
+
+/// The camera of a frame, told when the frame arrives and not changed by those that come later: one that was at this place before;
+/// else one of the same intrinsics that is carried around; else a new one.
+std::string OnlineEstimator::camera_of(const DepthFrame& frame) {
+  const SeenFrom* carried = nullptr;
+  for (const SeenFrom& one : cameras_) {
+    if (!sensing::same_intrinsics(one.camera, frame.camera)) continue;
+    if (one.T_base_camera.matrix().isApprox(frame.T_base_camera.matrix(), 1e-9)) {
+      const std::string name = one.name;
+      cameras_.push_back({frame.camera, frame.T_base_camera, name, true});
+      return name;
+    }
+    const bool stands = std::any_of(cameras_.begin(), cameras_.end(), [&](const SeenFrom& other) { return other.name == one.name && other.again; });
+    if (!stands && carried == nullptr) carried = &one;
+  }
+  const std::string name = carried != nullptr ? carried->name : std::to_string(cameras_.size());
+  cameras_.push_back({frame.camera, frame.T_base_camera, name, false});
+  return name;
 }
 
 void OnlineEstimator::begin(const Push& push) {
@@ -40,7 +95,7 @@ void OnlineEstimator::begin(const Push& push) {
   recording_.pushes.push_back(push);
   Recording alone = recording_;
   alone.pushes = {push};
-  for (auto& terms : observe(alone)) inputs_.push_back(std::move(terms));
+  take_in(alone);
   if (!push.steps.empty()) object_.reset();  // it may touch elsewhere
 }
 
@@ -75,10 +130,10 @@ const Identification& OnlineEstimator::add(const Step& step, const OnProgress& p
   Recording alone = recording_;
   alone.pushes = {recording_.pushes.back()};
   alone.pushes.back().steps = {step};
-  auto terms = observe(alone).front();
   const bool rebuild = !object_ || new_contact(step);
   recording_.pushes.back().steps.push_back(step);
-  inputs_.push_back(std::move(terms));
+  const std::size_t cameras = cameras_.size();
+  take_in(alone);
   try {
     if (!says_something(recording_, inputs_)) {
       estimate_.message = "no load has been seen to deform the object yet";
@@ -91,6 +146,7 @@ const Identification& OnlineEstimator::add(const Step& step, const OnProgress& p
   } catch (...) {
     recording_.pushes.back().steps.pop_back();
     inputs_.pop_back();
+    cameras_.resize(cameras);
     if (rebuild) object_.reset();
     throw;
   }

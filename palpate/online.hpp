@@ -40,12 +40,21 @@ class OnlineEstimator {
  private:
   bool new_contact(const Step& step) const;
   void build(const OnProgress& progress);
+  void take_in(const Recording& part);
+  std::string camera_of(const DepthFrame& frame);
 
+  struct SeenFrom {
+    Camera camera;
+    Pose T_base_camera = Pose::Identity();
+    std::string name;
+    bool again = false;  ///< a camera of these intrinsics was here before
+  };
   IdentifyOptions options_;
   Recording recording_;   // as given, with all steps
   Recording simulated_;   // the same with the object as it is solved
   std::optional<estimation::SimulatedObject> object_;
   estimation::Inputs inputs_;
+  std::vector<SeenFrom> cameras_;  // one a frame
   estimation::GrowingFit fit_;
   Identification estimate_;
 };

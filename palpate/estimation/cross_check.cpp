@@ -52,6 +52,8 @@ class CrossCheck {
       if (pushes.size() <= p) pushes.resize(p + 1, std::vector<char>(model_.step_count(), 0));
       pushes[p][s] = 1;
     }
+    // Online, a push may have begun that has no step yet.
+    std::erase_if(pushes, [](const std::vector<char>& steps) { return std::find(steps.begin(), steps.end(), 1) == steps.end(); });
     if (pushes.size() > 1) {
       for (std::size_t p = 0; p < pushes.size() && !cancelled_; ++p) out.pushes.push_back(young_of(pushes[p], name_of(pushes[p])));
     }

@@ -180,6 +180,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     if (optimum.evaluation.usable) return true;
     answer.fit.solves = model.solves();
     answer.fit.load_cases = model.load_cases();
+    if (optimum.termination == Termination::cancelled) return false;
     answer.verdicts.push_back({"not_converged", "The simulation found no equilibrium (" + optimum.message +
                                                     "): check the loads, the supports and the material."});
     return false;
@@ -222,11 +223,21 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
 
   ResidualSummary residuals;
   const auto optimise_again = [&] {
-    optimum = optimise(objective, optimum.unknowns, loss, optimiser, progress);
+    Optimum again = optimise(objective, optimum.unknowns, loss, optimiser, progress);
+    if (again.termination == Termination::cancelled) {  // what was found before stays the answer
+      answer.termination = optimum.termination = Termination::cancelled;
+      answer.message = again.message;
+      return false;
+    }
+    optimum = std::move(again);
     optimum.loss = loss;
     if (!take()) return false;
     residuals = objective.summarise(loss);
-    return optimum.termination != Termination::cancelled;
+    return true;
+  };
+  const auto as_far_as_known = [&] {
+    if (optimum.evaluation.usable) answer.parameters = parameters_so_far(optimum.unknowns);
+    return answer;
   };
   // Neighbouring pixels err together: count them as fewer, and fit once more with that weight.
   const auto weigh_neighbours = [&] {
@@ -236,7 +247,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     return optimise_again();
   };
   residuals = objective.summarise(loss);
-  if (!weigh_neighbours()) return answer;
+  if (!weigh_neighbours()) return as_far_as_known();
 
   double factor = 1;
   std::vector<int> moving;
@@ -269,10 +280,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
       load_cases_of_meshes += next->model().load_cases();
       correction = std::move(next);
     }
-    if (!corrected) {
-      if (optimum.evaluation.usable) answer.parameters = parameters_so_far(optimum.unknowns);
-      return answer;
-    }
+    if (!corrected) return as_far_as_known();
     meshed = better->mesh;
     finer = better->finer;
     mesh.reset();
@@ -295,7 +303,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;
     answer.message = "stopped by the caller";
-    return answer;
+    return as_far_as_known();
   }
   std::vector<Posterior> regions{posterior};
   for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));

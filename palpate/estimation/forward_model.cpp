@@ -173,6 +173,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
       patch_radius_.push_back(radii);
     }
   }
+  if (steps_.empty()) throw Error("holds no step: there is nothing to learn from", "pushes");
   effort_ = efforts(recording);
   memory_.resize(steps_.size());
   followed_.assign(steps_.size(), 0);

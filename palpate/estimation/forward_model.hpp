@@ -109,9 +109,14 @@ class ForwardModel {
   std::size_t first_step_of(std::size_t worker) const { return worker * steps_.size() / workers_; }
   std::size_t workers() const { return workers_; }
 
+  /// A step's load as a share of the highest so far: what supports that give way have given way by.
+  const std::vector<double>& load_shares() const { return effort_; }
+  bool gives_way() const { return !spread_.empty(); }
+
   /// A non-linear step whose solution would move by at most this share of itself since it was last solved follows its
   /// derivatives and is not solved anew: wrong by about the share's square. 0 (the default): every prediction is a solution.
   void set_reuse(double share) { reuse_ = share; }
+  double reuse() const { return reuse_; }
   /// The largest square of such a share in the steps' last predictions: how far they are from solutions, relative.
   double reuse_error() const;
 
@@ -217,13 +222,14 @@ class ForwardModel {
 /// Sets how far solutions are reused, for as long as it lives.
 class ReuseWhile {
  public:
-  ReuseWhile(ForwardModel& model, double share) : model_(model) { model_.set_reuse(share); }
-  ~ReuseWhile() { model_.set_reuse(0); }
+  ReuseWhile(ForwardModel& model, double share) : model_(model), before_(model.reuse()) { model_.set_reuse(share); }
+  ~ReuseWhile() { model_.set_reuse(before_); }
   ReuseWhile(const ReuseWhile&) = delete;
   ReuseWhile& operator=(const ReuseWhile&) = delete;
 
  private:
   ForwardModel& model_;
+  double before_;
 };
 
 }  // namespace palpate::estimation

@@ -64,7 +64,11 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   optimiser.reuse_error = 1;
   Optimum optimum;
   bool found = false;
-  if (loss_) {
+  // What is found here is kept when all is done: a caller that stops it by an exception finds what was there before.
+  std::optional<Loss> weighed = loss_;
+  if (model.load_shares() != load_shares_ && model.gives_way()) kept_ = {};  // earlier steps are smaller shares of a new highest load
+  load_shares_ = model.load_shares();
+  if (weighed) {
     VectorX start = unknowns.prior_mean();
     std::map<std::string, int> place;
     for (std::size_t k = 0; k < names.size(); ++k) {
@@ -79,8 +83,8 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
     kept_ = {};
     objective.set_reuse(reuse);
     // Which rays of a new step count is chosen where the steps before it say that it should be.
-    if (objective.evaluate(start, *loss_, progress).usable) loss_ = objective.with_chosen_rays(*loss_);
-    optimum = optimise(objective, start, *loss_, optimiser, progress);
+    if (objective.evaluate(start, *weighed, progress).usable) weighed = objective.with_chosen_rays(*weighed);
+    optimum = optimise(objective, start, *weighed, optimiser, progress);
     if (optimum.termination == Termination::no_progress &&
         newton_step(optimum.evaluation, free_unknowns(unknowns)).gain < least_gain) {
       optimum.termination = Termination::converged;
@@ -88,11 +92,11 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
     }
     if (optimum.evaluation.usable && optimum.termination != Termination::cancelled && optimum.termination != Termination::converged) {
       objective.set_reuse(anew);
-      optimum = optimise(objective, optimum.unknowns, *loss_, optimiser, progress);
+      optimum = optimise(objective, optimum.unknowns, *weighed, optimiser, progress);
       objective.set_reuse(reuse);
     }
-    optimum.loss = *loss_;
-    found = optimum.evaluation.usable && objective.residual_scale() < misfit * std::max(1.0, loss_->tukey / loss.tukey);
+    optimum.loss = *weighed;
+    found = optimum.evaluation.usable && objective.residual_scale() < misfit * std::max(1.0, weighed->tukey / loss.tukey);
   }
   if (!found && optimum.termination != Termination::cancelled) {
     objective.set_reuse(0);
@@ -142,17 +146,20 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   answer.fit.chi2_per_dof = summary.chi2_per_dof;
 
   // The next update starts here, whatever the search over nu below visits.
-  same_object_ = true;
-  loss_ = optimum.loss;
-  names_ = names;
-  known_.clear();
-  for (std::size_t k = 0; k < names.size(); ++k) known_[names[k]] = optimum.unknowns(static_cast<Index>(k));
+  const auto remember = [&] {
+    same_object_ = true;
+    loss_ = optimum.loss;
+    names_ = names;
+    known_.clear();
+    for (std::size_t k = 0; k < names.size(); ++k) known_[names[k]] = optimum.unknowns(static_cast<Index>(k));
+  };
 
   objective.set_reuse(search_reuse, false);
   const Posterior posterior = explore_posterior(objective, optimum, optimum.loss, factor, progress);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;
     answer.message = "stopped by the caller";
+    remember();
     return done();
   }
   std::vector<Posterior> regions{posterior};
@@ -166,6 +173,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}, Doubts{}});
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   kept_ = objective.take_kept();
+  remember();
   return done();
 }
 

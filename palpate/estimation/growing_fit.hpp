@@ -44,6 +44,7 @@ class GrowingFit {
   std::optional<Loss> loss_;             // of the last optimum
   Objective::Kept kept_;
   std::vector<std::string> names_;  // of the unknowns that kept_ counts
+  std::vector<double> load_shares_;     // of the model that kept_ is of
   bool same_object_ = true;
   int steps_evaluated_ = 0;
 };

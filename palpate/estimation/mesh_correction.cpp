@@ -26,7 +26,7 @@ bool MeshCorrection::correct(Objective& objective, const VectorX& unknowns, cons
   model_.start_from(coarse);
   if (!objective_.evaluate(unknowns, loss, progress).usable) return refuse();
   for (std::size_t s = 0; s < changes.size(); ++s) {
-    if (!loss.counts(s)) continue;
+    if (!loss.counts(s) || objective.last_predictions()[s].surface_m.rows() == 0) continue;  // nothing was seen there
     changes[s] = change_between(objective.last_predictions()[s], objective_.last_predictions()[s], unknowns);
     if (!changes[s]) return refuse();
   }

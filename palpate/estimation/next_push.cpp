@@ -81,12 +81,13 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
   const bool fixed = recording.model.poisson_fixed || !(covariance(1, 1) > 0);
   if (fixed) covariance(1, 0) = covariance(0, 1) = 0, covariance(1, 1) = 1 / known_exactly;
 
-  // The mesh's error comes back with every push. Its sign of correlation is not told, so it goes out of the diagonal.
+  // The mesh's error comes back with every push, and none shows the unseen side. Its sign of correlation is not told, so it goes out of the diagonal.
   for (const auto& entry : answer.budget) {
-    if (entry.input != "mesh") continue;
-    known.uncured(0) = std::min(std::pow(entry.young_modulus_percent / 100, 2), 0.9 * covariance(0, 0));
-    known.uncured(1) = fixed ? 0 : std::min(entry.poisson_shift * entry.poisson_shift, 0.9 * covariance(1, 1));
+    if (entry.input != "mesh" && entry.input != "unseen side") continue;
+    known.uncured(0) += std::pow(entry.young_modulus_percent / 100, 2);
+    known.uncured(1) += fixed ? 0 : entry.poisson_shift * entry.poisson_shift;
   }
+  for (int i = 0; i < 2; ++i) known.uncured(i) = std::min(known.uncured(i), 0.9 * covariance(i, i));
   const double left = std::sqrt((1 - known.uncured(0) / covariance(0, 0)) * (1 - known.uncured(1) / covariance(1, 1)));
   covariance.diagonal() -= known.uncured;
   covariance(0, 1) *= left;

@@ -9,7 +9,7 @@
 
 namespace palpate::estimation {
 
-/// Rays of a step that count, a term and a ray each; a term without flags: all.
+/// A RayChoice for every ray of a step, a term each; a term without any: all count.
 using RaysOfStep = std::vector<std::vector<char>>;
 
 /// How residuals are weighed in one evaluation.

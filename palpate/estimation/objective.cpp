@@ -54,7 +54,6 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
       for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
         if (terms_[s].empty() || !loss.counts(s)) continue;
         if (anchored) {
-    if (!pattern_) pattern_ = std::make_shared<const SurfacePattern>(model_.object().surface.rest());
           predictions_[s] = model_.predict(s, unknowns);
           normals[s] = follow(s, unknowns, loss);
         } else if (reuse_ > 0 && find_kept(s, unknowns, loss)) {
@@ -64,8 +63,8 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
         } else {
           ++steps_evaluated_;
           predictions_[s] = model_.predict(s, unknowns);
-          if (!predictions_[s].converged) stop = true;
-          if (stop) return;
+          // The others go on: which of them were solved, and from where, must not depend on who was faster.
+          if (!predictions_[s].converged || stop) return;
           rows_[s] = rows_of(s, predictions_[s], unknowns, loss);
           if (reuse_ > 0) {
             keep(s, unknowns, loss);
@@ -146,7 +145,7 @@ Loss Objective::with_chosen_rays(Loss loss) const {
     for (std::size_t t = 0; t < chosen.size(); ++t) {
       const VectorX& facing = rows_[s][t].facing;
       chosen[t].resize(static_cast<std::size_t>(facing.size()));
-      for (Index i = 0; i < facing.size(); ++i) chosen[t][static_cast<std::size_t>(i)] = facing(i) > well_inside ? 1 : 0;
+      for (Index i = 0; i < facing.size(); ++i) chosen[t][static_cast<std::size_t>(i)] = facing(i) > well_inside ? counts_in : facing(i) > 0 ? grazes : passes_by;
     }
     loss.rays[s] = std::make_shared<const RaysOfStep>(std::move(chosen));
   }
@@ -167,14 +166,17 @@ double Objective::cost_of(const std::vector<StepPrediction>& predictions, const 
 }
 
 double Objective::residual_scale() const {
-  std::vector<double> sizes;
+  std::vector<double> sizes;  // of what has one: rays that pass by say nothing of the spread of those that hit
+  bool any = false;
   for (const auto& step : rows_) {
     for (const auto& rows : step) {
       if (!rows.robust) continue;
-      for (Index i = 0; i < rows.residual.size(); ++i) sizes.push_back(std::abs(rows.residual(i)));
+      any = any || rows.residual.size() > 0;
+      for (Index i = 0; i < rows.residual.size(); ++i)
+        if (std::isfinite(rows.residual(i))) sizes.push_back(std::abs(rows.residual(i)));
     }
   }
-  if (sizes.empty()) return 0;
+  if (sizes.empty()) return any ? std::numeric_limits<double>::infinity() : 0;
   auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
   return *middle / 0.6745;
@@ -184,11 +186,15 @@ ResidualSummary Objective::summarise(const Loss& loss) const {
   ResidualSummary summary;
   double between = 0, total = 0;
   std::size_t cells = 0, in_cells = 0;
-  for (const auto& step : rows_) {
-    for (const auto& rows : step) {
+  for (std::size_t s = 0; s < rows_.size(); ++s) {
+    const RaysOfStep* const choice = loss.along_rays ? loss.rays_of(s) : nullptr;
+    for (std::size_t t = 0; t < rows_[s].size(); ++t) {
+      const TermRows& rows = rows_[s][t];
+      const bool chosen = choice != nullptr && t < choice->size() && (*choice)[t].size() == static_cast<std::size_t>(rows.residual.size());
       std::map<int, std::pair<double, std::size_t>> cell_sums;
       for (Index i = 0; i < rows.residual.size(); ++i) {
         const double r = rows.residual(i);
+        if (chosen && (*choice)[t][static_cast<std::size_t>(i)] == grazes) continue;
         if (rows.robust) ++summary.points;
         if (std::isinf(r)) {  // a ray beside the silhouette: no residual that could be tested
           ++summary.outliers;

@@ -95,6 +95,8 @@ class Objective {
 
   ResidualSummary summarise(const Loss& loss) const;            ///< of the last evaluation
   const std::vector<std::vector<TermRows>>& last_rows() const { return rows_; }  ///< a step: its terms
+  /// True for a step in which something was observed.
+  bool sees(std::size_t s) const { return !terms_[s].empty(); }
   const std::vector<StepPrediction>& last_predictions() const { return predictions_; }
 
   const Unknowns& unknowns() const { return unknowns_; }

@@ -95,7 +95,7 @@ Objective::StepNormal Objective::follow(std::size_t s, const VectorX& unknowns, 
     for (std::size_t t = 0; t < rows_[s].size(); ++t) {
       const std::vector<char>& chosen = (*loss.rays_of(s))[t];
       for (std::size_t i = 0; i < chosen.size(); ++i)
-        if (chosen[i] == 0) rows_[s][t].residual(static_cast<Index>(i)) = std::numeric_limits<double>::infinity();
+        if (chosen[i] != counts_in) rows_[s][t].residual(static_cast<Index>(i)) = std::numeric_limits<double>::infinity();
     }
     anchor = anchor_of(rows_[s], here, unknowns, loss);
   } else if (!same_rays || !(moved <= 0.5 * reuse_ * anchor.patience)) {

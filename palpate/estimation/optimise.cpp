@@ -293,10 +293,11 @@ double stiff_young_pa(double force_n, double size_m) {
 
 /// Steps that linear theory is asked about: a few of a long recording say enough. A non-linear body may bulge or dodge under its
 /// full load, and a start that is too soft for it may end on another equilibrium: there, those of up to half the highest force.
-std::vector<std::size_t> steps_to_start_with(const ForwardModel& model, double highest_n) {
+std::vector<std::size_t> steps_to_start_with(const Objective& objective, const ForwardModel& model, double highest_n) {
   constexpr double light = 0.55;  // half, and what a controller misses it by
   std::vector<std::size_t> all, lighter;
   for (std::size_t s = 0; s < model.step_count(); ++s) {
+    if (!objective.sees(s)) continue;
     all.push_back(s);
     const double force_n = force_of(model, s);
     if (force_n > 0.1 * highest_n && force_n < light * highest_n) lighter.push_back(s);
@@ -322,7 +323,7 @@ VectorX find_start(Objective& objective, double poisson_start) {
   for (std::size_t s = 0; s < model.step_count(); ++s) highest_n = std::max(highest_n, force_of(model, s));
   guess(log_young) = std::log(stiff_young_pa(highest_n, size_m));
   std::vector<StepPrediction> stiff(model.step_count());
-  for (std::size_t s : steps_to_start_with(model, highest_n)) {
+  for (std::size_t s : steps_to_start_with(objective, model, highest_n)) {
     stiff[s] = model.predict(s, guess);
     if (!stiff[s].converged) stiff[s] = {};
   }
@@ -343,6 +344,11 @@ VectorX find_start(Objective& objective, double poisson_start) {
       const VectorX loaded = -prediction.d_surface.col(0);
       for (Index v = 0; v < prediction.surface_m.rows(); ++v) {
         prediction.surface_m.row(v) += (ratio - 1) * loaded.segment<3>(3 * v).transpose();
+      }
+      if (prediction.field != nullptr) {
+        const VectorX material = -prediction.d_markers().col(0);
+        for (Index v = 0; v < prediction.material_m.rows(); ++v)
+          prediction.material_m.row(v) += (ratio - 1) * material.segment<3>(3 * v).transpose();
       }
       sensible = sensible && ratio * loaded.cwiseAbs().maxCoeff() < size_m;
       for (std::size_t l = 0; l < prediction.force_n.size(); ++l) {

@@ -87,7 +87,7 @@ PaperError::PaperError(const Recording& recording, const SimulatedObject& object
     ForwardModel model(recording, object, list, statics, memory->model);
     memory->model = model.solved();
     Objective objective(model, inputs, list);
-    impl_->start_pa = std::exp(find_start(objective, options.poisson_start)(log_young));
+    impl_->start_pa = std::exp(find_start(objective, recording.model.poisson_fixed.value_or(options.poisson_start))(log_young));
   }
   impl_->model = std::make_unique<ForwardModel>(recording, object, impl_->unknowns, statics, memory->model);
   memory->model = impl_->model->solved();
@@ -135,7 +135,9 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
                                const FitOptions& options, const OnProgress& progress, FitMemory* memory) {
   check(options);
   PaperError error(recording, object, inputs, options, memory);
-  const double nu_low = recording.model.poisson_lower, nu_high = recording.model.poisson_upper;
+  const double nu_start = recording.model.poisson_fixed.value_or(options.poisson_start);
+  const double nu_low = std::min(recording.model.poisson_lower, recording.model.poisson_fixed.value_or(1)),
+               nu_high = std::max(recording.model.poisson_upper, recording.model.poisson_fixed.value_or(-1));
   const bool nu_moves = !recording.model.poisson_fixed;
   // Of log E and nu in the numerical derivatives. Points that change their nearest vertex make the error rough: where a narrow
   // difference shows no way down, a wider one may.
@@ -144,7 +146,7 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
 
   // Algorithm 1, in (log E, nu): gradient step, re-simulation, acceptance if the error falls.
   Eigen::Vector2d x(std::log(error.start_young_modulus_pa()),
-                    std::clamp(recording.model.poisson_fixed.value_or(options.poisson_start), nu_low, nu_high));
+                    std::clamp(nu_start, nu_low, nu_high));
   const auto inside = [&](Eigen::Vector2d at) {
     at(1) = std::clamp(at(1), nu_low, nu_high);
     return at;

@@ -384,7 +384,7 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   double chi2 = 0;
   for (const double r : left.travel) chi2 += r * r;
   for (const double r : left.touch) chi2 += r * r;
-  for (const double r : left.ray) chi2 += std::isfinite(r) ? std::min(r * r, tukey_cut * tukey_cut) : 0;
+  for (const double r : left.ray) chi2 += std::abs(r) < tukey_cut ? r * r : 0;  // as they are counted
   const double rows = static_cast<double>(left.travel.size() + left.touch.size() + left.rays_hit);
   check.chi2_per_dof = chi2 / std::max(1.0, rows - static_cast<double>(moving.size()));
   check.travels = left.travel.size();

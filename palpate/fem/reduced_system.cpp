@@ -280,13 +280,17 @@ MatrixX rigid_motions(const Points& nodes_m) {
 
 namespace {
 
+/// A node's part; -1 for nodes of no element, which nothing has to hold.
 std::vector<Index> connected_parts(const TetMesh& mesh, Index& count) {
   geometry::UnionFind parts(mesh.nodes_m.rows());
   for (Index e = 0; e < mesh.tetrahedra.rows(); ++e)
     for (int a = 1; a < mesh.tetrahedra.cols(); ++a) parts.join(mesh.tetrahedra(e, 0), mesh.tetrahedra(e, a));
-  std::vector<Index> label(mesh.nodes_m.rows(), -1), part(mesh.nodes_m.rows());
+  std::vector<Index> label(mesh.nodes_m.rows(), -1), part(mesh.nodes_m.rows(), -1);
+  std::vector<char> used(mesh.nodes_m.rows(), 0);
+  for (Index i = 0; i < mesh.tetrahedra.size(); ++i) used[mesh.tetrahedra.data()[i]] = 1;
   count = 0;
   for (std::size_t i = 0; i < part.size(); ++i) {
+    if (used[i] == 0) continue;
     const Index root = parts.root(static_cast<Index>(i));
     if (label[root] < 0) label[root] = count++;
     part[i] = label[root];
@@ -310,6 +314,7 @@ void check_supported(const TetMesh& mesh, const std::vector<Constraint>& constra
   const std::vector<Index> part = connected_parts(mesh, parts);
   std::vector<Eigen::Matrix<double, 6, 6>> gram(parts, Eigen::Matrix<double, 6, 6>::Zero());
   for (const Constraint& c : constraints) {
+    if (part[c.node] < 0) continue;
     const MatrixX rows = c.axes.leftCols(c.count).transpose() * modes.middleRows<3>(3 * c.node);
     gram[part[c.node]] += rows.transpose() * rows;
   }

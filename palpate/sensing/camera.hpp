@@ -14,7 +14,11 @@ namespace palpate::sensing {
 ///         does not belong to the model (none: 0; plumb_bob: 4 or 5; rational: 8; fisheye: 4).
 void check(const Camera& camera);
 
-/// Pixel of a point in the camera frame; nothing behind the camera (z <= 0). Distortion models, (x, y) = (X, Y) / Z:
+/// True for cameras of one calibration: most likely one device.
+bool same_intrinsics(const Camera& a, const Camera& b);
+
+/// Pixel of a point in the camera frame; nothing behind the camera (z <= 0), nor so far aside that the
+/// lens has no image of it (beyond the fold of a polynomial). Distortion models, (x, y) = (X, Y) / Z:
 ///  - plumb_bob, rational: coefficients k1 k2 p1 p2 [k3 [k4 k5 k6]], the Brown-Conrady model with the ratio
 ///    (1 + k1 r2 + k2 r4 + k3 r6) / (1 + k4 r2 + k5 r4 + k6 r6) as radial factor, as OpenCV and ROS define them;
 ///  - fisheye: k1..k4, equidistant with theta_d = theta (1 + k1 t2 + k2 t4 + k3 t6 + k4 t8) (Kannala and Brandt 2006).

@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
+#include <stdexcept>
 
 #include "estimation/pushed_block.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/sensing/depth_render.hpp"
 
 namespace palpate {
 namespace {
@@ -56,6 +59,125 @@ TEST(OnlineEstimator, KnowsMoreAfterEveryStepAndEndsWhereIdentifyDoes) {
     EXPECT_EQ(end.parameters[k].lower_95, batch.parameters[k].lower_95);
     EXPECT_NEAR(online.estimate().parameters[k].value, batch.parameters[k].value, 0.1 * batch.parameters[k].std);
   }
+}
+
+/// What a fixed camera's calibration errs by does not average out over steps, online or not.
+class SeenByOneCamera : public testing::Test {
+ protected:
+  void SetUp() override {
+    scene_ = estimation::pushed_block_recording();
+    scene_.model.material = "linear";
+    scene_.model.refine = "none";
+    scene_.rest.volume = estimation::kuhn_block(4, 3, 2, estimation::block_size_m);
+    const Step like = scene_.pushes[0].steps[0];
+    std::vector<Step>& steps = scene_.pushes[0].steps;
+    steps.assign(5, like);
+    steps[0].loads.clear();
+    for (int k = 1; k < 5; ++k) steps[std::size_t(k)].loads[0].force_n = Vec3(0, 0, -0.03 * k);
+    const estimation::SimulatedObject object = estimation::coarse_block("linear");
+    estimation::Unknowns unknowns;
+    estimation::ForwardModel model(scene_, object, unknowns);
+    VectorX truth = unknowns.prior_mean();
+    truth(estimation::log_young) = std::log(2e4);
+    truth(estimation::poisson) = 0.3;
+    for (std::size_t s = 0; s < steps.size(); ++s) {
+      TriMesh surface = object.surface.rest();
+      surface.vertices_m = model.predict(s, truth).surface_m;
+      steps[s].time_s = double(s);
+      steps[s].observations = {frame_of(surface, 0.2)};
+      farther_.push_back(frame_of(surface, 0.5));
+    }
+    push_ = scene_.pushes[0];
+    scene_.pushes.clear();
+    options_.fit.cross_checks = options_.fit.stresses = false;
+  }
+  DepthFrame frame_of(const TriMesh& surface, double distance_m) {
+    const Vec3 middle(0.03, 0.02, 0.015), eye = middle + distance_m * Vec3(0.4, -1, 1).normalized();
+    const Vec3 z = (middle - eye).normalized(), x = z.cross(Vec3::UnitZ()).normalized();
+    DepthFrame frame;
+    frame.camera = {160, 120, 150, 150, 79.5, 59.5, DistortionModel::none, {}};
+    frame.T_base_camera.linear() << x, z.cross(x), z;
+    frame.T_base_camera.translation() = eye;
+    frame.pose_std_m = 2e-3;
+    frame.pose_std_rad = 5e-3;
+    frame.noise.model = "constant";
+    frame.noise.sigma_m = 5e-4;
+    frame.depth_m = sensing::render_depth({{&surface, Pose::Identity()}}, frame.camera, frame.T_base_camera);
+    for (Index i = 0; i < frame.depth_m.size(); ++i)
+      if (frame.depth_m.data()[i] > 0) frame.depth_m.data()[i] += float(5e-4 * normal_(random_));
+    return frame;
+  }
+  OnlineEstimator begun() const {
+    OnlineEstimator online(scene_, options_);
+    Push named = push_;
+    named.steps.clear();
+    online.begin(named);
+    return online;
+  }
+  std::mt19937 random_{3};
+  std::normal_distribution<double> normal_;
+  Recording scene_;
+  Push push_;
+  std::vector<DepthFrame> farther_;
+  IdentifyOptions options_;
+};
+
+TEST_F(SeenByOneCamera, ItsCommonPoseIsAnUnknownOfAllSteps) {
+  OnlineEstimator online = begun();
+  for (const Step& step : push_.steps) online.add(step);
+  const Identification now = online.estimate(), whole = online.answer().answer;
+  const auto cameras = [](const Identification& answer) {
+    return std::count_if(answer.nuisances.begin(), answer.nuisances.end(), [](const Nuisance& one) { return one.name.rfind("camera", 0) == 0; });
+  };
+  EXPECT_EQ(cameras(now), 6);
+  EXPECT_EQ(cameras(whole), 6);
+  EXPECT_NEAR(now.parameters.at(0).std / whole.parameters.at(0).std, 1, 0.05);
+  EXPECT_NEAR(now.parameters.at(0).value, whole.parameters.at(0).value, 0.2 * whole.parameters.at(0).std);
+}
+
+/// A caller's exception takes the step back with all that it left behind: a next one may have other rays.
+TEST_F(SeenByOneCamera, AStepThatWasBrokenOffLeavesNothingBehind) {
+  OnlineEstimator plain = begun(), broken = begun();
+  for (std::size_t s = 0; s < 3; ++s) plain.add(push_.steps[s]), broken.add(push_.steps[s]);
+  const double expected = plain.add(push_.steps[3]).parameters.at(0).value;
+  for (const int last : {2, 4, 7}) {
+    Step other = push_.steps[3];
+    other.observations = {farther_[3]};
+    int calls = 0;
+    EXPECT_THROW(broken.add(other, [&](std::string_view, double) -> bool { return ++calls < last ? true : throw std::runtime_error("stop"); }),
+                 std::runtime_error);
+  }
+  const Identification& then = broken.add(push_.steps[3]);
+  EXPECT_NEAR(then.parameters.at(0).value, expected, 0.02 * then.parameters.at(0).std);
+}
+
+/// A force that is imposed is no observation of it.
+TEST(OnlineEstimator, WaitsUntilSomethingIsSeen) {
+  Recording whole = pushed_block({});
+  Recording scene = whole;
+  scene.pushes.clear();
+  OnlineEstimator online(scene);
+  Push push = whole.pushes[0];
+  push.steps.clear();
+  online.begin(push);
+  Step first = whole.pushes[0].steps[1];
+  Wrench wrench;
+  wrench.tool = first.loads[0].tool;
+  wrench.force_n = *first.loads[0].force_n;
+  wrench.force_sigma_n = 0.01;
+  first.observations = {wrench};
+  EXPECT_TRUE(online.add(first).parameters.empty());
+  EXPECT_EQ(online.add(whole.pushes[0].steps[2]).parameters.size(), 2u);
+}
+
+TEST(OnlineEstimator, RefusesOptionsThatWouldHaveNoSay) {
+  Recording scene = pushed_block({});
+  scene.pushes.clear();
+  IdentifyOptions paper, by_site;
+  paper.method = "paper";
+  by_site.regions = "by-site";
+  EXPECT_THROW(OnlineEstimator(scene, paper), Error);
+  EXPECT_THROW(OnlineEstimator(scene, by_site), Error);
 }
 
 TEST(OnlineEstimator, RefusesAStepAndGoesOnWithoutIt) {

@@ -2,7 +2,10 @@
 // Markers move rigidly with the nearest patch of the surface: they may stand several millimetres off it, so the patch's
 // rotation carries them as much as its translation does.
 #include <Eigen/SVD>
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
@@ -38,7 +41,8 @@ Patch patch_under(const TriMesh& surface, const geometry::TriangleTree& tree, co
 
 class MarkerTerm : public Term {
  public:
-  MarkerTerm(const Markers& markers, const TriMesh& rest, int offsets) : markers_(markers), rest_(rest), offsets_(offsets) {
+  MarkerTerm(const Markers& markers, const TriMesh& rest, std::vector<int> offsets)
+      : markers_(markers), rest_(rest), offsets_(std::move(offsets)) {
     const geometry::TriangleTree tree(rest);
     for (Index m = 0; m < markers.rest_m.rows(); ++m) {
       const bool seen = markers.rest_m.row(m).allFinite() && markers.observed_m.row(m).allFinite();
@@ -53,17 +57,18 @@ class MarkerTerm : public Term {
       if (!patches_[static_cast<std::size_t>(m)].vertices.empty()) seen.push_back(m);
     }
     const Index count = static_cast<Index>(predicted.columns.size());
-    const Index extra = offsets_ >= 0 ? 3 * markers_.rest_m.rows() : 0;
+    const Index extra = 3 * static_cast<Index>(offsets_.size());
     TermRows rows;
     rows.unknowns = predicted.columns;
-    for (Index k = 0; k < extra; ++k) rows.unknowns.push_back(offsets_ + static_cast<int>(k));
+    for (const int offset : offsets_)
+      for (int axis = 0; axis < 3; ++axis) rows.unknowns.push_back(offset + axis);
     rows.jacobian = MatrixX::Zero(3 * static_cast<Index>(seen.size()), count + extra);
     rows.residual.resize(rows.jacobian.rows());
     rows.observed_m.resize(static_cast<Index>(seen.size()), 3);
     for (Index r = 0; r < static_cast<Index>(seen.size()); ++r) {
       const Index m = seen[static_cast<std::size_t>(r)];
       Vec3 rest_m = markers_.rest_m.row(m);
-      if (extra > 0) rest_m += unknowns.segment<3>(offsets_ + 3 * m);
+      if (extra > 0) rest_m += unknowns.segment<3>(offsets_[static_cast<std::size_t>(m)]);
       const Patch& patch = patches_[static_cast<std::size_t>(m)];
 
       // Best rotation of the patch (Kabsch) and its derivative: (tr(S) I - S) dw = sum b x dy, with b = R a.
@@ -110,7 +115,7 @@ class MarkerTerm : public Term {
  private:
   Markers markers_;
   TriMesh rest_;
-  int offsets_;
+  std::vector<int> offsets_;  // a marker: first of its three unknowns; empty: its place at rest is exactly known
   std::vector<Patch> patches_;
 };
 
@@ -120,21 +125,25 @@ std::unique_ptr<Term> make_marker_term(const Markers& markers, const TermContext
   if (!(markers.sigma_m > 0)) {
     throw Error("the markers need their standard deviation (sigma_m > 0)", context.model.step(context.step).source + " markers");
   }
-  int offsets = -1;
+  std::vector<int> offsets;
   if (markers.rest_std_m > 0) {
-    std::string key = "markers";
-    for (const auto& name : markers.names) key += "/" + name;
-    if (context.shared.count(key) == 0) {
-      context.shared[key] = context.unknowns.size();
-      for (Index m = 0; m < markers.rest_m.rows(); ++m) {
-        const std::string name =
-            static_cast<std::size_t>(m) < markers.names.size() ? markers.names[static_cast<std::size_t>(m)] : std::to_string(m);
-        for (const char* axis : {"_x", "_y", "_z"}) context.unknowns.add({"marker_" + name + axis, "m", 0, markers.rest_std_m});
-      }
+    for (Index m = 0; m < markers.rest_m.rows(); ++m) {
+      // One marker in several steps errs alike in all of them: told by its name, or else by its place at rest.
+      const auto number = static_cast<std::size_t>(m);
+      const Vec3 rest_m = markers.rest_m.row(m);
+      std::string key = "marker/";
+      if (number < markers.names.size())
+        key += markers.names[number];
+      else
+        for (int axis = 0; axis < 3; ++axis) key += std::to_string(std::bit_cast<std::uint64_t>(rest_m(axis))) + "/";
+      const auto [at, fresh] = context.shared.try_emplace(key, context.unknowns.size());
+      const std::string name = number < markers.names.size() ? markers.names[number] : std::to_string(m);
+      for (const char* axis : {"_x", "_y", "_z"})
+        if (fresh) context.unknowns.add({"marker_" + name + axis, "m", 0, markers.rest_std_m});
+      offsets.push_back(at->second);
     }
-    offsets = context.shared[key];
   }
-  return std::make_unique<MarkerTerm>(markers, context.model.object().surface.rest(), offsets);
+  return std::make_unique<MarkerTerm>(markers, context.model.object().surface.rest(), std::move(offsets));
 }
 
 }  // namespace palpate::estimation

@@ -81,7 +81,7 @@ class RayTerm : public Term {
       std::optional<Scattered> scattered;
       Vec3 lever = measured;  // where the frame's pose acts: the hit, for a ray
       Index& hint = hints_[static_cast<std::size_t>(i)];
-      const bool chosen = view.chosen != nullptr && (*view.chosen)[static_cast<std::size_t>(i)] != 0;
+      const bool chosen = view.chosen != nullptr && (*view.chosen)[static_cast<std::size_t>(i)] == counts_in;
       if (view.chosen != nullptr && !chosen) {
         rows.residual(i) = std::numeric_limits<double>::infinity();
         continue;

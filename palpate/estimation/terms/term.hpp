@@ -32,6 +32,10 @@ struct RayObservation {
 
 using TermInput = std::variant<RayObservation, PointCloud, Markers, ToolTravel, Wrench>;
 
+/// Whether a ray counts: not where it passes the object by, and not where it grazes it, which says little and nothing against
+/// the fit.
+enum RayChoice : char { passes_by = 0, counts_in = 1, grazes = 2 };
+
 /// How a term looks at what it observed.
 struct TermView {
   bool along_rays = true;  ///< false while the surface may still be far away: closest points are used instead of rays
