@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "cli/bag_recording.hpp"
+#include "cli/number_checks.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/self_check.hpp"
@@ -96,7 +97,7 @@ Run verbs::check(CLI::App& app) {
   app.add_option("--mapping", given->mapping, "what a bag's topics mean (default: mapping.yaml beside it)");
   app.add_option("--stiffness", given->stiffness_n_per_m,
                  "of the spring along every push, N/m; its plate is the recording's surface")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   app.add_flag("--rigid", given->rigid, "the body does not give way at all");
   app.add_option("--stiffness-std", given->check.stiffness_relative_std, "how well the stiffness is known, relative")
       ->check(CLI::NonNegativeNumber)
@@ -107,7 +108,7 @@ Run verbs::check(CLI::App& app) {
   app.add_option("--turned-within", given->check.placed_std_rad, "of its orientation, rad (0: exact)")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--touch-within", given->check.touch_std_m, "of the tip at first contact along the push, m")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   return [given](Session& session) { return run(*given, session); };
 }

@@ -12,6 +12,7 @@
 #include "cli/bag_recording.hpp"
 #include "cli/live_report.hpp"
 #include "cli/mistyped.hpp"
+#include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -170,15 +171,15 @@ Run verbs::estimate(CLI::App& app) {
       ->check(CLI::IsMember({"none", "auto"}));
   app.add_option("--mesh-tolerance", given->mesh_tolerance,
                  "with refine auto: fit again on a finer mesh while the mesh's own share of E is above this (0.01 = 1 %)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   app.add_option("--regions", given->regions,
                  "parts with an E of their own: recorded (what the recording says), by-site (one around each site that was pushed) or none")
       ->check(CLI::IsMember({"recorded", "by-site", "none"}));
   app.add_option("--poisson-range", given->poisson_range, "range of the uniform prior on nu, e.g. 0.3 0.4995")->expected(2);
   app.add_option("--poisson-ratio", given->poisson_ratio, "take nu as known");
   app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--max-iterations", given->max_iterations, "most iterations of the fit")->check(CLI::PositiveNumber);
+      ->check(positive_number());
+  app.add_option("--max-iterations", given->max_iterations, "most iterations of the fit")->check(positive_number());
   app.add_flag("--budget", given->budget, "print what each input's uncertainty does to E and nu");
   given->live.add_to(app);
   return [given](Session& session) { return estimate(session, *given); };

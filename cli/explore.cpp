@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "cli/live_report.hpp"
+#include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
 #include "cli/push_robot.hpp"
 #include "cli/push_words.hpp"
@@ -168,12 +169,12 @@ Run verbs::explore(CLI::App& app) {
       ->required();
   add_robot_options(app, given->robot);
   app.add_option("--young-modulus-within", options.young_modulus_within, "goal: half of the 95 % interval over E")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   app.add_option("--poisson-ratio-within", options.poisson_ratio_within, "goal: half of the 95 % interval")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
-  app.add_option("--pushes", options.max_pushes, "most pushes")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--pushes", options.max_pushes, "most pushes")->check(positive_number())->capture_default_str();
   app.add_option("--for", given->goal, "young-modulus, poisson-ratio or both: what the next push is chosen for")
       ->check(CLI::IsMember({"young-modulus", "poisson-ratio", "both"}))
       ->capture_default_str();
@@ -186,12 +187,12 @@ Run verbs::explore(CLI::App& app) {
       ->check(CLI::Range(0, 12))
       ->capture_default_str();
   app.add_option("--force-limit", options.push.force_limit_n, "of the robot, N")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   app.add_option("--travel-limit", given->travel_limit_m, "of the robot, m (default: of the object)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   app.add_option("--guess", options.suggest.young_modulus_pa, "of Young's modulus before the first touch, Pa")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   app.add_option("--law", given->law, "material law of the estimate (default: that of the scene)");
   app.add_option("--refine", given->refine, "none or auto: finer under the tool")->check(CLI::IsMember({"none", "auto"}));

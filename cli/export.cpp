@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "cli/learned_object.hpp"
+#include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -165,7 +166,7 @@ Run verbs::export_(CLI::App& app) {
   app.add_option("--to", given->to, "simulator:" + list)->required();
   app.add_option("-o,--out", given->out, "folder for its files")->required();
   app.add_option("--density", given->density_kg_m3, "kg/m3, for simulators of motion (that of the recording)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   app.add_option("--gravity", given->gravity, "X Y Z in m/s2 (that of the recording; none where the shape was measured with its weight on)")->expected(3)->type_name("");
   app.add_flag("--verify", given->verify, "calculix: let ccx solve the exported model under a test load and compare");
   return [given](Session& session) { return run(*given, session); };

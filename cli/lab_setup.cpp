@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fstream>
 
+#include "cli/number_checks.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/fem/materials.hpp"
 #include "palpate/io/mesh_file.hpp"
@@ -43,10 +44,10 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
   app.add_option("--force-sensor", arguments.force_sensor, "one of" + rows(lab::force_sensors()))->capture_default_str();
   app.add_option("--young-modulus", arguments.young_modulus_pa,
                  "of the true object, Pa (default: drawn from the seed, 10 to 40 kPa; bar: ten times that)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   app.add_option("--region-ratio", arguments.region_ratio,
                  "of the bear: its head is stiffer and its back softer by this factor; of the bar: its upper half is stiffer")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
       ->check(CLI::Range(0.0, 0.4999));
   app.add_option("--stands", arguments.stands,
@@ -54,7 +55,7 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
       ->check(CLI::IsMember({"glued", "rough"}))
       ->capture_default_str();
   app.add_option("--friction", arguments.friction_coefficient, "Coulomb's coefficient of a rough table and wall")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   app.add_flag("--wall", arguments.wall, "an upright wall behind the object, and a push towards it");
   lab::LabOptions& lab = arguments.lab;
@@ -67,10 +68,10 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
   app.add_option("--relaxation", lab.relaxation, "share of each rise of the force that fades after the motion")
       ->check(CLI::Range(0.0, 0.95))
       ->capture_default_str();
-  app.add_option("--relaxation-time", lab.relaxation_s, "with this time constant, s")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--slip-at", lab.slip_at_m, "travel at which the tip slides off sideways, m (default: it holds)")->check(CLI::PositiveNumber);
+  app.add_option("--relaxation-time", lab.relaxation_s, "with this time constant, s")->check(positive_number())->capture_default_str();
+  app.add_option("--slip-at", lab.slip_at_m, "travel at which the tip slides off sideways, m (default: it holds)")->check(positive_number());
   app.add_option("--slides-at", lab.slides_at_n, "sideways force at which the object slides on the table, N (default: it holds)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
 }
 
 lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {

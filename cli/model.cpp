@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -56,7 +57,7 @@ reconstruction::BuiltObject build_from_recording(const Options& o, const reconst
 
 reconstruction::BuiltObject build(const Options& o, Session& session) {
   reconstruction::BuildOptions options;
-  if (o.tetrahedra > 0) options.mesh.tetrahedra = o.tetrahedra;
+  if (o.tetrahedra != 0) options.mesh.tetrahedra = o.tetrahedra;
   options.mesh.edge_m = o.edge_m;
   options.fine_surface = true;
   if (!o.finer.empty()) options.mesh.finer = {{Vec3(o.finer[0], o.finer[1], o.finer[2]), o.finer[3], o.finer[4]}};
@@ -70,7 +71,14 @@ reconstruction::BuiltObject build(const Options& o, Session& session) {
     surface = geometry::boundary_surface(io::tet_mesh_of(std::move(data), o.input)).surface;
   else
     surface = io::tri_mesh_of(std::move(data), o.input);
-  return reconstruction::build_object(surface, {}, options, session.progress());
+  if (o.tetrahedra == 0 && o.edge_m == 0)
+    throw Error("0 keeps the tetrahedra of a volume, but the file holds a surface: give how many are wished", "--tetrahedra");
+  try {
+    return reconstruction::build_object(surface, {}, options, session.progress());
+  } catch (const Error& error) {
+    if (error.where() != "surface") throw;
+    throw Error(error.message(), o.input);
+  }
 }
 
 int run(const Options& o, Session& session) {
@@ -128,9 +136,10 @@ Run verbs::model(CLI::App& app) {
                  "finer than the tetrahedra)")
       ->required();
   app.add_option("--tetrahedra", o->tetrahedra, "wished number of tetrahedra; 0 keeps those of a volume as they are")
+      ->check(CLI::Range(0, 2000000))
       ->type_name("N")
       ->capture_default_str();
-  app.add_option("--edge", o->edge_m, "wished edge length in metres instead of a number")->type_name("METRES");
+  app.add_option("--edge", o->edge_m, "wished edge length in metres instead of a number")->check(positive_number())->type_name("METRES");
   app.add_option("--finer", o->finer, "shorter edges near a point: X Y Z RADIUS EDGE, in metres")
       ->expected(5)
       ->type_name("");

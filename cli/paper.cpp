@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "cli/lab_setup.hpp"
+#include "cli/number_checks.hpp"
 #include "cli/paper_json.hpp"
 #include "cli/paper_page.hpp"
 #include "cli/verbs.hpp"
@@ -129,7 +130,7 @@ Run verbs::paper(CLI::App& app) {
   for (const Study& study : studies()) scenes += fmt::format("\n{}: {}", study.name, study.title);
   app.add_option("-o,--output", arguments->output, "folder for paper.html and paper.json")->required();
   app.add_flag("--quick", arguments->quick, "one seed a scene and a coarse error surface: minutes a scene in place of many hours");
-  app.add_option("--seeds", arguments->seeds, "seeds a scene, from --seed on (default: 100, with --quick 1)")->check(CLI::PositiveNumber);
+  app.add_option("--seeds", arguments->seeds, "seeds a scene, from --seed on (default: 100, with --quick 1)")->check(positive_number());
   app.add_option("--scene", arguments->scenes, "only this one; may be given several times" + scenes);
   app.add_option("--object", arguments->object, "a closed mesh file that takes the place of the cow (fig. 3, 4)")->check(CLI::ExistingFile);
   add_mesh_file_options(app, arguments->file);

@@ -7,14 +7,18 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "cli/learned_object.hpp"
+#include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/estimation/load_columns.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/report/words.hpp"
@@ -25,7 +29,8 @@ namespace {
 struct Options {
   std::filesystem::path result, out;
   std::vector<double> contact, direction;
-  double force_n = 0, travel_m = 0, radius_m = 0;
+  std::optional<double> force_n, travel_m;
+  double radius_m = 0;
   std::string tool;
 };
 
@@ -86,7 +91,27 @@ nlohmann::json json_of(const prediction::Band& band) {
 
 MatrixX by_rows(const VectorX& field) { return Eigen::Map<const Points>(field.data(), field.size() / 3, 3); }
 
+double mesh_size_m(const TetMesh& mesh) { return (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm(); }
+
+/// A place beside the surface would be pressed by the part of the patch that reaches it: it is moved there, or refused.
+void put_on_surface(const TetMesh& mesh, const Tool& tool, Load& load, Session& session) {
+  const TriMesh surface = geometry::boundary_surface(mesh).surface;
+  const auto foot = geometry::TriangleTree(surface).closest(load.contact_m);
+  const double off_m = std::sqrt(foot.squared_distance_m2), near_m = 0.01 * mesh_size_m(mesh);
+  const auto words = [](const Vec3& at) { return fmt::format("{:.4g} {:.4g} {:.4g}", at.x(), at.y(), at.z()); };
+  if (off_m > std::max(near_m, 0.5 * tool.radius_m))
+    throw Error(fmt::format("lies {} away from the object's surface; the nearest place on it is {}", report::quantity(off_m, "m"), words(foot.point_m)),
+                "--contact");
+  if (off_m > near_m) session.warn(fmt::format("the contact is moved by {} onto the surface, to {}", report::quantity(off_m, "m"), words(foot.point_m)));
+  load.contact_m = foot.point_m;
+  const auto corner = [&](int k) { return Vec3(surface.vertices_m.row(surface.triangles(foot.triangle, k))); };
+  const Vec3 outwards = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+  if (load.direction.dot(outwards) > 0)
+    throw Error("points out of the object there, and a tool can only push; into it is about " + words(-outwards.normalized()), "--direction");
+}
+
 int run(const Options& given, Session& session) {
+  end_at_first_interrupt();
   const LearnedObject learned = load_learned_object(given.result);
   const Recording& object = learned.object;
   const TetMesh& mesh = *object.rest.volume;
@@ -100,10 +125,11 @@ int run(const Options& given, Session& session) {
   if (given.direction.size() == 3) load.direction = Vec3(given.direction[0], given.direction[1], given.direction[2]);
   if (!(load.direction.norm() > 0)) throw Error("must not be zero", "--direction");
   load.direction.normalize();
+  if (tool.shape != ToolShape::vertices) put_on_surface(mesh, tool, load, session);
   prediction::NewPush push;
   push.direction = load.direction;
-  if (given.force_n != 0) push.force_n = given.force_n;
-  if (given.travel_m != 0) push.travel_m = given.travel_m;
+  push.force_n = given.force_n;
+  push.travel_m = given.travel_m;
   if (push.force_n.has_value() == push.travel_m.has_value()) throw Error("give either --force or --travel", "predict");
   if (!given.out.empty()) must_take_files(given.out);
   fem::Boundary boundary = boundary_of(object, tool, load, push.background);
@@ -118,6 +144,8 @@ int run(const Options& given, Session& session) {
     return exit_numbers;
   }
   if (!found.reason.empty()) session.warn(found.reason);
+  if (!(std::abs(found.travel_m.value) > 1e-9 * mesh_size_m(mesh)))
+    throw Error("a support holds the object at this place: nothing moves there, and nothing can be learned", "--contact");
   const auto tell = [&](const char* what, const prediction::Band& band, const char* unit) {
     session.say(
         fmt::format("{:<20} {}{}", what, report::quantity(band.value, unit),
@@ -167,14 +195,15 @@ Run verbs::predict(CLI::App& app) {
   auto given = std::make_shared<Options>();
   app.add_option("result", given->result, "folder that `palpate estimate` wrote")->required();
   app.add_option("--contact", given->contact, "where the push acts, X Y Z in metres, base frame")
+      ->check(finite_number())
       ->expected(3)
       ->type_name("");
-  app.add_option("--direction", given->direction, "of the push, into the object (0 0 -1)")->expected(3)->type_name("");
-  app.add_option("--force", given->force_n, "along the direction, N");
-  app.add_option("--travel", given->travel_m, "of the pressed patch along the direction, m, instead of a force");
+  app.add_option("--direction", given->direction, "of the push, into the object (0 0 -1)")->check(finite_number())->expected(3)->type_name("");
+  app.add_option("--force", given->force_n, "along the direction, N")->check(positive_number());
+  app.add_option("--travel", given->travel_m, "of the pressed patch along the direction, m, instead of a force")->check(positive_number());
   app.add_option("--tool", given->tool, "tool of the recording (its only one)");
   app.add_option("--radius", given->radius_m, "radius of the pressed patch, m (that of the tool)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   app.add_option("-o,--out", given->out,
                  "folder for prediction.json and prediction.vtu (displacement and stress with bands)");
   return [given](Session& session) { return run(*given, session); };

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "cli/logged_robot.hpp"
+#include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
 #include "cli/push_robot.hpp"
 #include "cli/verbs.hpp"
@@ -189,9 +190,9 @@ Run verbs::record(CLI::App& app) {
   app.add_option("--truth", arguments->truth,
                  "file for what the simulation knows and the recording does not (default: beside the recording, OUTPUT.truth.json; "
                  "with --demo: not written)");
-  app.add_option("--force-limit", arguments->push.force_limit_n, "stop at this force, N")->check(CLI::PositiveNumber);
-  app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m (default: of the object)")->check(CLI::PositiveNumber);
-  app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N (default: of the object)")->check(CLI::PositiveNumber);
+  app.add_option("--force-limit", arguments->push.force_limit_n, "stop at this force, N")->check(positive_number());
+  app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m (default: of the object)")->check(positive_number());
+  app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N (default: of the object)")->check(positive_number());
   app.add_option("--bag", arguments->bag, "also write a bag (rosbag2: MCAP) with its mapping into this folder");
   app.add_option("--raw-bag", arguments->raw_bag,
                  "also write what the sensors said all the while (MCAP), as a robot's own recorder does");

@@ -42,6 +42,11 @@ void stop_on_interrupt() {
   std::signal(SIGPIPE, SIG_IGN);  // a reader that closed early is no reason to lose a result on disk
 }
 
+void end_at_first_interrupt() {
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+}
+
 std::string stage_words(std::string_view stage) {
   constexpr std::pair<std::string_view, std::string_view> words[] = {
       {"read", "reading the recording"},

@@ -58,6 +58,8 @@ class Session {
 
 /// Ctrl-C asks the running work to stop at its next progress report; pressed again it ends the program at once.
 void stop_on_interrupt();
+/// For verbs that have nothing to save: they end where they are.
+void end_at_first_interrupt();
 
 /// A stage of the library ("lattice") in the words of this program ("filling with tetrahedra").
 std::string stage_words(std::string_view stage);

@@ -12,6 +12,7 @@
 
 #include "cli/bag_recording.hpp"
 #include "cli/learned_object.hpp"
+#include "cli/number_checks.hpp"
 #include "cli/push_words.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -185,12 +186,12 @@ Run verbs::suggest(CLI::App& app) {
       ->needs("--contact");
   app.add_option("--tool", given->suggest.tool, "tool of the recording (its only round one)");
   app.add_option("--young-modulus", given->suggest.young_modulus_pa, "guess before the first touch, Pa")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
-  app.add_option("--force-limit", limits.force_n, "of the robot, N")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--travel-limit", limits.travel_m, "of the robot, m")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--force-limit", limits.force_n, "of the robot, N")->check(positive_number())->capture_default_str();
+  app.add_option("--travel-limit", limits.travel_m, "of the robot, m")->check(positive_number())->capture_default_str();
   app.add_option("--pressure-limit", limits.pressure_over_young, "mean pressure under the tool over Young's modulus")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   app.add_option("--tilt-limit", limits.tilt_rad, "between push and surface normal, rad: beyond it the tool slips")
       ->check(CLI::Range(0.0, 1.39))
@@ -209,7 +210,7 @@ Run verbs::suggest(CLI::App& app) {
       ->capture_default_str();
   app.add_option("--views", given->suggest.viewpoints, "further places of the camera that are compared, around the object")
       ->check(CLI::Range(0, 24));
-  app.add_option("--show", given->show, "rows of the table")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--show", given->show, "rows of the table")->check(positive_number())->capture_default_str();
   app.add_option("--then", given->then, "pushes that are planned one after another")
       ->check(CLI::Range(0, 20))
       ->capture_default_str();

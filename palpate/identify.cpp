@@ -24,7 +24,6 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/sensing/back_projection.hpp"
-#include "palpate/sensing/camera.hpp"
 #include "palpate/sensing/free_space.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/lens_scatter.hpp"
@@ -168,6 +167,8 @@ reconstruction::BuiltObject build_from_surface(const Recording& recording, recon
 reconstruction::BuildOptions fill_options(const Recording& recording) {
   reconstruction::BuildOptions options;
   options.mesh.tetrahedra = default_tetrahedra;
+  for (const Tool& tool : recording.tools)
+    if (tool.shape == ToolShape::platen) options.pressed_faces.push_back(tool.plane);
   if (recording.model.refine != "auto") return options;
   options.mesh.finer = finer_under_tools(recording);
   for (const Support& support : recording.supports) {
@@ -260,7 +261,7 @@ namespace {
 /// camera of one frame.
 std::vector<std::string> cameras_of(const std::vector<const DepthFrame*>& frames) {
   const auto same_place = [&](const DepthFrame& a, const DepthFrame& b) {
-    return sensing::same_intrinsics(a.camera, b.camera) && a.T_base_camera.matrix().isApprox(b.T_base_camera.matrix(), 1e-9);
+    return a.camera == b.camera && a.T_base_camera.matrix().isApprox(b.T_base_camera.matrix(), 1e-9);
   };
   std::vector<bool> stands;
   for (const DepthFrame* one : frames)
@@ -269,7 +270,7 @@ std::vector<std::string> cameras_of(const std::vector<const DepthFrame*>& frames
   for (std::size_t i = 0; i < frames.size(); ++i) {
     std::size_t first = frames.size(), count = 0;
     for (std::size_t j = 0; j < frames.size(); ++j) {
-      const bool belongs = stands[i] ? same_place(*frames[i], *frames[j]) : !stands[j] && sensing::same_intrinsics(frames[i]->camera, frames[j]->camera);
+      const bool belongs = stands[i] ? same_place(*frames[i], *frames[j]) : !stands[j] && frames[i]->camera == frames[j]->camera;
       if (belongs && ++count == 1) first = j;
     }
     names.push_back(count > 1 ? std::to_string(first) : "");
@@ -299,7 +300,7 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
       for (const auto& observation : step.observations) {
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
           auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
-          if (robot && !step.joints_rad.empty()) {
+          if (robot && !frame->robot_is_masked && !step.joints_rad.empty()) {
             masked = sensing::with_mask(masked, robot->mask(*frame, recording.joint_names, step.joints_rad));
           }
           if (masked_m != nullptr && masked_m->back().rows() == 0) {

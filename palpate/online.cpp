@@ -5,7 +5,6 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/finer_model.hpp"
-#include "palpate/sensing/camera.hpp"
 
 namespace palpate {
 namespace {
@@ -74,7 +73,7 @@ void OnlineEstimator::take_in(const Recording& part) {
 std::string OnlineEstimator::camera_of(const DepthFrame& frame) {
   const SeenFrom* carried = nullptr;
   for (const SeenFrom& one : cameras_) {
-    if (!sensing::same_intrinsics(one.camera, frame.camera)) continue;
+    if (one.camera != frame.camera) continue;
     if (one.T_base_camera.matrix().isApprox(frame.T_base_camera.matrix(), 1e-9)) {
       const std::string name = one.name;
       cameras_.push_back({frame.camera, frame.T_base_camera, name, true});

@@ -40,8 +40,10 @@ class Assembly {
     out_.recording = plan.recording;
     out_.recording.source = plan.source;
     out_.recording.warnings.insert(out_.recording.warnings.end(), streams.warnings.begin(), streams.warnings.end());
-    // Which pixels show the robot is settled here, where its base's pose is known: the steps carry no joints.
-    out_.recording.joint_names.clear();
+    // Joints that the description does not know (a gripper on the same topic) have no say.
+    std::vector<std::string>& joints = out_.recording.joint_names;
+    for (const std::string& name : streams.joint_names)
+      if (plan.recording.joint_names.empty() && plan.recording.robot && knows(*plan.recording.robot, name)) joints.push_back(name);
     used_images_.resize(streams.cameras.size());
     used_clouds_.resize(streams.clouds.size());
   }
@@ -237,6 +239,7 @@ class Assembly {
       step.time_s = at.time_s;
       step.source = plan_.source + ": " + push.name + " at " + seconds(at.time_s);
       step.T_base_tip = tip;
+      step.joints_rad = joints_of(at.time_s);
       const Vec3 pressing = force ? Vec3(force->force_n - tare) : Vec3(Vec3::Zero());
       const double along = pressing.dot(direction), travel = tip ? direction.dot(tip->translation() - contact) : 0;
       const double noise = times.span != nullptr ? 5 * times.span->free_air_std_n : 0;
@@ -332,6 +335,7 @@ class Assembly {
       const auto& robot = plan_.recording.robot;
       if (camera.mask_robot.value_or(robot && sensing::has_shapes(*robot) && !streams_.joints.empty()))
         frame = without_robot(std::move(frame));
+      frame.robot_is_masked = true;  // or it is not to be
       step.observations.emplace_back(std::move(frame));
     }
     for (std::size_t c = 0; c < streams_.clouds.size(); ++c) {
@@ -361,26 +365,31 @@ class Assembly {
     return tree_.lookup(plan_.base_frame, frame, time_s);
   }
 
+  /// In the order of the recording's joint names; empty where one is missing.
+  std::vector<double> joints_of(double time_s) const {
+    const auto all = joints_at(streams_, time_s);
+    std::vector<double> positions;
+    for (const std::string& name : out_.recording.joint_names) {
+      const auto place = std::find(streams_.joint_names.begin(), streams_.joint_names.end(), name);
+      if (!all || place == streams_.joint_names.end()) return {};
+      positions.push_back((*all)[static_cast<std::size_t>(place - streams_.joint_names.begin())]);
+    }
+    return positions;
+  }
+
   DepthFrame without_robot(DepthFrame frame) {
     if (!plan_.recording.robot)
       throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description",
                   plan_.source + ": topics.depth");
     if (!mask_) mask_ = std::make_unique<sensing::RobotMask>(*plan_.recording.robot);
-    const auto joints = joints_at(streams_, frame.time_s);
+    const std::vector<double> joints = joints_of(frame.time_s);
     const sensing::Kinematics& kinematics = mask_->kinematics();
     const std::string root = kinematics.robot().links[std::size_t(kinematics.root_link())].name;
     const auto base = pose_of(root, frame.time_s);
-    // Joints that the description does not know (a gripper on the same topic) have no say; one that is missing leaves no pose.
-    std::vector<std::string> names;
-    std::vector<double> positions;
-    for (std::size_t k = 0; joints && k < streams_.joint_names.size(); ++k) {
-      if (!knows(kinematics.robot(), streams_.joint_names[k])) continue;
-      names.push_back(streams_.joint_names[k]);
-      positions.push_back((*joints)[k]);
-    }
+    const std::vector<std::string>& names = out_.recording.joint_names;
     const auto& free = kinematics.free_joints();
     const auto missing = std::find_if(free.begin(), free.end(), [&](const std::string& one) {
-      return std::find(names.begin(), names.end(), one) == names.end();
+      return joints.empty() || std::find(names.begin(), names.end(), one) == names.end();
     });
     if (missing != free.end() || !base) {
       out_.notes.push_back("the robot is not masked at " + seconds(frame.time_s) + ": " +
@@ -388,7 +397,7 @@ class Assembly {
                                  : "the pose of '" + root + "' is not known"));
       return frame;
     }
-    return sensing::with_mask(frame, mask_->mask(frame, names, positions, *base));
+    return sensing::with_mask(frame, mask_->mask(frame, names, joints, *base));
   }
 
   const StreamPlan& plan_;

@@ -22,6 +22,7 @@ struct Camera {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   DistortionModel distortion = DistortionModel::none;
   std::vector<double> distortion_coefficients;
+  bool operator==(const Camera&) const = default;
 };
 
 /// Standard deviation of a depth sensor along the optical axis: a row of the table in `sensing` (by name) or `constant`.
@@ -47,6 +48,7 @@ struct DepthFrame {
   double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the camera's pose, per frame
   DepthImage depth_m;
   MaskImage mask;  ///< empty, or 1 where a pixel is invalid (robot, table, ...)
+  bool robot_is_masked = false;  ///< the mask holds what there is of the robot to be masked; else its model and joints say it
   DepthNoise noise;
 };
 

@@ -212,6 +212,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   solves_.assign(workers_, 0);
   load_cases_before_ = unit_load_cases();
   for (std::size_t s = 0; s < steps_.size(); ++s) body_of(push(s), worker_of(s));
+  add_slide_unknowns(unknowns);
 }
 
 std::vector<int> ForwardModel::parameter_columns() const {

@@ -116,7 +116,6 @@ class ForwardModel {
   /// A non-linear step whose solution would move by at most this share of itself since it was last solved follows its
   /// derivatives and is not solved anew: wrong by about the share's square. 0 (the default): every prediction is a solution.
   void set_reuse(double share) { reuse_ = share; }
-  double reuse() const { return reuse_; }
   /// The largest square of such a share in the steps' last predictions: how far they are from solutions, relative.
   double reuse_error() const;
 
@@ -182,6 +181,9 @@ class ForwardModel {
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
   void drop_what_nothing_holds(std::size_t s, const Body& body, const VectorX& unknowns, Coefficients& c) const;
   std::string why_unheld(double sideways_n, double std_n) const;
+  void prepare_slide(Body& body) const;
+  void add_slide_unknowns(Unknowns& unknowns);
+  void slide(std::size_t s, const Body& body, const VectorX& unknowns, const std::vector<int>& columns, bool derivatives, Watched& at) const;
   struct LoadPart;  // of one load: columns that work together
   std::vector<LoadPart> load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const;
   RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;
@@ -202,6 +204,7 @@ class ForwardModel {
 
   Vec3 clamp_pivot_m_ = Vec3::Zero();
   std::vector<int> clamp_;                       // a step: first of six unknowns, or -1
+  std::vector<int> slide_;                       // a step: first of as many unknowns as motions are free, or -1
   std::vector<std::vector<int>> force_error_;    // a step and load: first of three unknowns, or -1
   std::vector<std::vector<int>> contact_shift_;  // a step and load: first of two unknowns, or -1
   std::map<int, Vec3> shift_direction_;          // of the push that such two unknowns are across
@@ -219,17 +222,16 @@ class ForwardModel {
   int load_cases_before_ = 0;  // of unit responses taken over
 };
 
-/// Sets how far solutions are reused, for as long as it lives.
+/// Sets how far solutions are reused, for as long as it lives and until another one inside it ends.
 class ReuseWhile {
  public:
-  ReuseWhile(ForwardModel& model, double share) : model_(model), before_(model.reuse()) { model_.set_reuse(share); }
-  ~ReuseWhile() { model_.set_reuse(before_); }
+  ReuseWhile(ForwardModel& model, double share) : model_(model) { model_.set_reuse(share); }
+  ~ReuseWhile() { model_.set_reuse(0); }
   ReuseWhile(const ReuseWhile&) = delete;
   ReuseWhile& operator=(const ReuseWhile&) = delete;
 
  private:
   ForwardModel& model_;
-  double before_;
 };
 
 }  // namespace palpate::estimation

@@ -152,6 +152,8 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
   boundary.inertia_relief = recording_->free;
   std::vector<fem::RigidContact> tables;
   if (recording_->free) {
+    if (!platens.empty())
+      throw Error("a platen presses an object against something, and this one is free; say what holds it", "supports");
     boundary.motions.resize(3 * object_.mesh.nodes_m.rows(), 0);
   } else {
     HeldBody held = hold(object_.mesh, recording_->supports, platens);
@@ -161,6 +163,7 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
     tables = std::move(held.contacts);
   }
   body->forces = boundary.forces;
+  prepare_slide(*body);
   body->spreads = static_cast<int>(spread_.size());
   body->node_motions = static_cast<int>(platens.size()) + body->spreads;
   if (contact_) {
@@ -310,6 +313,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     c.motion(motion) = effort_[s] * unknowns(unknown);
     c.d_motion(motion, column(unknown)) = effort_[s];
   }
+  for (Index k = 0; s < slide_.size() && slide_[s] >= 0 && k < body.slide.cols(); ++k) column(slide_[s] + static_cast<int>(k));
   // The clamp moves the surface, whether or not a load depends on it.
   if (clamp_[s] >= 0) {
     for (int k = 0; k < 6; ++k) column(clamp_[s] + k);

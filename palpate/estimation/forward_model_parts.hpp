@@ -60,6 +60,8 @@ struct ForwardModel::Body {
   std::map<std::string, int> motion_column;  // of a platen
   int gravity_column = -1;
   MatrixX free_motions;
+  MatrixX slide, slide_conjugate;  // surface and loads of a slide along them (3v x f, columns x f); empty: none
+  MatrixX slide_mean;              // the surface's mean motion along them, f x 3v
   Eigen::SparseMatrix<double> forces;
   std::unique_ptr<fem::Statics> statics;                // none where there are contacts
   std::unique_ptr<fem::ContactStatics> contact;

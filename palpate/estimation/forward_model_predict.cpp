@@ -45,6 +45,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, b
     return out;
   }
 
+  slide(s, body, unknowns, c.columns, derivatives, at);
   place_surface(s, unknowns, at.moved_m, out);
   if (!derivatives) return out;
 

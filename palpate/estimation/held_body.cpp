@@ -75,6 +75,21 @@ MatrixX null_space(const MatrixX& rows) {
   return svd.matrixV().rightCols(6 - rank);
 }
 
+/// Of the span of orthonormal columns the basis that is nearest to the axes, whatever basis it was given in: a slide then means the
+/// same on every mesh.
+MatrixX along_axes(const MatrixX& span) {
+  MatrixX left = span * span.transpose(), basis(span.rows(), 0);
+  for (Index k = 0; k < span.cols(); ++k) {
+    Index longest = 0;
+    for (Index i = 1; i < left.cols(); ++i)
+      if (left.col(i).norm() > left.col(longest).norm() * (1 + 1e-6)) longest = i;
+    basis.conservativeResize(span.rows(), k + 1);
+    basis.col(k) = left.col(longest).normalized();
+    left -= basis.col(k) * (basis.col(k).transpose() * left);
+  }
+  return basis;
+}
+
 /// Pins the motions that are left at single nodes: as many directions as motions, so that no stress can arise from them.
 MatrixX pin_free_motions(const TetMesh& mesh, Holds& holds) {
   const Vec3 centre = mesh.nodes_m.colwise().mean();
@@ -88,7 +103,7 @@ MatrixX pin_free_motions(const TetMesh& mesh, Holds& holds) {
     for (const auto& direction : held) append(node, direction);
   }
   for (const auto& [node, direction] : holds.carried()) append(node, direction);
-  const MatrixX free = null_space(rows);
+  const MatrixX free = along_axes(null_space(rows));
   if (free.cols() == 0) return MatrixX(3 * mesh.nodes_m.rows(), 0);
 
   MatrixX left = free;

@@ -16,7 +16,7 @@ struct HeldBody {
   /// 3n x m, one column a platen: metres of node motion per metre of travel; then one a support that may spread (spreads).
   Eigen::SparseMatrix<double> motions;
   /// 3n x f: rigid motions that supports leave free. They were pinned at single nodes, which carry no force as long as no load
-  /// works on these motions (frictionless platens); 0 columns when the supports hold everything.
+  /// works on these motions (frictionless platens), orthonormal and as near to the axes as may be; 0 columns when the supports hold everything.
   MatrixX free_motions;
   /// Tables and walls that the object may lift off and slide on (not the bonded ones), in the order of the supports.
   std::vector<fem::RigidContact> contacts;

@@ -47,6 +47,8 @@ struct Draft {
   Index dropped = 0;
   double dropped_share = 0;
   double volume_m3 = 0;
+  Vec3 dropped_at_m = Vec3::Zero();  // of the largest piece
+  double dropped_size_m = 0;
 };
 
 /// Pieces of a mesh that hold less than a share of its volume.
@@ -81,8 +83,17 @@ std::vector<std::pair<Vec3, double>> loose_points(const TetEditor& mesh, double 
 void drop_small_pieces(Draft& draft, double share) {
   const SmallPieces small(draft.mesh, share);
   double lost = 0;
-  for (Index id = 0; id < static_cast<Index>(small.pieces.volume_m3.size()); ++id)
-    if (small.contain(id)) ++draft.dropped, lost += small.pieces.volume_m3[id];
+  Index largest = -1;
+  for (Index id = 0; id < static_cast<Index>(small.pieces.volume_m3.size()); ++id) {
+    if (!small.contain(id)) continue;
+    ++draft.dropped, lost += small.pieces.volume_m3[id];
+    if (largest < 0 || small.pieces.volume_m3[id] > small.pieces.volume_m3[largest]) largest = id;
+  }
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (std::size_t t = 0; t < draft.mesh.tets.size(); ++t)
+    if (draft.mesh.alive[t] && small.pieces.of[t] == largest)
+      for (const Index v : draft.mesh.tets[t]) low = low.cwiseMin(draft.mesh.x[v]), high = high.cwiseMax(draft.mesh.x[v]);
+  if (largest >= 0) draft.dropped_at_m = 0.5 * (low + high), draft.dropped_size_m = (high - low).norm();
   for (Index t = 0; t < static_cast<Index>(draft.mesh.tets.size()); ++t)
     if (draft.mesh.alive[t] && small.contain(small.pieces.of[t])) draft.mesh.remove_tet(t);
   draft.dropped_share = lost / small.all_m3;
@@ -105,7 +116,7 @@ std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, co
   unaffordable = !lattice.refine_to_surface(samples, o.detail * cell, cell / o.finest, affordable);
   if (unaffordable) return std::nullopt;
   if (!o.finer.empty()) lattice.refine_to_size([&](const Vec3& p) { return finest_near(o, p); });
-  Draft out{cut_lattice(lattice, solid), 0, 0, 0};
+  Draft out{cut_lattice(lattice, solid)};
   if (out.mesh.count() == 0) return std::nullopt;
   // thin parts that the lattice tears into pieces get a finer one around the pieces, as long as that brings them together
   constexpr double small = 0.01;
@@ -203,6 +214,17 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     throw Error("the surface encloses nothing: there is no inside to fill. Close it, or complete it first", "surface");
   const double reference = solid.watertight() ? solid.signed_volume_m3() - samples.buried_m3 : counted_volume(solid);
   const double volume = std::max(reference, 1e-4 * (solid.max_m() - solid.min_m()).prod());
+  const auto affordable = [&](const char* field, double edge_m, double filled_m3) {
+    constexpr double most = 2e6;
+    const double takes = 12 * 1.2 * 1.2 * 1.2 * filled_m3 / std::pow(edge_m / 0.93, 3);
+    require(takes <= most, field, fmt::format("edges of {:.2g} m take some {:.1g} tetrahedra, at most {:.0g} are made; give longer ones", edge_m, takes, most));
+  };
+  if (o.edge_m > 0) {
+    require(o.edge_m < solid.diagonal_m(), "edge_m", fmt::format("edges of {:.2g} m are longer than the object, {:.2g} m", o.edge_m, solid.diagonal_m()));
+    affordable("edge_m", o.edge_m, volume);
+  }
+  for (const FinerNear& f : o.finer)
+    affordable("finer.edge_m", f.edge_m, std::min(volume, 4.2 * std::pow(std::max(f.radius_m, f.edge_m), 3)));
   // A lattice of cubes has 12 tetrahedra a cube; boundaries and thin parts cost more, found by trying. What is too much is
   // merged again where the surface loses least.
   double cell = o.edge_m > 0 ? o.edge_m / 0.93 : std::cbrt(12 * volume / o.tetrahedra) * 1.2;
@@ -233,10 +255,21 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     cell *= std::pow(std::clamp(ratio / 1.25, 0.2, 3.0), 0.43);
   }
   const auto too_thin = [&] {
+    const double takes = 0.4 * solid.area_m2() / (wall * wall);
+    if (!(wall < 0.4 * cell))
+      return Error(fmt::format("{} tetrahedra cannot follow it: parts of it are too thin, or tiny and far from the rest; ask for more, or "
+                               "leave those parts out",
+                               o.tetrahedra),
+                   "surface");
+    if (takes > 2e6)
+      return Error(fmt::format("its walls, {:.2g} m thick on average, are too thin to be filled: walls of that width and size take some "
+                               "{:.0e} tetrahedra, at most 2e+06 are made",
+                               wall, takes),
+                   "surface");
     return Error(
         fmt::format("its walls, {:.2g} m thick on average, are too thin for {} tetrahedra; walls of that width and size "
-                    "take some {:.1g}",
-                    wall, o.tetrahedra, std::max(2.0 * o.tetrahedra, 0.4 * solid.area_m2() / (wall * wall))),
+                    "take some {:.1g} or more",
+                    wall, o.tetrahedra, std::max(3.0 * o.tetrahedra, takes)),
         "surface");
   };
   if (!best) throw too_thin();
@@ -296,13 +329,20 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     warn("closed_holes", fmt::format("{:.0f} % of the boundary closes holes of the given surface", 100 * out.unseen_share));
   if (best->dropped > 0)
     warn("dropped_pieces",
-         fmt::format("{} small piece{} ({:.2g} % of the volume), cut off by thin or open parts, {} left out", best->dropped,
-                     best->dropped == 1 ? "" : "s", 100 * best->dropped_share, best->dropped == 1 ? "was" : "were"));
+         fmt::format("{} small piece{} ({:.2g} % of the volume) {} left out: parts of their own, or cut off by thin or open parts; the "
+                     "largest is {:.2g} m long, at ({:.3g}, {:.3g}, {:.3g}) m",
+                     best->dropped, best->dropped == 1 ? "" : "s", 100 * best->dropped_share, best->dropped == 1 ? "was" : "were",
+                     best->dropped_size_m, best->dropped_at_m.x(), best->dropped_at_m.y(), best->dropped_at_m.z()));
   if (o.edge_m == 0 && out.check.tetrahedra > 1.5 * o.tetrahedra)
     warn("more_than_asked", fmt::format("{} tetrahedra and not {}: with fewer the thin parts would lose their shape",
                                         out.check.tetrahedra, o.tetrahedra));
   for (const Finding& f : out.check.findings)
     if (f.code != "units") out.warnings.push_back(f);
+  constexpr double near_rms = 0.0025, near_most = 0.02;  // of the diagonal: what a few thousand tetrahedra keep to
+  if (known_volume && o.improve && (out.surface_rms_m > near_rms * solid.diagonal_m() || out.hausdorff_m > near_most * solid.diagonal_m()))
+    warn("surface_distance", fmt::format("the surface is up to {:.2g} m away from the model's ({:.2g} m rms): thin or pointed parts are cut "
+                                         "short; ask for more tetrahedra, or check the surface for stray vertices",
+                                         out.hausdorff_m, out.surface_rms_m));
   if (out.volume_error && std::abs(*out.volume_error) > 0.03)
     warn("volume_error", fmt::format("the volume differs by {:+.1f} % from the surface's; ask for more tetrahedra",
                                      100 * *out.volume_error));

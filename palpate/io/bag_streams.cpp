@@ -22,7 +22,7 @@ std::string plain(const std::string& frame) { return frame.starts_with("/") ? fr
 class StreamReader {
  public:
   StreamReader(const MessageSource& bag, const BagMapping& mapping) : bag_(bag), mapping_(mapping) {
-    if (bag.messages.empty()) throw Error("holds no message", bag.name);
+    if (bag.messages.empty()) throw Error("holds no message" + (bag.warnings.empty() ? "" : ": " + bag.warnings.front()), bag.name);
     start_ns_ = bag.messages.front().log_time_ns;
   }
 
@@ -124,6 +124,11 @@ void read_wrenches(const StreamReader& reader, const StreamReader::Topic& topic,
     if (streams.wrench_frame.empty()) streams.wrench_frame = plain(one.header.frame);
   });
   sort_by_time(streams.wrenches);
+  // Sent twice: it is one measurement.
+  const auto same = [](const WrenchSample& a, const WrenchSample& b) {
+    return a.time_s == b.time_s && a.force_n == b.force_n && a.torque_nm == b.torque_nm;
+  };
+  streams.wrenches.erase(std::unique(streams.wrenches.begin(), streams.wrenches.end(), same), streams.wrenches.end());
 }
 
 /// Several senders (an arm, its gripper) may share the topic and name their joints in any order: every message gives a sample
@@ -139,6 +144,7 @@ void read_joints(const StreamReader& reader, const StreamReader::Topic& topic, S
     const RosJointState one = decode_joint_state(message.data, reader.where(topic), topic.about->encoding);
     Seen seen{reader.seconds(one.header, message), {}};
     for (std::size_t k = 0; k < one.names.size(); ++k) {
+      if (!std::isfinite(one.position[k])) continue;  // drivers say so of joints that they do not measure
       const auto place = std::find(names.begin(), names.end(), one.names[k]);
       seen.positions.emplace_back(static_cast<std::size_t>(place - names.begin()), one.position[k]);
       if (place == names.end()) names.push_back(one.names[k]);
@@ -237,8 +243,11 @@ void read_camera(const StreamReader& reader, const MappedCamera& mapped, const M
       const auto one = by_time.find(time_s);
       kept->masks.push_back(one == by_time.end() ? std::nullopt : std::optional(one->second));
     }
-    camera.mask = [kept](std::size_t i) {
-      return kept->masks[i] ? decode_mask(*kept->masks[i], kept->where, kept->mask_encoding) : MaskImage();
+    camera.mask = [kept, about](std::size_t i) {
+      if (!kept->masks[i]) return MaskImage();
+      MaskImage mask = decode_mask(*kept->masks[i], kept->where, kept->mask_encoding);
+      if (mask.rows() != about.height_px || mask.cols() != about.width_px) throw Error("the mask is of another size than the image", kept->where);
+      return mask;
     };
   }
   streams.cameras.push_back(std::move(camera));
@@ -313,6 +322,8 @@ SensorStreams read_streams(const MessageSource& bag, BagMapping& mapping) {
       streams.marks.push_back({reader.log_seconds(message),
                                is_text ? decode_string(message.data, reader.where(marks), marks.about->encoding) : ""});
     });
+    const auto same = [](const MarkSample& a, const MarkSample& b) { return a.time_s == b.time_s && a.text == b.text; };
+    streams.marks.erase(std::unique(streams.marks.begin(), streams.marks.end(), same), streams.marks.end());
   }
   if (mapping.robot_description && !mapping.plan.recording.robot) {
     const auto description = reader.topic(*mapping.robot_description, {"std_msgs/msg/String"});

@@ -40,7 +40,7 @@ const Exporter& exporter_named(const std::string& name) {
   }
   const auto near = nearest_word(name, known);
   throw Error("is no simulator that is known" + (near ? "; did you mean '" + *near + "'?" : std::string()) +
-                  " Known: " + fmt::format("{}", fmt::join(known, ", ")),
+                  "; known are " + fmt::format("{}", fmt::join(known, ", ")),
               name);
 }
 

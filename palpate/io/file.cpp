@@ -32,11 +32,18 @@ void write_file(const fs::path& path, std::string_view bytes) {
     if (!stream) throw Error("cannot be written; check that its folder exists and may be written to", path.string());
     stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     stream.flush();
-    if (!stream) throw Error("cannot be written; is the disk full?", path.string());
+    if (!stream) {
+      stream.close();
+      std::error_code code;
+      fs::remove(part, code);
+      throw Error("cannot be written; is the disk full?", path.string());
+    }
   }
-  std::error_code code;
+  std::error_code code, left;
   fs::rename(part, path, code);
-  if (code) throw Error("cannot be put in place: " + code.message(), path.string());
+  if (!code) return;
+  fs::remove(part, left);
+  throw Error("cannot be put in place: " + code.message() + "; remove what stands there, or write to another folder", path.string());
 }
 
 std::string extension_of(const fs::path& path) {

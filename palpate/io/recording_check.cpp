@@ -63,6 +63,8 @@ class Checker {
         }
       }
     }
+    for (const Tool& tool : recording_.tools) check_platen(tool);
+    for (const Push& push : recording_.pushes) check_signs(push);
     check_loads(loaded);
     if (recording_.pushes.empty())
       add(recording_.source, "holds no push; list in 'pushes' what was done to the object");
@@ -167,6 +169,40 @@ class Checker {
       add(region.source, fmt::format("the point [{}] of '{}' is far from the object, which reaches from [{}] to [{}]; is it in metres?",
                                      point(at), region.name, point(box_.min), point(box_.max)));
     }
+  }
+
+  void check_platen(const Tool& tool) {
+    if (!has_mesh_ || tool.shape != ToolShape::platen) return;
+    const VectorX height = (nodes_.rowwise() - tool.plane.point_m.transpose()) * tool.plane.normal.normalized();
+    const double nearest = height.cwiseAbs().minCoeff();
+    if (nearest > 0.01 * box_.diagonal())
+      add("tools." + tool.name, fmt::format("the platen's plane is {} from the object; give a point of the face where it first touches, in metres",
+                                            length(nearest)));
+    else if (height.mean() < 0)
+      add("tools." + tool.name, "the platen's normal points away from the object; it points to where the object is");
+  }
+
+  /// Force and travel of a tool over a push: what presses an object moves into it.
+  void check_signs(const Push& push) {
+    double work = 0, size = 0;
+    for (const Step& step : push.steps) {
+      for (const Load& load : step.loads) {
+        std::optional<double> force, travel = load.travel_m;
+        if (load.force_n) force = load.force_n->dot(load.direction);
+        for (const Observation& one : step.observations) {
+          if (const auto* wrench = std::get_if<Wrench>(&one); wrench && !force && (wrench->tool.empty() || wrench->tool == load.tool))
+            force = wrench->force_n.dot(load.direction);
+          if (const auto* seen = std::get_if<ToolTravel>(&one); seen && !travel && (seen->tool.empty() || seen->tool == load.tool))
+            travel = seen->travel_m;
+        }
+        if (!force || !travel) continue;
+        work += *force * *travel;
+        size += std::abs(*force * *travel);
+      }
+    }
+    if (size > 0 && work < -0.5 * size)
+      add(push.steps.front().source, "force and travel of push '" + push.name +
+                                         "' have opposite signs: both are positive along 'direction' where the tool presses; turn one of them");
   }
 
   static std::string point(const Vec3& x) { return fmt::format("{:.4g}, {:.4g}, {:.4g}", x.x(), x.y(), x.z()); }

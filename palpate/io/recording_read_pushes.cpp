@@ -129,7 +129,7 @@ void read_step_table(const YamlField& file, const YamlField& every_step, Push& p
     const auto near = nearest_word(name, known);
     throw Error("column '" + name.substr(0, 60) + "' is unknown, or nothing in 'every_step' takes it" +
                     (near && *near != name ? "; did you mean '" + *near + "'?" : "") +
-                    " With two loads or two observations of a kind the name goes in front (left.force_x_n)",
+                    "; with two loads or two observations of a kind the name goes in front (left.force_x_n)",
                 table.name() + ":1 (named in " + file.where() + ")");
   }
 }

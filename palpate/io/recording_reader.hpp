@@ -35,7 +35,7 @@ auto parse_named(const std::string& where, Parse parse) {
   try {
     return parse();
   } catch (const Error& error) {
-    throw Error(error.message(), error.where() + " (named in " + where + ")");
+    throw Error(error.message(), error.where() == where ? where : error.where() + " (named in " + where + ")");
   }
 }
 

@@ -172,6 +172,10 @@ RosCameraInfo decode_camera_info(std::string_view message, const std::string& wh
   for (int i = 0; i < 6; ++i) in.number<std::uint32_t>();  // binning and region of interest
   in.number<std::uint8_t>();
   camera.fx_px = k[0], camera.cx_px = k[2], camera.fy_px = k[4], camera.cy_px = k[5];
+  bool finite = true;
+  for (const double value : k) finite = finite && std::isfinite(value);
+  for (const double value : camera.distortion_coefficients) finite = finite && std::isfinite(value);
+  if (!finite) in.fail("holds a number that is not finite in K or D");
   if (!(camera.fx_px > 0 && camera.fy_px > 0)) in.fail("holds no focal length: the camera is not calibrated");
   bool bent = false;
   for (const double value : camera.distortion_coefficients) bent |= value != 0;
@@ -224,6 +228,8 @@ std::vector<RosTransform> decode_transforms(std::string_view message, const std:
     one.header = header_of(in);
     one.child = in.text();
     one.T_parent_child.translation() = vector_of(in);
+    constexpr double farthest_m = 1e6;
+    if (!(one.T_parent_child.translation().cwiseAbs().maxCoeff() < farthest_m)) in.fail("holds a position that is no number of metres");
     const Vec3 imaginary = vector_of(in);
     const Eigen::Quaterniond rotation(in.number<double>(), imaginary.x(), imaginary.y(), imaginary.z());
     if (!(std::abs(rotation.norm() - 1) < 0.01)) in.fail("holds a rotation whose quaternion is not of length 1");

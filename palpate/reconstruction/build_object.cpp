@@ -144,6 +144,10 @@ BuiltObject fill(const TriMesh& surface, bool loose_facets, const std::vector<Su
     if (loose_facets) geometry::lay_on(s.plane, out.model.volume);
     else geometry::stand_on(s.plane, surface, out.model.volume);
   }
+  for (const Plane& plane : options.pressed_faces) {
+    if (loose_facets) geometry::lay_on(plane, out.model.volume);
+    else geometry::stand_on(plane, surface, out.model.volume);
+  }
   out.model.embedding = geometry::embed(surface.vertices_m, out.model.volume);
   out.model.supports = supports;
   out.model.unseen_share = filled.unseen_share;

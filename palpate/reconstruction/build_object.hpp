@@ -12,6 +12,8 @@ struct BuildOptions {
   geometry::TetrahedraliseOptions mesh;  ///< of a surface that has to be filled
   bool align_views = true;  ///< correct the poses of views that have a prior spread (PointCloud::pose_std_*), all at once
   bool fine_surface = false;  ///< of views: also make BuiltObject::fine_surface (half a second)
+  /// Planes that platens press on: faces along them are laid flat as those on a support are; a platen moves what is in its plane.
+  std::vector<Plane> pressed_faces = {};
 };
 
 struct BuiltObject {

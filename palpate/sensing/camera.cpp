@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <string>
-#include <tuple>
 
 #include "palpate/core/error.hpp"
 
@@ -170,13 +169,6 @@ void check(const Camera& camera) {
   }
   for (const double k : camera.distortion_coefficients)
     if (!std::isfinite(k)) throw Error("must be finite", "camera.distortion_coefficients");
-}
-
-bool same_intrinsics(const Camera& a, const Camera& b) {
-  const auto all = [](const Camera& c) {
-    return std::tie(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.distortion, c.distortion_coefficients);
-  };
-  return all(a) == all(b);
 }
 
 std::optional<Vec2> project(const Camera& camera, const Vec3& point, Eigen::Matrix<double, 2, 3>* derivative) {

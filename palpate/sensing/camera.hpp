@@ -14,9 +14,6 @@ namespace palpate::sensing {
 ///         does not belong to the model (none: 0; plumb_bob: 4 or 5; rational: 8; fisheye: 4).
 void check(const Camera& camera);
 
-/// True for cameras of one calibration: most likely one device.
-bool same_intrinsics(const Camera& a, const Camera& b);
-
 /// Pixel of a point in the camera frame; nothing behind the camera (z <= 0), nor so far aside that the
 /// lens has no image of it (beyond the fold of a polynomial). Distortion models, (x, y) = (X, Y) / Z:
 ///  - plumb_bob, rational: coefficients k1 k2 p1 p2 [k3 [k4 k5 k6]], the Brown-Conrady model with the ratio

@@ -29,7 +29,7 @@ std::vector<DepthFrame> images_at_rest(const Recording& recording) {
     for (const auto& observation : step.observations) {
       const auto* frame = std::get_if<DepthFrame>(&observation);
       if (frame == nullptr) continue;
-      frames.push_back(robot && !step.joints_rad.empty()
+      frames.push_back(robot && !frame->robot_is_masked && !step.joints_rad.empty()
                            ? with_mask(*frame, robot->mask(*frame, recording.joint_names, step.joints_rad))
                            : *frame);
     }

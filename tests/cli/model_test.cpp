@@ -67,6 +67,20 @@ TEST_F(Model, a_surface_in_millimetres_becomes_files_that_can_be_read_back) {
   EXPECT_GT(fs::file_size(folder_ / "out/model.png"), 10000U);
 }
 
+TEST_F(Model, sizes_that_make_no_sense_are_refused_and_nothing_is_left_behind) {
+  io::write_mesh(folder_ / "ball.stl", shapes::sphere(0.04, 4));
+  const std::string file = (folder_ / "ball.stl").string(), out = " -o " + (folder_ / "out").string();
+  EXPECT_EQ(run(file + out + " --tetrahedra -5").exit_code, 2);
+  EXPECT_EQ(run(file + out + " --edge=-1").exit_code, 2);
+  EXPECT_EQ(run(file + out + " --edge=nan").exit_code, 2);
+  EXPECT_EQ(run(file + out + " --tetrahedra 0").exit_code, 3);
+  EXPECT_EQ(run(file + out + " --edge 1e-7").exit_code, 3);
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  fs::create_directories(folder_ / "taken" / "model.msh");
+  EXPECT_EQ(run(file + " --tetrahedra 300 -o " + (folder_ / "taken").string()).exit_code, 3);
+  EXPECT_FALSE(fs::exists(folder_ / "taken" / "model.msh.part"));
+}
+
 TEST_F(Model, open_input_has_no_volume_error_and_a_sheet_is_refused) {
   TriMesh bowl = shapes::sphere(0.04, 4);
   bowl.triangles.conservativeResize(bowl.triangles.rows() - 300, 3);

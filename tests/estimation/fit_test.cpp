@@ -115,7 +115,8 @@ TEST_P(UniaxialCompression, StressOfEveryStepIsForceOverArea) {
     const double area_m2 = material == "linear" ? bar_m.x() * bar_m.y() : volume_m3 / (bar_m.z() - step.travel_m);
     const double stress_pa = step.force_measured_n / area_m2;
     ASSERT_EQ(step.von_mises_pa.size(), step.surface_m.rows());
-    EXPECT_LT((step.von_mises_pa.array() - stress_pa).abs().maxCoeff(), 1e-5 * young_pa);
+    // The bar's turn about the push is taken out to first order, which changes its volume by the square.
+    EXPECT_LT((step.von_mises_pa.array() - stress_pa).abs().maxCoeff(), (material == "linear" ? 1e-5 : 2e-4) * young_pa);
   }
 }
 

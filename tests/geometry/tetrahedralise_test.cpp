@@ -266,9 +266,9 @@ TEST(Tetrahedralise, thin_walls_stay_whole_or_are_refused) {
   EXPECT_EQ(r.check.components, 1);
   EXPECT_LT(std::abs(*r.volume_error), 0.1);
   EXPECT_LT(r.hausdorff_m, 0.02 * r.surface.diagonal_m());
-  EXPECT_THAT(message_of([] { with(hollow_ball(0.00005), 3000); }), HasSubstr("too thin for 3000 tetrahedra"));
-  EXPECT_THAT(message_of([] { with(shapes::box(Vec3(0.2, 0.2, 0.0001)), 3000); }),
-              HasSubstr("too thin for 3000 tetrahedra"));
+  EXPECT_THAT(message_of([] { with(hollow_ball(0.00005), 3000); }), HasSubstr("too thin to be filled"));
+  EXPECT_THAT(message_of([] { with(shapes::box(Vec3(0.2, 0.2, 0.0001)), 3000); }), HasSubstr("too thin to be filled"));
+  EXPECT_THAT(message_of([] { with(shapes::box(Vec3(0.2, 0.2, 0.0005)), 500); }), HasSubstr("too thin for 500 tetrahedra"));
 }
 
 TEST(Tetrahedralise, an_inner_shell_that_faces_inward_is_a_cavity_and_all_inside_out_is_turned) {
@@ -353,6 +353,47 @@ TEST(Tetrahedralise, options_are_checked_field_by_field) {
   EXPECT_THAT(bad([](auto& o) { o.finer = {{Vec3(NAN, 0, 0), 1, 1}}; }), HasSubstr("finer.point_m"));
   EXPECT_THAT(bad([](auto& o) { o.finer = {{Vec3::Zero(), -1, 1}}; }), HasSubstr("finer.radius_m"));
   EXPECT_THAT(bad([](auto& o) { o.finer = {{Vec3::Zero(), 1, 0}}; }), HasSubstr("finer.edge_m"));
+}
+
+TEST(Tetrahedralise, edges_that_would_take_millions_of_tetrahedra_are_refused_at_once) {
+  const TriMesh ball = shapes::sphere(0.1, 4);
+  const auto said = [&](const TetrahedraliseOptions& o) -> std::string {
+    try {
+      tetrahedralise(ball, o);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "nothing";
+  };
+  TetrahedraliseOptions tiny, large, fine_spot;
+  tiny.edge_m = 1e-6;
+  large.edge_m = 10;
+  fine_spot.finer = {{Vec3(0, 0, 0.1), 0.05, 1e-6}};
+  EXPECT_THAT(said(tiny), AllOf(HasSubstr("edge_m"), HasSubstr("1e-06 m take some")));
+  EXPECT_THAT(said(large), AllOf(HasSubstr("edge_m"), HasSubstr("longer than the object")));
+  EXPECT_THAT(said(fine_spot), HasSubstr("finer.edge_m"));
+}
+
+/// What is lost is said, with its place.
+TEST(Tetrahedralise, parts_that_are_left_out_and_vertices_that_stray_are_named) {
+  TriMesh two = shapes::sphere(0.1, 4);
+  const TriMesh small = shapes::sphere(0.008, 3);
+  const Eigen::Index vertices = two.vertices_m.rows(), triangles = two.triangles.rows();
+  two.vertices_m.conservativeResize(vertices + small.vertices_m.rows(), 3);
+  two.vertices_m.bottomRows(small.vertices_m.rows()) = small.vertices_m.rowwise() + Eigen::RowVector3d(0.3, 0, 0);
+  two.triangles.conservativeResize(triangles + small.triangles.rows(), 3);
+  two.triangles.bottomRows(small.triangles.rows()) = small.triangles.array() + static_cast<Index>(vertices);
+  TetrahedraliseOptions o;
+  o.tetrahedra = 3000;
+  std::string said;
+  for (const Finding& one : tetrahedralise(two, o).warnings) said += one.code + ": " + one.message + "\n";
+  EXPECT_THAT(said, AllOf(HasSubstr("dropped_pieces"), HasSubstr("parts of their own"), HasSubstr("(0.3, "), HasSubstr("surface_distance")));
+
+  TriMesh stray = shapes::sphere(0.1, 4);
+  stray.vertices_m(5, 0) = 1;
+  said.clear();
+  for (const Finding& one : tetrahedralise(stray, o).warnings) said += one.code + ": " + one.message + "\n";
+  EXPECT_THAT(said, AllOf(HasSubstr("surface_distance"), HasSubstr("stray vertices")));
 }
 
 TEST(Tetrahedralise, can_be_cancelled) {

@@ -220,6 +220,41 @@ TEST(Obj, PolygonsNegativeAndSlashedIndices) {
   EXPECT_EQ(mesh.triangles, expected);
 }
 
+/// A letter C and a star, from every corner, either way round: the triangles cover what the outline encloses, once.
+TEST(Obj, PolygonsThatBendInwardsAreCutIntoWhatTheyEnclose) {
+  std::vector<std::vector<Eigen::Vector2d>> outlines(2);
+  outlines[0] = {{0, 0}, {3, 0}, {3, 1}, {1, 1}, {1, 2}, {3, 2}, {3, 3}, {0, 3}};
+  for (int k = 0; k < 10; ++k) {
+    const double r = k % 2 == 0 ? 1 : 0.4, angle = 0.2 * M_PI * k;
+    outlines[1].emplace_back(r * std::cos(angle), r * std::sin(angle));
+  }
+  for (const auto& outline : outlines) {
+    const std::size_t n = outline.size();
+    double area = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto &a = outline[i], &b = outline[(i + 1) % n];
+      area += 0.5 * (a.x() * b.y() - a.y() * b.x());
+    }
+    for (std::size_t start = 0; start < n; ++start) {
+      for (const bool backwards : {false, true}) {
+        std::string text, face = "f";
+        for (const auto& p : outline) text += "v " + std::to_string(p.x()) + " " + std::to_string(0.5 * p.x()) + " " + std::to_string(p.y()) + "\n";
+        for (std::size_t i = 0; i < n; ++i) face += " " + std::to_string((backwards ? start + n - i : start + i) % n + 1);
+        const TriMesh mesh = tri_mesh_of(parse_mesh(text + face + "\n", "a.obj"), "a.obj");
+        ASSERT_EQ(mesh.triangles.rows(), static_cast<Eigen::Index>(n) - 2);
+        double sum = 0;
+        for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t) {
+          const auto corner = [&](int k) { return Vec3(mesh.vertices_m.row(mesh.triangles(t, k))); };
+          const Vec3 doubled = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+          EXPECT_EQ(doubled.y() > 0, backwards) << "all turn the same way";
+          sum += 0.5 * doubled.norm();
+        }
+        EXPECT_NEAR(sum, area * std::sqrt(1.25), 1e-5);  // the plane is slanted; six digits were written
+      }
+    }
+  }
+}
+
 TEST(MeshFile, EndingsAreJudged) {
   EXPECT_THROW(read_mesh("object.step"), Error);
   EXPECT_THROW(write_mesh("object.inp2", surface_of_two_tets()), Error);

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an option's number must be, in words of its own.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <string>
+
+namespace palpate::cli {
+
+/// A finite number above 0.
+inline CLI::Validator positive_number() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        const bool fine = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value > 0;
+        return fine ? std::string() : "must be a number above 0, is " + text;
+      },
+      "POSITIVE");
+}
+
+/// A number, neither NaN nor infinite.
+inline CLI::Validator finite_number() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        return CLI::detail::lexical_cast(text, value) && std::isfinite(value) ? std::string() : "must be a finite number, is " + text;
+      },
+      "NUMBER");
+}
+
+}  // namespace palpate::cli
