@@ -267,6 +267,9 @@ class Assembly {
       look(step);
       push.steps.push_back(std::move(step));
     }
+    if (plan.travel_sigma_m.size() > 1 && plan.travel_sigma_m.size() != loaded_steps)
+      out_.notes.push_back(push.name + ": travel_sigma_m holds " + std::to_string(plan.travel_sigma_m.size()) + " numbers for " +
+                           std::to_string(loaded_steps) + " loaded steps; the last one stands for those that follow");
     if (!moving.empty())
       out_.notes.push_back(push.name + ": the force was changing in " + std::to_string(moving.size()) +
                            (moving.size() == 1 ? " step" : " steps") + ", the first at " + seconds(moving.front()) +

@@ -83,6 +83,10 @@ PointCloud read_xyz(std::string_view bytes, const std::string& name) {
   using Table = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const auto width = static_cast<Eigen::Index>(columns);
   const Table table = Eigen::Map<const Table>(numbers.data(), static_cast<Eigen::Index>(numbers.size()) / width, width);
+  if (width == 6 && table.rightCols(3).cwiseAbs().maxCoeff() > 1.01)
+    throw Error("the numbers behind x y z are taken for a unit normal, and are as large as " +
+                    std::to_string(table.rightCols(3).cwiseAbs().maxCoeff()) + "; leave colours out",
+                name);
   std::vector<std::string> names = {"x", "y", "z", "nx", "ny", "nz"};
   names.resize(columns);
   return cloud_from_columns(names, table, name);

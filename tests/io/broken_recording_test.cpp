@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every way in which recordings were seen to be broken: each is an Error that names the file (and the line or field) and the
 // cure.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "io/broken_bytes.hpp"
@@ -13,6 +14,8 @@ namespace palpate::io {
 namespace {
 
 using namespace palpate::io::test;
+using testing::AllOf;
+using testing::HasSubstr;
 
 class BrokenRecording : public testing::Test {
  protected:
@@ -304,6 +307,58 @@ TEST_F(BrokenRecording, TravelInMillimetres) {
       "frames.csv",
       "time_s,force_x_n,force_y_n,force_z_n,cloud,observed_travel_m\n0,0,0,0,clouds/a.xyz,0\n1,0,0,-2,clouds/b.xyz,4\n");
   expect_refused("frames.csv:3", "millimetres");
+}
+
+/// What contradicts itself is found in memory as it is on disk.
+TEST(ContradictoryRecording, PlatensAndSignsAreJudged) {
+  Recording recording;
+  recording.source = "block";
+  const MeshData mesh = cube();
+  recording.rest.volume = TetMesh{mesh.points_m, mesh.tetrahedra};
+  Support table;
+  table.kind = SupportKind::plane;
+  table.plane.normal = Vec3::UnitZ();
+  recording.supports = {table};
+  Tool press;
+  press.name = "press";
+  press.shape = ToolShape::platen;
+  press.plane.point_m = Vec3(0, 0, 0.1);
+  press.plane.normal = -Vec3::UnitZ();
+  recording.tools = {press};
+  Push push;
+  push.name = "down";
+  for (int k = 0; k < 3; ++k) {
+    Step step;
+    step.source = "block: step";
+    Load load;
+    load.tool = "press";
+    load.direction = -Vec3::UnitZ();
+    load.travel_m = 0.001 * k;
+    step.loads = {load};
+    Wrench force;
+    force.force_n = Vec3(0, 0, -2.0 * k);
+    force.force_sigma_n = 0.1;
+    step.observations = {force};
+    push.steps.push_back(step);
+  }
+  recording.pushes = {push};
+  const auto said = [](const Recording& one) {
+    std::string all;
+    for (const Problem& problem : check_recording(one)) all += problem.where + ": " + problem.what + "\n";
+    return all;
+  };
+  EXPECT_EQ(said(recording), "");
+  Recording wrong = recording;
+  for (Step& step : wrong.pushes[0].steps) step.loads[0].travel_m = -*step.loads[0].travel_m;
+  EXPECT_THAT(said(wrong), AllOf(HasSubstr("push 'down'"), HasSubstr("opposite signs")));
+  for (Step& step : wrong.pushes[0].steps) std::get<Wrench>(step.observations[0]).force_n *= -1;
+  EXPECT_EQ(said(wrong), "") << "a glued plate may pull";
+  wrong = recording;
+  wrong.tools[0].plane.point_m.z() = 0.12;
+  EXPECT_THAT(said(wrong), AllOf(HasSubstr("tools.press"), HasSubstr("from the object")));
+  wrong = recording;
+  wrong.tools[0].plane.normal = Vec3::UnitZ();
+  EXPECT_THAT(said(wrong), HasSubstr("points away from the object"));
 }
 
 TEST_F(BrokenRecording, AllProblemsAreListed) {

@@ -120,6 +120,7 @@ TEST(Xyz, CommasCommentsAndNormals) {
   const PointCloud cloud = parse_cloud("# x y z\n1,2,3\n4\t5 6 # last\n", "a.xyz");
   EXPECT_EQ(cloud.points_m.row(1), Vec3(4, 5, 6).transpose());
   EXPECT_EQ(parse_cloud("1 2 3 0 0 1\n", "a.xyz").normals.row(0), Vec3(0, 0, 1).transpose());
+  EXPECT_THROW(parse_cloud("1 2 3 255 0 0\n", "a.xyz"), Error) << "a colour is no normal";
   EXPECT_THROW(parse_cloud("1 2 3\n1 2\n", "a.xyz"), Error);
 }
 

@@ -1,0 +1,101 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// `palpate predict` and `palpate export` of a learned block: pushes that make no sense are refused, gravity acts once.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "estimation/pushed_block.hpp"
+#include "palpate/io/file.hpp"
+#include "palpate/io/recording.hpp"
+#include "temporary_folder.hpp"
+
+namespace palpate {
+namespace {
+
+using testing::HasSubstr;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string text;
+};
+
+class LearnedBlock : public testing::Test {
+ protected:
+  void SetUp() override {
+    Recording recording = estimation::pushed_block_recording();
+    recording.rest.volume = estimation::kuhn_block(4, 3, 2, estimation::block_size_m);
+    recording.rest.state = RestState::under_gravity;
+    recording.density_kg_m3 = 500;
+    recording.environment.gravity_m_s2 = Vec3(0, 0, -9.81);
+    recording.model.material = "linear";
+    recording.model.refine = "none";
+    estimation::PushedBlock truth;
+    truth.finer = 1;
+    truth.points = 200;
+    truth.material = "linear";
+    const auto clouds = estimation::clouds_of(truth, recording);
+    for (std::size_t s = 0; s < clouds.size(); ++s) {
+      recording.pushes[0].steps[s].time_s = static_cast<double>(s);
+      recording.pushes[0].steps[s].observations = {std::get<PointCloud>(clouds[s][0])};
+    }
+    io::write_recording(recording, files_ / "recording");
+    ASSERT_EQ(run("estimate " + (files_ / "recording").string() + " -o " + (files_ / "result").string() + " --quiet").exit_code, 0);
+  }
+  Outcome run(const std::string& arguments) const {
+    FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " 2>&1").c_str(), "r");
+    Outcome out;
+    std::array<char, 4096> buffer;
+    while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) out.text.append(buffer.data(), count);
+    const int status = pclose(pipe);
+    out.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return out;
+  }
+  Outcome predict(const std::string& arguments) const { return run("predict " + (files_ / "result").string() + " --radius 0.006 " + arguments); }
+
+  const test::TemporaryFolder files_{"learned_block"};
+};
+
+TEST_F(LearnedBlock, IsPressedOnItsSurfaceAndIntoIt) {
+  const Outcome good = predict("--contact 0.03 0.02 0.03 --force 0.1");
+  EXPECT_EQ(good.exit_code, 0) << good.text;
+  EXPECT_THAT(good.text, HasSubstr("travel"));
+  const struct {
+    const char *arguments, *said;
+    int exit_code;
+  } bad[] = {
+      {"--contact 0.03 0.02 0.05 --force 0.1", "away from the object's surface; the nearest place on it is 0.03 0.02 0.03", 3},
+      {"--contact 0.03 0.02 0.03 --direction 0 0 1 --force 0.1", "points out of the object", 3},
+      {"--contact 0 0.02 0.015 --direction 1 0 0 --force 0.1", "a support holds the object", 3},
+      {"--contact 0.03 0.02 0.03 --force -5", "must be a number above 0, is -5", 2},
+      {"--contact 0.03 0.02 0.03 --force 0", "must be a number above 0", 2},
+      {"--contact 0.03 0.02 0.03 --travel nan", "must be a number above 0", 2},
+      {"--contact nan 0.02 0.03 --force 1", "must be a finite number", 2},
+  };
+  for (const auto& one : bad) {
+    const Outcome outcome = predict(one.arguments);
+    EXPECT_EQ(outcome.exit_code, one.exit_code) << one.arguments << outcome.text;
+    EXPECT_THAT(outcome.text, HasSubstr(one.said)) << one.arguments;
+  }
+}
+
+/// The shape was measured with its weight on: a simulator that pulls at it again would let it sag twice.
+TEST_F(LearnedBlock, ThatHasSaggedAlreadyIsExportedWithoutGravity) {
+  const std::string to = "export " + (files_ / "result").string() + " --to calculix -o ";
+  const Outcome plain = run(to + (files_ / "plain").string());
+  EXPECT_EQ(plain.exit_code, 0) << plain.text;
+  EXPECT_THAT(plain.text, HasSubstr("gravity is left out"));
+  EXPECT_THAT(io::read_file(files_ / "plain" / "object.inp"), testing::Not(HasSubstr("GRAV")));
+  const Outcome asked = run(to + "\"" + (files_ / "asked's").string() + "\" --gravity 0 0 -9.81");
+  EXPECT_EQ(asked.exit_code, 0) << asked.text;
+  EXPECT_THAT(asked.text, HasSubstr("sags once more"));
+  EXPECT_THAT(io::read_file(files_ / "asked's" / "object.inp"), HasSubstr("GRAV"));
+}
+
+}  // namespace
+}  // namespace palpate
