@@ -255,7 +255,7 @@ int look(Session& session, const Arguments& given) {
   const std::vector<io::Problem> problems = io::check_recording(recording);
   all.update(described(recording, problems));
   tell(session, recording, all);
-  for (const std::string& warning : recording.warnings) session.warn("warning    " + warning);
+  for (const std::string& warning : recording.warnings) session.warn(warning);
   for (const io::Problem& problem : problems) session.warn(fmt::format("wrong      {}: {}", problem.where, problem.what));
   if (problems.empty()) session.say("nothing is wrong with it");
   session.result(all);

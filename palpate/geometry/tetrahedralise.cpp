@@ -327,7 +327,8 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
         "surface");
   if (out.unseen_share > 0.05)
     warn("closed_holes", fmt::format("{:.0f} % of the boundary closes holes of the given surface", 100 * out.unseen_share));
-  if (best->dropped > 0)
+  constexpr double crumbs = 1e-4;  // of the volume: scraps at edges that nobody misses
+  if (best->dropped > 0 && best->dropped_share > crumbs)
     warn("dropped_pieces",
          fmt::format("{} small piece{} ({:.2g} % of the volume) {} left out: parts of their own, or cut off by thin or open parts; the "
                      "largest is {:.2g} m long, at ({:.3g}, {:.3g}, {:.3g}) m",
