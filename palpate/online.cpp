@@ -91,10 +91,10 @@ void OnlineEstimator::begin(const Push& push) {
   for (const Push& known : recording_.pushes) {
     if (known.name == push.name) throw Error("a push of this name was made already", "pushes." + push.name);
   }
-  recording_.pushes.push_back(push);
   Recording alone = recording_;
   alone.pushes = {push};
   take_in(alone);
+  recording_.pushes.push_back(push);
   if (!push.steps.empty()) object_.reset();  // it may touch elsewhere
 }
 
@@ -130,9 +130,9 @@ const Identification& OnlineEstimator::add(const Step& step, const OnProgress& p
   alone.pushes = {recording_.pushes.back()};
   alone.pushes.back().steps = {step};
   const bool rebuild = !object_ || new_contact(step);
-  recording_.pushes.back().steps.push_back(step);
   const std::size_t cameras = cameras_.size();
   take_in(alone);
+  recording_.pushes.back().steps.push_back(step);
   try {
     if (!says_something(recording_, inputs_)) {
       estimate_.message = "no load has been seen to deform the object yet";

@@ -194,6 +194,16 @@ TEST(OnlineEstimator, RefusesAStepAndGoesOnWithoutIt) {
   bad.loads[0].tool = "no such tool";
   EXPECT_THROW(online.add(bad), Error);
   EXPECT_TRUE(online.recording().pushes[0].steps.empty());
+  // Frames that no camera took are refused before anything is taken in, step by step and with a whole push.
+  bad = whole.pushes[0].steps[1];
+  bad.observations = {DepthFrame{}};
+  EXPECT_THROW(online.add(bad), Error);
+  EXPECT_TRUE(online.recording().pushes[0].steps.empty());
+  Push bad_push = push;
+  bad_push.name = "bad";
+  bad_push.steps = {bad};
+  EXPECT_THROW(online.begin(bad_push), Error);
+  EXPECT_EQ(online.recording().pushes.size(), 1u);
   EXPECT_EQ(online.add(whole.pushes[0].steps[1]).parameters.size(), 2u);
 }
 
