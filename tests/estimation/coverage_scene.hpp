@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -16,6 +14,9 @@
 #include <string>
 #include <vector>
 
+#include "estimation/coverage_rows.hpp"
+#include "estimation/finer_near.hpp"
+#include "estimation/random_field.hpp"
 #include "fem/calculix.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/mesh_error.hpp"
@@ -25,179 +26,10 @@
 #include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
-#include "palpate/io/mesh_file.hpp"
-#include "palpate/lab/box_surface.hpp"
-#include "palpate/lab/implicit_surface.hpp"
 #include "palpate/lab/random.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 
 namespace palpate::coverage {
-
-/// What is wrong with a recording: a row of the table. Each is drawn with the standard deviation that the recording states.
-struct Row {
-  std::string name;
-  double outlier_share = 0;
-  double tare_share = 0;  ///< of the highest force
-  double pose_m = 0, pose_rad = 0;
-  double rest_m = 0, rest_length_m = 0.04;
-  double contact_m = 0;
-  double correlated_m = 0, correlated_length_m = 0.015;
-  double depth_m = 0.02;
-};
-
-inline std::vector<Row> rows() {
-  constexpr double degree = EIGEN_PI / 180;
-  std::vector<Row> all(8);
-  all[0].name = "clean";
-  all[1].name = "outliers", all[1].outlier_share = 0.05;
-  all[2].name = "tare", all[2].tare_share = 0.02;
-  all[3].name = "pose", all[3].pose_m = 1e-3, all[3].pose_rad = 0.2 * degree;
-  all[4].name = "rest", all[4].rest_m = 5e-4;
-  all[5].name = "contact", all[5].contact_m = 4e-3;
-  all[6].name = "correlated", all[6].correlated_m = 3e-4;
-  all[7] = {"all", 0.05, 0.02, 1e-3, 0.2 * degree, 5e-4, 0.04, 4e-3, 3e-4, 0.015, 0.04};
-  return all;
-}
-
-struct SceneSpec {
-  std::string name;
-  TriMesh surface;
-  std::vector<Support> supports;
-  Vec3 contact_m, direction, eye_m;
-  double pad_radius_m = 0.015;
-};
-
-inline Support table() {
-  Support support;
-  support.name = "table";
-  support.kind = SupportKind::plane;
-  support.select = NodeSelection::plane;
-  return support;
-}
-
-inline SceneSpec cube_top() {
-  return {"cube_top", lab::box_surface({-0.075, -0.075, 0}, {0.075, 0.075, 0.15}, 10), {table()}, {0, 0, 0.15}, -Vec3::UnitZ(),
-          {0.3, -0.35, 0.55}};
-}
-
-inline SceneSpec ball_top() {
-  const Vec3 centre(0, 0, 0.065);
-  return {"ball_top",
-          lab::implicit_surface([centre](const Vec3& p) { return (p - centre).norm() - 0.075; },
-                                {Vec3(-0.085, -0.085, 0), Vec3(0.085, 0.085, 0.15), 0.004}),
-          {table()}, {0, 0, 0.14}, -Vec3::UnitZ(), {0.3, -0.35, 0.5}};
-}
-
-inline SceneSpec bar_oblique() {
-  return {"bar_oblique", lab::box_surface({-0.03, -0.03, 0}, {0.03, 0.03, 0.18}, 12), {table()}, {0, 0, 0.18},
-          Vec3(1, 0, -1).normalized(), {-0.3, -0.35, 0.5}};
-}
-
-/// The optional data's teddy, standing, 0.3 m high, pushed into the belly.
-inline std::optional<SceneSpec> teddy_belly() {
-  const std::filesystem::path file = std::filesystem::path(PALPATE_SHARED_DIR) / "data/meshes/teddy_autoknit.obj";
-  if (!std::filesystem::exists(file)) return std::nullopt;
-  SceneSpec spec;
-  spec.name = "teddy_belly";
-  const TriMesh given = io::read_tri_mesh(file);
-  spec.surface = given;
-  spec.surface.vertices_m.col(1) = -given.vertices_m.col(2);  // y is up in the file
-  spec.surface.vertices_m.col(2) = given.vertices_m.col(1);
-  spec.surface.vertices_m *= 0.3 / (given.vertices_m.col(1).maxCoeff() - given.vertices_m.col(1).minCoeff());
-  const double foot_m = spec.surface.vertices_m.col(2).minCoeff();
-  spec.surface.vertices_m.col(2).array() -= foot_m;
-  Support glue;
-  glue.name = "glue";
-  glue.kind = SupportKind::box;
-  glue.select = NodeSelection::box;
-  glue.box_min_m = Vec3(-1, -1, -0.01);
-  glue.box_max_m = Vec3(1, 1, 0.02);
-  spec.supports = {glue};
-  const auto hit = geometry::TriangleTree(spec.surface).cast({0, -1, 0.12}, Vec3::UnitY());
-  spec.contact_m = Vec3(0, -1 + hit->range_m, 0.12);
-  spec.direction = Vec3::UnitY();
-  spec.eye_m = Vec3(0.35, -0.5, 0.3);
-  return spec;
-}
-
-inline std::vector<SceneSpec> scenes() {
-  std::vector<SceneSpec> all{cube_top(), ball_top(), bar_oblique()};
-  if (auto teddy = teddy_belly()) all.push_back(*teddy);
-  return all;
-}
-
-/// Every triangle near a place in four, until none there is longer.
-inline TriMesh finer_near(TriMesh mesh, const Vec3& place_m, double radius_m, double edge_m, double elsewhere_m) {
-  std::vector<Vec3> points;
-  for (Index v = 0; v < mesh.vertices_m.rows(); ++v) points.push_back(mesh.vertices_m.row(v));
-  std::vector<std::array<Index, 3>> triangles;
-  for (Index t = 0; t < mesh.triangles.rows(); ++t)
-    triangles.push_back({mesh.triangles(t, 0), mesh.triangles(t, 1), mesh.triangles(t, 2)});
-  // Longest edges are halved, both of their triangles at once, so that no crack opens.
-  for (bool again = true; again;) {
-    again = false;
-    std::map<std::pair<Index, Index>, Index> middle;
-    const auto at = [&](Index i) -> const Vec3& { return points[static_cast<std::size_t>(i)]; };
-    std::vector<std::pair<Index, Index>> longest;
-    for (const auto& t : triangles) {
-      std::pair<Index, Index> edge;
-      double length_m = 0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Index a = t[k], b = t[(k + 1) % 3];
-        // Ties go to the lower pair of indices, so that neighbours agree.
-        const double d = (at(a) - at(b)).norm();
-        if (d > length_m * (1 + 1e-9)) length_m = d, edge = std::minmax(a, b);
-      }
-      longest.push_back(edge);
-      const double away_m = std::max(0.0, ((at(t[0]) + at(t[1]) + at(t[2])) / 3 - place_m).norm() - radius_m);
-      if (length_m > std::min(elsewhere_m, edge_m + 0.3 * away_m) && middle.emplace(edge, -1).second) again = true;
-    }
-    for (auto& [edge, node] : middle) {
-      node = static_cast<Index>(points.size());
-      points.push_back(0.5 * (at(edge.first) + at(edge.second)));
-    }
-    std::vector<std::array<Index, 3>> next;
-    const auto split = [&](const auto& self, const std::array<Index, 3>& t) -> void {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto cut = middle.find(std::minmax(t[k], t[(k + 1) % 3]));
-        if (cut == middle.end()) continue;
-        self(self, {t[k], cut->second, t[(k + 2) % 3]});
-        self(self, {cut->second, t[(k + 1) % 3], t[(k + 2) % 3]});
-        return;
-      }
-      next.push_back(t);
-    };
-    for (const auto& t : triangles) split(split, t);
-    triangles = std::move(next);
-  }
-  mesh.vertices_m.resize(static_cast<Index>(points.size()), 3);
-  for (std::size_t i = 0; i < points.size(); ++i) mesh.vertices_m.row(static_cast<Index>(i)) = points[i];
-  mesh.triangles.resize(static_cast<Index>(triangles.size()), 3);
-  for (std::size_t i = 0; i < triangles.size(); ++i)
-    mesh.triangles.row(static_cast<Index>(i)) << triangles[i][0], triangles[i][1], triangles[i][2];
-  return mesh;
-}
-
-/// Smooth random field with covariance std^2 exp(-d^2 / (2 length^2)), by random Fourier features.
-class RandomField {
- public:
-  RandomField(double std, double length_m, lab::Random& random) {
-    constexpr int waves = 250;
-    wave_.resize(waves, 3);
-    phase_.resize(waves);
-    for (int k = 0; k < waves; ++k) {
-      wave_.row(k) = random.normal3() / length_m;
-      phase_(k) = random.uniform(0, 2 * EIGEN_PI);
-    }
-    size_ = std * std::sqrt(2.0 / waves);
-  }
-  double at(const Vec3& x_m) const { return size_ * (wave_ * x_m + phase_).array().cos().sum(); }
-
- private:
-  Eigen::Matrix<double, Eigen::Dynamic, 3> wave_;
-  VectorX phase_;
-  double size_ = 0;
-};
 
 /// One recording, ready for estimation::fit.
 struct Draw {

@@ -1,0 +1,135 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// What a robot's description adds to streams: where the tip is, and which pixels show it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "acquisition/pressed_spring.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::acquisition {
+namespace {
+
+using namespace palpate::acquisition::test;
+using testing::HasSubstr;
+
+/// A column that goes up and down, with a box for a tool; its tip's frame turns z down.
+RobotModel column() {
+  RobotModel robot;
+  robot.name = "column";
+  RobotLink tip{"tip", {}, {}};
+  RobotShape box;
+  box.kind = RobotShape::Kind::box;
+  box.size_m = Vec3(0.02, 0.02, 0.02);
+  tip.visual.push_back(box);
+  robot.links = {{"base", {}, {}}, {"carriage", {}, {}}, tip};
+  RobotJoint lift;
+  lift.kind = RobotJoint::Kind::prismatic;
+  lift.name = "lift";
+  lift.parent = "base";
+  lift.child = "carriage";
+  lift.axis = Vec3::UnitZ();
+  lift.T_parent_joint.translation() = Vec3(0.3, 0.1, 0);
+  lift.lower = -1, lift.upper = 1;
+  RobotJoint flange;
+  flange.name = "flange";
+  flange.parent = "carriage";
+  flange.child = "tip";
+  flange.T_parent_joint.linear() = tip_at(0).linear();
+  robot.joints = {lift, flange};
+  return robot;
+}
+
+TEST(FromStreams, WithoutTransformsOfTheTipTheJointsTellWhereItIs) {
+  SensorStreams streams = lab();
+  FrameLink& tip = streams.frames[0];
+  streams.joint_names = {"gripper_of_another_device", "lift"};
+  for (const PoseSample& sample : tip.samples) streams.joints.push_back({sample.time_s, {0.5, height_m(sample.time_s)}});
+  streams.frames.erase(streams.frames.begin());
+  StreamPlan by_joints = plan();
+  by_joints.recording.robot = column();
+  const auto with_joints = recording_from(by_joints, streams).recording.pushes,
+             with_frames = recording_from(plan(), lab()).recording.pushes;
+  ASSERT_EQ(with_joints.size(), 1u);
+  ASSERT_EQ(with_joints[0].steps.size(), with_frames[0].steps.size());
+  for (std::size_t i = 1; i + 1 < with_joints[0].steps.size(); ++i) {
+    EXPECT_LT((*with_joints[0].steps[i].loads[0].force_n - *with_frames[0].steps[i].loads[0].force_n).norm(), 1e-9);
+    EXPECT_NEAR(travel_of(with_joints[0].steps[i]), travel_of(with_frames[0].steps[i]), 1e-9);
+  }
+}
+
+TEST(FromStreams, PixelsOfTheRobotAreLeftOut) {
+  SensorStreams streams = lab();
+  for (const PoseSample& sample : streams.frames[0].samples)
+    streams.joints.push_back({sample.time_s, {height_m(sample.time_s)}});
+  streams.joint_names = {"lift"};
+  // A camera 40 cm above the tool that looks down.
+  Pose above = Pose::Identity();
+  above.linear() = tip_at(0).linear();
+  above.translation() = Vec3(0.3, 0.1, 0.5);
+  streams.frames[2].samples[0].T_parent_child = above;
+  streams.cameras[0].mask_robot = true;
+  streams.cameras[0].like.camera = {64, 48, 200, 200, 31.5, 23.5, DistortionModel::none, {}};
+  streams.cameras[0].image = [](std::size_t) { return DepthImage(DepthImage::Constant(48, 64, 0.5f)); };
+  StreamPlan masked = plan();
+  masked.recording.robot = column();
+  const FromStreams made = recording_from(masked, streams);
+  for (const Step& step : made.recording.pushes[0].steps) {
+    for (const Observation& one : step.observations) {
+      const auto* frame = std::get_if<DepthFrame>(&one);
+      if (frame == nullptr) continue;
+      ASSERT_EQ(frame->mask.rows(), 48);
+      EXPECT_EQ(frame->mask(24, 32), 1) << "the tool, in the middle of the picture";
+      EXPECT_EQ(frame->mask(2, 2), 0);
+      // 2 cm at about 40 cm: 10 pixels a side, widened by the mask's margins.
+      EXPECT_GT(frame->mask.cast<int>().sum(), 80);
+      EXPECT_LT(frame->mask.cast<int>().sum(), 600);
+    }
+  }
+  masked.recording.robot.reset();
+  EXPECT_THROW(recording_from(masked, streams), Error) << "no description, no mask";
+}
+
+TEST(FromStreams, TheRobotIsMaskedWhereItStandsAndOnceAndOnlyIfItIsWanted) {
+  SensorStreams streams = lab();
+  // A gripper shares the topic; the column stands 10 m aside, far out of the picture.
+  for (const PoseSample& sample : streams.frames[0].samples)
+    streams.joints.push_back({sample.time_s, {0.02, height_m(sample.time_s)}});
+  streams.joint_names = {"gripper", "lift"};
+  Pose aside = Pose::Identity();
+  aside.translation() = Vec3(10, 0, 0);
+  StreamPlan masked = plan();
+  masked.recording.robot = column();
+  masked.recording.robot->links.front().name = masked.recording.robot->joints.front().parent = "root";
+  streams.frames.push_back({"base", "root", true, {{0, aside}}});
+  const auto masked_pixels = [](const FromStreams& made) {
+    int sum = 0;
+    for (const Step& step : made.recording.pushes[0].steps) {
+      EXPECT_LE(step.joints_rad.size(), 1u) << "the gripper's is not one of the robot's";
+      for (const Observation& one : step.observations)
+        if (const auto* frame = std::get_if<DepthFrame>(&one)) {
+          EXPECT_TRUE(frame->robot_is_masked) << "else it would be masked again, as if it stood at the base";
+          if (frame->mask.size() > 0) sum += frame->mask.cast<int>().sum();
+        }
+    }
+    return sum;
+  };
+  streams.cameras[0].mask_robot = true;
+  EXPECT_EQ(masked_pixels(recording_from(masked, streams)), 0);
+  streams.frames.back().samples[0].T_parent_child = Pose::Identity();
+  streams.frames[2].samples[0].T_parent_child.linear() = tip_at(0).linear();
+  streams.frames[2].samples[0].T_parent_child.translation() = Vec3(0.3, 0.1, 0.5);
+  streams.cameras[0].image = [](std::size_t) { return DepthImage(DepthImage::Constant(48, 64, 0.5f)); };
+  EXPECT_GT(masked_pixels(recording_from(masked, streams)), 80);
+  streams.cameras[0].mask_robot.reset();
+  EXPECT_GT(masked_pixels(recording_from(masked, streams)), 80) << "it is described and its pose is known";
+  streams.cameras[0].mask_robot = false;
+  EXPECT_EQ(masked_pixels(recording_from(masked, streams)), 0);
+
+  streams.cameras[0].mask_robot = true;
+  streams.joint_names = {"gripper", "finger"};
+  EXPECT_THAT(recording_from(masked, streams).notes, testing::Contains(HasSubstr("joint 'lift' is not in the joint states")));
+}
+
+}  // namespace
+}  // namespace palpate::acquisition
