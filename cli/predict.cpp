@@ -145,7 +145,7 @@ int run(const Options& given, Session& session) {
   }
   if (!found.reason.empty()) session.warn(found.reason);
   if (!(std::abs(found.travel_m.value) > 1e-9 * mesh_size_m(mesh)))
-    throw Error("a support holds the object at this place: nothing moves there, and nothing can be learned", "--contact");
+    throw Error("a support holds the object at this place: nothing moves there", "--contact");
   const auto tell = [&](const char* what, const prediction::Band& band, const char* unit) {
     session.say(
         fmt::format("{:<20} {}{}", what, report::quantity(band.value, unit),

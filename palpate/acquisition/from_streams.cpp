@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <set>
 
@@ -41,9 +42,9 @@ class Assembly {
     out_.recording.source = plan.source;
     out_.recording.warnings.insert(out_.recording.warnings.end(), streams.warnings.begin(), streams.warnings.end());
     // Joints that the description does not know (a gripper on the same topic) have no say.
-    std::vector<std::string>& joints = out_.recording.joint_names;
-    for (const std::string& name : streams.joint_names)
-      if (plan.recording.joint_names.empty() && plan.recording.robot && knows(*plan.recording.robot, name)) joints.push_back(name);
+    if (plan.recording.joint_names.empty() && plan.recording.robot)
+      std::copy_if(streams.joint_names.begin(), streams.joint_names.end(), std::back_inserter(out_.recording.joint_names),
+                   [&](const std::string& name) { return knows(*plan.recording.robot, name); });
     used_images_.resize(streams.cameras.size());
     used_clouds_.resize(streams.clouds.size());
   }

@@ -40,7 +40,7 @@ struct SensorPlan {
 struct Knowledge {
   double young_modulus_pa = 2e4, poisson_ratio = 0.3;  ///< where information is computed
   MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, force scale), their priors included
-  Eigen::Vector2d uncured = Eigen::Vector2d::Zero();   ///< variance of log E and nu that no push takes away: the mesh's
+  Eigen::Vector2d uncured = Eigen::Vector2d::Zero();   ///< variance of log E and nu that no push takes away: the mesh's and the unseen side's
   bool touched = false;                                ///< false: nothing but priors, E is a guess
 };
 

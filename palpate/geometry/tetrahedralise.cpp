@@ -177,6 +177,13 @@ double share_over_holes(const TriMesh& boundary, const Solid& solid) {
   return all > 0 ? far / all : 0;
 }
 
+constexpr Index most_tetrahedra = 2000000;
+
+/// A lattice of cubes has 12 tetrahedra a cube; boundaries cost more.
+double cell_for(double volume_m3, double tetrahedra) { return std::cbrt(12 * volume_m3 / tetrahedra) * 1.2; }
+double tetrahedra_of(double volume_m3, double cell_m) { return 12 * volume_m3 * std::pow(1.2 / cell_m, 3); }
+double cell_of_edge(double edge_m) { return edge_m / 0.93; }
+
 void require(bool ok, const char* field, const std::string& what) {
   if (!ok) throw Error(what, std::string("TetrahedraliseOptions: ") + field);
 }
@@ -184,8 +191,8 @@ void require(bool ok, const char* field, const std::string& what) {
 }  // namespace
 
 void check(const TetrahedraliseOptions& o) {
-  require(o.tetrahedra >= 50 && o.tetrahedra <= 2000000, "tetrahedra",
-          fmt::format("{} is not between 50 and 2000000", o.tetrahedra));
+  require(o.tetrahedra >= 50 && o.tetrahedra <= most_tetrahedra, "tetrahedra",
+          fmt::format("{} is not between 50 and {}", o.tetrahedra, most_tetrahedra));
   require(o.edge_m >= 0 && std::isfinite(o.edge_m), "edge_m",
           fmt::format("{} is no length (0 = from tetrahedra)", o.edge_m));
   require(o.detail >= 0.02 && o.detail <= 1, "detail", fmt::format("{} is not between 0.02 and 1", o.detail));
@@ -215,9 +222,9 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   const double reference = solid.watertight() ? solid.signed_volume_m3() - samples.buried_m3 : counted_volume(solid);
   const double volume = std::max(reference, 1e-4 * (solid.max_m() - solid.min_m()).prod());
   const auto affordable = [&](const char* field, double edge_m, double filled_m3) {
-    constexpr double most = 2e6;
-    const double takes = 12 * 1.2 * 1.2 * 1.2 * filled_m3 / std::pow(edge_m / 0.93, 3);
-    require(takes <= most, field, fmt::format("edges of {:.2g} m take some {:.1g} tetrahedra, at most {:.0g} are made; give longer ones", edge_m, takes, most));
+    const double takes = tetrahedra_of(filled_m3, cell_of_edge(edge_m));
+    require(takes <= most_tetrahedra, field,
+            fmt::format("edges of {:.2g} m take some {:.1g} tetrahedra, at most {} are made; give longer ones", edge_m, takes, most_tetrahedra));
   };
   if (o.edge_m > 0) {
     require(o.edge_m < solid.diagonal_m(), "edge_m", fmt::format("edges of {:.2g} m are longer than the object, {:.2g} m", o.edge_m, solid.diagonal_m()));
@@ -225,9 +232,8 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   }
   for (const FinerNear& f : o.finer)
     affordable("finer.edge_m", f.edge_m, std::min(volume, 4.2 * std::pow(std::max(f.radius_m, f.edge_m), 3)));
-  // A lattice of cubes has 12 tetrahedra a cube; boundaries and thin parts cost more, found by trying. What is too much is
-  // merged again where the surface loses least.
-  double cell = o.edge_m > 0 ? o.edge_m / 0.93 : std::cbrt(12 * volume / o.tetrahedra) * 1.2;
+  // What thin parts cost is found by trying. What is too much is merged again where the surface loses least.
+  double cell = o.edge_m > 0 ? cell_of_edge(o.edge_m) : cell_for(volume, o.tetrahedra);
   const double shrinks = 0.95;  // improvement merges some more
   constexpr int attempts = 5;
   const double wall = 2 * std::max(reference, 1e-9 * volume) / solid.area_m2();
@@ -261,10 +267,10 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
                                "leave those parts out",
                                o.tetrahedra),
                    "surface");
-    if (takes > 2e6)
+    if (takes > most_tetrahedra)
       return Error(fmt::format("its walls, {:.2g} m thick on average, are too thin to be filled: walls of that width and size take some "
-                               "{:.0e} tetrahedra, at most 2e+06 are made",
-                               wall, takes),
+                               "{:.0e} tetrahedra, at most {} are made",
+                               wall, takes, most_tetrahedra),
                    "surface");
     return Error(
         fmt::format("its walls, {:.2g} m thick on average, are too thin for {} tetrahedra; walls of that width and size "

@@ -116,26 +116,17 @@ std::optional<Vec2> undistort_brown(const std::vector<double>& k, const Vec2& be
   return p;
 }
 
-/// True when a point that far from the axis lies beyond the largest circle that the lens maps one to one: the polynomials turn
-/// back there, and what is far out of view would be drawn inside the picture. Told by the slope along the way out.
+/// True for a point beyond the largest circle that the lens maps one to one: the polynomials turn back there, or leap over a pole,
+/// and what is far out of view would be drawn inside the picture. Told by the way out to it.
 bool beyond_fold(const Camera& camera, const Vec2& p) {
   constexpr int stations = 8;
-  const bool fisheye = camera.distortion == DistortionModel::fisheye;
-  if (camera.distortion == DistortionModel::none) return false;
-  const double length = fisheye ? std::atan(p.norm()) : p.norm();
-  std::array<double, 8> k{};
-  for (std::size_t i = 0; i < camera.distortion_coefficients.size() && i < k.size(); ++i) k[i] = camera.distortion_coefficients[i];
+  if (camera.distortion == DistortionModel::none || p.norm() < 1e-9) return false;
+  const Vec2 outwards = p.normalized();
+  const double angle = std::atan(p.norm());
   for (int i = 1; i <= stations; ++i) {
-    const double r = length * i / stations, s = r * r;
-    if (fisheye) {
-      double slope = 0;
-      fisheye_angle(camera.distortion_coefficients, r, &slope);
-      if (!(slope > 0)) return true;
-      continue;
-    }
-    const double top = 1 + s * (k[0] + s * (k[1] + s * k[4])), bottom = 1 + s * (k[5] + s * (k[6] + s * k[7]));
-    const double d_top = k[0] + s * (2 * k[1] + 3 * s * k[4]), d_bottom = k[5] + s * (2 * k[6] + 3 * s * k[7]);
-    if (!(bottom > 0) || !(top * bottom + 2 * s * (d_top * bottom - top * d_bottom) > 0)) return true;
+    Mat2 slope;
+    const Vec2 bent = distort(camera, std::tan(angle * i / stations) * outwards, &slope);
+    if (!(bent.dot(outwards) > 0) || !(outwards.dot(slope * outwards) > 0)) return true;
   }
   return false;
 }
