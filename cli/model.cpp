@@ -136,7 +136,7 @@ Run verbs::model(CLI::App& app) {
                  "finer than the tetrahedra)")
       ->required();
   app.add_option("--tetrahedra", o->tetrahedra, "wished number of tetrahedra; 0 keeps those of a volume as they are")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0, 2000000))
       ->type_name("N")
       ->capture_default_str();
   app.add_option("--edge", o->edge_m, "wished edge length in metres instead of a number")->check(positive_number())->type_name("METRES");
