@@ -233,7 +233,8 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   for (const FinerNear& f : o.finer)
     affordable("finer.edge_m", f.edge_m, std::min(volume, 4.2 * std::pow(std::max(f.radius_m, f.edge_m), 3)));
   // What thin parts cost is found by trying. What is too much is merged again where the surface loses least.
-  double cell = o.edge_m > 0 ? cell_of_edge(o.edge_m) : cell_for(volume, o.tetrahedra);
+  const double first_cell = o.edge_m > 0 ? cell_of_edge(o.edge_m) : cell_for(volume, o.tetrahedra);
+  double cell = first_cell;
   const double shrinks = 0.95;  // improvement merges some more
   constexpr int attempts = 5;
   const double wall = 2 * std::max(reference, 1e-9 * volume) / solid.area_m2();
@@ -279,7 +280,8 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
         "surface");
   };
   if (!best) throw too_thin();
-  const bool shell = reference > 0 && wall < 0.4 * intact_cell;
+  // where `finer` asks for many small cells the others grow to make up for them: that makes no shell of a solid
+  const bool shell = reference > 0 && wall < 0.4 * (o.finer.empty() ? intact_cell : std::min(intact_cell, first_cell));
   if (best_ratio > 1.05 && o.edge_m == 0 && o.improve && !out.cancelled) {
     CoarsenOptions fewer{static_cast<Index>(o.tetrahedra / shrinks), 0.1 * intact_cell, {}, shell ? wall : 0};
     if (!o.finer.empty()) fewer.edge_m = [&](const Vec3& p) { return finest_near(o, p); };

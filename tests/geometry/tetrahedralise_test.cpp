@@ -8,9 +8,11 @@
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/solid.hpp"
+#include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/surface_distance.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/geometry/winding_number.hpp"
+#include "palpate/lab/box_surface.hpp"
 #include "refusals.hpp"
 
 namespace palpate::geometry {
@@ -283,6 +285,24 @@ TEST(Tetrahedralise, an_inner_shell_that_faces_inward_is_a_cavity_and_all_inside
   const auto t = with(turned, 6000);
   EXPECT_EQ(t.flipped_triangles, turned.triangles.rows());
   EXPECT_NEAR(t.check.volume_m3, r.check.volume_m3, 1e-3 * r.check.volume_m3);
+}
+
+// Where many places are finer, the cells elsewhere grow to keep the count; a solid bar is no thin shell for that.
+TEST(Tetrahedralise, a_bar_that_is_finer_under_its_tool_and_at_its_foot_is_filled) {
+  const TriMesh m = lab::box_surface({0.56, -0.04, 0}, {0.64, 0.04, 0.16}, 20);
+  for (const Vec3& contact : {Vec3(0.617816, -0.04, 0.0617312), Vec3(0.608535, -0.04, 0.0606342), Vec3(0.64, 0.04, 0.16)}) {
+    TetrahedraliseOptions o;
+    o.tetrahedra = 8000;
+    o.finer = finer_at_feet({Vec3::Zero(), Vec3::UnitZ()}, m);
+    for (FinerNear& near : o.finer) near.edge_m *= 5.0 / 6;
+    ASSERT_GT(o.finer.size(), 50u);
+    o.finer.insert(o.finer.begin(), {contact, 0.0225, 0.003});
+    const auto r = tetrahedralise(m, o);
+    EXPECT_EQ(r.check.inverted + r.check.degenerate, 0);
+    EXPECT_GE(r.check.min_dihedral_deg, 13);  // beside a foot's edge: a degree below what bodies without such places keep
+    EXPECT_NEAR(r.check.tetrahedra, o.tetrahedra, 0.2 * o.tetrahedra);
+    EXPECT_LT(std::abs(r.volume_error.value_or(1)), 0.005);
+  }
 }
 
 TEST(Tetrahedralise, is_finer_where_asked) {
