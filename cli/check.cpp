@@ -100,13 +100,13 @@ Run verbs::check(CLI::App& app) {
       ->check(positive_number());
   app.add_flag("--rigid", given->rigid, "the body does not give way at all");
   app.add_option("--stiffness-std", given->check.stiffness_relative_std, "how well the stiffness is known, relative")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_from_zero())
       ->capture_default_str();
   app.add_option("--placed-within", given->check.placed_std_m,
                  "standard deviation of the body's place in the robot's frame, m (0: exact)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from_zero());
   app.add_option("--turned-within", given->check.placed_std_rad, "of its orientation, rad (0: exact)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from_zero());
   app.add_option("--touch-within", given->check.touch_std_m, "of the tip at first contact along the push, m")
       ->check(positive_number())
       ->capture_default_str();

@@ -72,6 +72,12 @@ Finding tool(const std::string& program, const std::string& used_for, const std:
   return {program, false, false, "not found; used for " + used_for, cure};
 }
 
+Finding python_module(const std::string& module, const std::string& used_for, const std::string& cure) {
+  const std::string import = fmt::format("python3 -c 'import {}' >/dev/null 2>&1", module);
+  const bool there = std::system(import.c_str()) == 0;
+  return {module, there, false, there ? "python3 imports it (" + used_for + ")" : "python3 does not find it; used for " + used_for, cure};
+}
+
 int examine(Session& session) {
   std::error_code error;
   std::filesystem::path temporary = std::filesystem::temp_directory_path(error);
@@ -84,6 +90,7 @@ int examine(Session& session) {
       writable("current folder", std::filesystem::current_path()),
       tool("ccx", "checking exports against CalculiX", "apt install calculix-ccx"),
       tool("python3", "converters in examples/", "apt install python3-numpy"),
+      python_module("numpy", "converters in examples/", "apt install python3-numpy"),
       tool("node", "checking exports against MuJoCo", "apt install nodejs"),
   };
   bool healthy = true;

@@ -11,12 +11,11 @@
 
 #include "cli/bag_recording.hpp"
 #include "cli/live_report.hpp"
-#include "cli/mistyped.hpp"
+#include "cli/material_names.hpp"
 #include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/fem/materials.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
@@ -73,15 +72,9 @@ IdentifyOptions identify_options(const Options& given, const Session& session) {
   return options;
 }
 
-/// Before the recording is read and the object meshed, which may take minutes.
-void check_material(const std::string& material) {
-  std::vector<std::string> names;
-  for (const fem::MaterialLaw* law : fem::material_table()) names.emplace_back(law->name());
-  if (std::find(names.begin(), names.end(), material) != names.end()) return;
-  const auto meant = did_you_mean(material, names);
-  throw Error(fmt::format("no material is called '{}';{} they are {}", material,
-                          meant ? fmt::format(" did you mean '{}'?", *meant) : "", fmt::join(names, ", ")),
-              "--material");
+/// Before the object is meshed, which may take minutes.
+void check_material(const std::string& material, const std::string& where) {
+  if (const auto wrong = wrong_material(material)) throw Error(*wrong, where);
 }
 
 void tell(Session& session, const Options& given, const Identification& answer) {
@@ -121,7 +114,7 @@ void tell(Session& session, const Options& given, const Identification& answer) 
 int estimate(Session& session, const Options& given) {
   StageClock clock;
   must_take_files(given.out);
-  if (!given.material.empty()) check_material(given.material);
+  if (!given.material.empty()) check_material(given.material, "--material");
   LiveReport live(given.live, session, given.recording.filename().string());
   const OnProgress show = live.watch(session.progress());
   const OnProgress progress = [&](std::string_view stage, double share) {
@@ -131,6 +124,7 @@ int estimate(Session& session, const Options& given) {
   progress("read", 0);
   const Recording recording = load_recording(session, given.recording, given.mapping);
   for (const auto& warning : recording.warnings) session.warn(warning);
+  if (given.material.empty()) check_material(recording.model.material, given.recording.string() + ": model.material");
   IdentifyOptions options = identify_options(given, session);
   options.fit.on_estimate = live.on_estimate(recording);
   Identified found = identify(recording, options, progress);
@@ -175,8 +169,8 @@ Run verbs::estimate(CLI::App& app) {
   app.add_option("--regions", given->regions,
                  "parts with an E of their own: recorded (what the recording says), by-site (one around each site that was pushed) or none")
       ->check(CLI::IsMember({"recorded", "by-site", "none"}));
-  app.add_option("--poisson-range", given->poisson_range, "range of the uniform prior on nu, e.g. 0.3 0.4995")->expected(2);
-  app.add_option("--poisson-ratio", given->poisson_ratio, "take nu as known");
+  app.add_option("--poisson-range", given->poisson_range, "range of the uniform prior on nu, e.g. 0.3 0.4995")->expected(2)->check(poisson_number());
+  app.add_option("--poisson-ratio", given->poisson_ratio, "take nu as known")->check(poisson_number());
   app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)")
       ->check(positive_number());
   app.add_option("--max-iterations", given->max_iterations, "most iterations of the fit")->check(positive_number());

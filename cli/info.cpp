@@ -11,6 +11,7 @@
 
 #include "cli/bag_recording.hpp"
 #include "cli/info_bag.hpp"
+#include "cli/material_names.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/message_source.hpp"
@@ -252,7 +253,8 @@ int look(Session& session, const Arguments& given) {
     all["bag"] = bag;
   }
   const Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
-  const std::vector<io::Problem> problems = io::check_recording(recording);
+  std::vector<io::Problem> problems = io::check_recording(recording);
+  if (const auto wrong = wrong_material(recording.model.material)) problems.push_back({"model.material", *wrong});
   all.update(described(recording, problems));
   tell(session, recording, all);
   for (const std::string& warning : recording.warnings) session.warn(warning);

@@ -60,11 +60,11 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
   app.add_flag("--wall", arguments.wall, "an upright wall behind the object, and a push towards it");
   lab::LabOptions& lab = arguments.lab;
   app.add_option("--compliance", lab.compliance_m_per_n, "of the lab's stick and arm, m/N (0.0001: a tenth of a millimetre a newton)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from_zero());
   app.add_option("--stated-compliance", lab.stated_compliance_m_per_n, "what the recording says of it, m/N (default: the truth)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from_zero());
   app.add_option("--stated-compliance-std", lab.stated_compliance_std_m_per_n, "how well the recording says that it is known, m/N (default: exactly)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from_zero());
   app.add_option("--relaxation", lab.relaxation, "share of each rise of the force that fades after the motion")
       ->check(CLI::Range(0.0, 0.95))
       ->capture_default_str();

@@ -45,6 +45,12 @@ const std::string* first_word(const std::vector<std::string>& arguments) {
   return nullptr;
 }
 
+/// Whether what is wrong is the command and not a file: the error names an option alone, or the verb.
+bool is_usage(const std::string& where) {
+  const std::vector<std::string> names = verb_names();
+  return (where.starts_with("--") && where.find(' ') == std::string::npos) || std::find(names.begin(), names.end(), where) != names.end();
+}
+
 std::string hint(const std::string& word, const std::vector<std::string>& candidates) {
   const auto meant = did_you_mean(word, candidates);
   return meant ? fmt::format(" Did you mean `{}`?", *meant) : std::string();
@@ -123,7 +129,8 @@ int main(int argc, char** argv) {
   try {
     return parse_and_run({argv + 1, argv + argc}, session);
   } catch (const palpate::Error& error) {
-    return fail(session, exit_input, "input", with_option(error), error.where());
+    const bool usage = is_usage(error.where());
+    return fail(session, usage ? exit_usage : exit_input, usage ? "usage" : "input", with_option(error), error.where());
   } catch (const std::bad_alloc&) {
     return fail(session, exit_internal, "internal",
                 "not enough memory for this problem; use a coarser mesh or fewer points");

@@ -19,6 +19,28 @@ inline CLI::Validator positive_number() {
       "POSITIVE");
 }
 
+/// A finite number, 0 or above.
+inline CLI::Validator number_from_zero() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        const bool fine = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= 0;
+        return fine ? std::string() : "must be 0 or a number above it, is " + text;
+      },
+      "NUMBER >= 0");
+}
+
+/// A Poisson ratio with which a body can be computed.
+inline CLI::Validator poisson_number() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        const bool fine = CLI::detail::lexical_cast(text, value) && value > -1 && value <= 0.4995;
+        return fine ? std::string() : "must lie above -1 and at most at 0.4995, is " + text;
+      },
+      "NUMBER");
+}
+
 /// A number, neither NaN nor infinite.
 inline CLI::Validator finite_number() {
   return CLI::Validator(

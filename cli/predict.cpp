@@ -93,21 +93,23 @@ MatrixX by_rows(const VectorX& field) { return Eigen::Map<const Points>(field.da
 
 double mesh_size_m(const TetMesh& mesh) { return (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm(); }
 
+std::string words(const Vec3& at) { return fmt::format("{:.4g} {:.4g} {:.4g}", at.x(), at.y(), at.z()); }
+
 /// A place beside the surface would be pressed by the part of the patch that reaches it: it is moved there, or refused.
 void put_on_surface(const TetMesh& mesh, const Tool& tool, Load& load, Session& session) {
   const TriMesh surface = geometry::boundary_surface(mesh).surface;
   const auto foot = geometry::TriangleTree(surface).closest(load.contact_m);
   const double off_m = std::sqrt(foot.squared_distance_m2), near_m = 0.01 * mesh_size_m(mesh);
-  const auto words = [](const Vec3& at) { return fmt::format("{:.4g} {:.4g} {:.4g}", at.x(), at.y(), at.z()); };
   if (off_m > std::max(near_m, 0.5 * tool.radius_m))
     throw Error(fmt::format("lies {} away from the object's surface; the nearest place on it is {}", report::quantity(off_m, "m"), words(foot.point_m)),
-                "--contact");
+                "--contact " + words(load.contact_m));
   if (off_m > near_m) session.warn(fmt::format("the contact is moved by {} onto the surface, to {}", report::quantity(off_m, "m"), words(foot.point_m)));
   load.contact_m = foot.point_m;
   const auto corner = [&](int k) { return Vec3(surface.vertices_m.row(surface.triangles(foot.triangle, k))); };
   const Vec3 outwards = (corner(1) - corner(0)).cross(corner(2) - corner(0));
   if (load.direction.dot(outwards) > 0)
-    throw Error("points out of the object there, and a tool can only push; into it is about " + words(-outwards.normalized()), "--direction");
+    throw Error("points out of the object there, and a tool can only push; into it is about " + words(-outwards.normalized()),
+                "--direction " + words(load.direction));
 }
 
 int run(const Options& given, Session& session) {
@@ -145,7 +147,7 @@ int run(const Options& given, Session& session) {
   }
   if (!found.reason.empty()) session.warn(found.reason);
   if (!(std::abs(found.travel_m.value) > 1e-9 * mesh_size_m(mesh)))
-    throw Error("a support holds the object at this place: nothing moves there", "--contact");
+    throw Error("a support holds the object at this place: nothing moves there", "--contact " + words(load.contact_m));
   const auto tell = [&](const char* what, const prediction::Band& band, const char* unit) {
     session.say(
         fmt::format("{:<20} {}{}", what, report::quantity(band.value, unit),

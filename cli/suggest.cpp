@@ -197,10 +197,10 @@ Run verbs::suggest(CLI::App& app) {
       ->check(CLI::Range(0.0, 1.39))
       ->capture_default_str();
   app.add_option("--stick", limits.stick_length_m, "length from the tip to the hand, m")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_from_zero())
       ->capture_default_str();
   app.add_option("--hand-radius", limits.hand_radius_m, "of what follows behind the stick, m")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_from_zero())
       ->capture_default_str();
   app.add_option("--contacts", given->suggest.candidates.contacts, "places that are compared")
       ->check(CLI::Range(1, 500))

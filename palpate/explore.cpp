@@ -85,7 +85,7 @@ class Loop {
     suggesting.cameras = {frame};
     estimation::SensorPlan sensors;
     sensors.travel_sigma_m = robot_.travel_sigma_m();
-    sensors.travel_offset_std_m = options_.push.increment_m;
+    sensors.travel_offset_std_m = acquisition::travel_offset_std_m(options_.push, *sensors.travel_sigma_m);
     const double noise_n = force_noise_n();
     sensors.force_tare_std_n = noise_n / std::sqrt(static_cast<double>(options_.push.free_air_samples));
     const double samples = options_.push.settling.window_s / options_.push.sample_period_s;

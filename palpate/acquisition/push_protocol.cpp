@@ -98,7 +98,7 @@ class PushRun {
     for (const Vec3& f : forces) square += std::pow(along(f - report_.tare_n), 2);
     free_air_std_n_ = std::sqrt(square / std::max(1, options_.free_air_samples - 1));
     push_.force_tare_std_n = free_air_std_n_ / std::sqrt(double(options_.free_air_samples));
-    push_.travel_offset_std_m = options_.increment_m;
+    push_.travel_offset_std_m = travel_offset_std_m(options_, robot_.travel_sigma_m());
     if (!recorded_rest_) record(state, {}, 0, false);
   }
 
@@ -337,6 +337,8 @@ Mat3 tip_along(const Vec3& direction) {
   rotation.col(1) = direction.cross(rotation.col(0));
   return rotation;
 }
+
+double travel_offset_std_m(const PushOptions& o, double travel_sigma_m) { return std::hypot(0.5 * o.increment_m, travel_sigma_m); }
 
 void check(const PushOptions& o) {
   const auto need = [](bool good, const char* field, const char* rule) {

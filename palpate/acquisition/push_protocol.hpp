@@ -48,6 +48,9 @@ struct PushOptions {
 /// @throws Error naming the option that is out of range.
 void check(const PushOptions& options);
 
+/// Prior of the travel's zero, m: it is traced back to about half an increment, from tips that are known to `travel_sigma_m`.
+double travel_offset_std_m(const PushOptions& options, double travel_sigma_m);
+
 enum class StopReason { force_limit, travel_limit, slip, contact_lost, no_contact, robot_limit, user };
 const char* to_words(StopReason reason);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "palpate/estimation/grazing.hpp"
 #include "palpate/estimation/load_columns.hpp"
 
 namespace palpate::estimation {
@@ -47,7 +48,6 @@ RayObservation without_stick(const RayObservation& view, const PushCandidate& ca
 double seen_share(const geometry::TriangleTree& surface, const Points& seen_m, const std::optional<Vec3>& eye_m,
                   const PushCandidate& candidate, double radius_m, double spacing) {
   constexpr int turns = 12;
-  constexpr double grazing_cosine = 0.17;  // as the fit's rays
   const auto across = tangents(candidate.direction);
   const double near_m = std::max(0.6 * radius_m, 2 * spacing);
   const auto shows = [&](const Vec3& around, bool measured) {

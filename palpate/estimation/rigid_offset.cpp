@@ -3,18 +3,14 @@
 
 #include <cmath>
 
+#include "palpate/core/cross_matrix.hpp"
+
 namespace palpate::estimation {
 namespace {
 
-Mat3 skew(const Vec3& v) {
-  Mat3 s;
-  s << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return s;
-}
-
 Mat3 left_jacobian(const Vec3& w) {
   const double angle = w.norm();
-  const Mat3 s = skew(w);
+  const Mat3 s = cross_matrix(w);
   if (angle < 1e-6) return Mat3::Identity() + 0.5 * s + s * s / 6.0;
   return Mat3::Identity() + (1 - std::cos(angle)) / (angle * angle) * s +
          (angle - std::sin(angle)) / (angle * angle * angle) * s * s;
@@ -24,7 +20,7 @@ Mat3 left_jacobian(const Vec3& w) {
 
 Mat3 RigidOffset::rotation() const {
   const double angle = rotation_rad.norm();
-  if (angle < 1e-14) return Mat3::Identity() + skew(rotation_rad);
+  if (angle < 1e-14) return Mat3::Identity() + cross_matrix(rotation_rad);
   return Eigen::AngleAxisd(angle, rotation_rad / angle).toRotationMatrix();
 }
 
@@ -37,7 +33,7 @@ Vec3 RigidOffset::apply_inverse(const Vec3& point_m) const {
 Eigen::Matrix<double, 3, 6> RigidOffset::derivative(const Vec3& point_m) const {
   Eigen::Matrix<double, 3, 6> d;
   d.leftCols<3>().setIdentity();
-  d.rightCols<3>() = -skew(rotation() * (point_m - pivot_m)) * left_jacobian(rotation_rad);
+  d.rightCols<3>() = -cross_matrix(rotation() * (point_m - pivot_m)) * left_jacobian(rotation_rad);
   return d;
 }
 
@@ -49,7 +45,7 @@ RigidMap::RigidMap(const RigidOffset& offset)
 
 Mat3 RigidOffset::inverse_rotation_derivative(const Vec3& vector) const {
   // exp(w)' v = exp(-w) v, and d/dw exp(-w) v = [exp(-w) v]_x J_l(-w) with J_l(-w) = J_r(w).
-  return skew(rotation().transpose() * vector) * left_jacobian(-rotation_rad);
+  return cross_matrix(rotation().transpose() * vector) * left_jacobian(-rotation_rad);
 }
 
 }  // namespace palpate::estimation

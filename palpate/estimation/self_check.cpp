@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/grazing.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
@@ -17,7 +18,6 @@ namespace {
 constexpr double quantile_975 = 1.959963984540054;
 constexpr double alarm = 3;  // standard deviations: a dozen errors are judged at once
 constexpr double tukey_cut = 4.685;
-constexpr double grazing_cosine = 0.17;
 constexpr Index most_rays = 3000;  // a frame
 
 /// Entries of the vector that is solved for.

@@ -280,8 +280,7 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
         "surface");
   };
   if (!best) throw too_thin();
-  // where `finer` asks for many small cells the others grow to make up for them: that makes no shell of a solid
-  const bool shell = reference > 0 && wall < 0.4 * (o.finer.empty() ? intact_cell : std::min(intact_cell, first_cell));
+  const bool shell = reference > 0 && wall < 0.4 * intact_cell;
   if (best_ratio > 1.05 && o.edge_m == 0 && o.improve && !out.cancelled) {
     CoarsenOptions fewer{static_cast<Index>(o.tetrahedra / shrinks), 0.1 * intact_cell, {}, shell ? wall : 0};
     if (!o.finer.empty()) fewer.edge_m = [&](const Vec3& p) { return finest_near(o, p); };
@@ -310,9 +309,11 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
 
   out.mesh = best->mesh.compact();
   out.check = check_volume(out.mesh);
+  // Where `finer` asks for many small cells the others grow to make up for them: that makes no thin walls of a solid's.
+  const bool thin = shell && (o.finer.empty() || wall < 0.4 * first_cell);
   const bool flat = out.check.min_dihedral_deg < 15 || out.check.max_dihedral_deg > 150;
   if (o.edge_m == 0 && o.improve && !out.cancelled &&
-      (torn(out.check.volume_m3, 0.1) || out.check.tetrahedra > 4 * o.tetrahedra || (shell && flat)))
+      (torn(out.check.volume_m3, 0.1) || out.check.tetrahedra > 4 * o.tetrahedra || (thin && flat)))
     throw too_thin();
   const TriMesh boundary = boundary_surface(out.mesh).surface;
   if (known_volume) out.volume_error = out.check.volume_m3 / reference - 1;

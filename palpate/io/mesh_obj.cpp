@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wavefront OBJ: vertices and faces; texture, normals, groups and materials are skipped.
+// Wavefront OBJ: vertices and faces; texture, normals, groups and materials are skipped. A backslash at its end goes on with
+// the next line.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,6 +19,12 @@ MeshData read_obj(std::string_view bytes, const std::string& name) {
   while (file.remaining() > 0) {
     const std::size_t start = file.position();
     std::string_view text = file.line();
+    std::string joined;
+    while (text.ends_with('\\') && file.remaining() > 0) {
+      joined.append(text.substr(0, text.size() - 1)) += ' ';
+      text = file.line();
+    }
+    if (!joined.empty()) text = joined.append(text);
     const std::size_t next = file.position();
     text = trimmed(text.substr(0, text.find('#')));
     Scanner line(text, name);

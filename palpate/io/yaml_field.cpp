@@ -54,9 +54,13 @@ std::optional<std::string> nearest_word(std::string_view word, const std::vector
 YamlField YamlField::parse(const std::string& bytes, const std::string& name) {
   const auto file = std::make_shared<const std::string>(name);
   try {
-    YAML::Node root = YAML::Load(bytes);
-    if (!root.IsDefined() || root.IsNull())
+    const std::vector<YAML::Node> documents = YAML::LoadAll(bytes);
+    if (documents.empty() || !documents[0].IsDefined() || documents[0].IsNull())
       throw Error("is empty; see docs/recording-format.md for what belongs in it", name);
+    if (documents.size() > 1)
+      throw Error("holds more than one document; take out the line `---` between them, or give each a file of its own",
+                  name + ":" + std::to_string(documents[1].Mark().line + 1));
+    const YAML::Node& root = documents[0];
     return {root, "", file};
   } catch (const YAML::Exception& problem) {
     throw Error("is not valid YAML: " + problem.msg + "; mend this line, or give another file if this was not meant to be one",

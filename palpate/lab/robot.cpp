@@ -254,9 +254,9 @@ void LabRobot::wait(double duration_s) { impl_->clock_s += duration_s; }
 double LabRobot::travel_sigma_m() const {
   const Impl& lab = *impl_;
   const auto poses = lab.mask.kinematics().link_poses(lab.mask.kinematics().free_joints(), lab.commanded);
-  // Of the three axes' sum, about the part along the push; two positions (contact and now) make a travel.
-  const double all = lab.mask.kinematics().position_std_m(poses, lab.tip, Vec3::Zero(), lab.options.joint_std_rad);
-  return std::max(1e-5, std::sqrt(2.0 / 3.0) * all);
+  const Vec3& along = lab.site().direction;
+  const Mat3 covariance = lab.mask.kinematics().position_covariance_m2(poses, lab.tip, Vec3::Zero(), lab.options.joint_std_rad);
+  return std::max(1e-5, std::sqrt(along.dot(covariance * along)));
 }
 
 DepthFrame LabRobot::take_depth_image() {

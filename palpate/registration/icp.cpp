@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "palpate/core/cross_matrix.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::registration {
@@ -27,12 +28,6 @@ struct Normal {
   double sum = 0, weights = 0, size = 0;
   Index counting = 0;
 };
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 Pose small_motion(const Vector6& d) {
   const double angle = d.head<3>().norm();

@@ -124,21 +124,26 @@ std::vector<Pose> Kinematics::link_poses(const std::vector<std::string>& names, 
   return poses;
 }
 
-double Kinematics::position_std_m(const std::vector<Pose>& poses, Index link, const Vec3& point_link_m,
-                                  double joint_std_rad) const {
+Mat3 Kinematics::position_covariance_m2(const std::vector<Pose>& poses, Index link, const Vec3& point_link_m,
+                                        double joint_std_rad) const {
   const Vec3 point = poses[std::size_t(link)] * point_link_m;
-  double variance = 0;
+  Mat3 covariance = Mat3::Zero();
   for (Index at = link; joint_above_[std::size_t(at)] >= 0;) {
     const auto j = std::size_t(joint_above_[std::size_t(at)]);
     const RobotJoint& joint = robot_.joints[j];
     if (joint.kind == RobotJoint::Kind::revolute || joint.kind == RobotJoint::Kind::continuous) {
       const Pose& frame = poses[std::size_t(child_[j])];  // the joint's origin and axis move with its child
       const Vec3 lever = (frame.linear() * joint.axis).cross(point - frame.translation());
-      variance += (lever * joint_std_rad).squaredNorm();
+      covariance += joint_std_rad * joint_std_rad * lever * lever.transpose();
     }
     at = parent_[j];
   }
-  return std::sqrt(variance);
+  return covariance;
+}
+
+double Kinematics::position_std_m(const std::vector<Pose>& poses, Index link, const Vec3& point_link_m,
+                                  double joint_std_rad) const {
+  return std::sqrt(position_covariance_m2(poses, link, point_link_m, joint_std_rad).trace());
 }
 
 }  // namespace palpate::sensing

@@ -29,8 +29,11 @@ class Kinematics {
   /// @throws Error when a free joint has no value, a name is unknown, or the counts differ.
   std::vector<Pose> link_poses(const std::vector<std::string>& names, const std::vector<double>& positions) const;
 
-  /// Standard deviation of the position of a point of a link, from independent errors of all joints above it:
-  /// the square root of the sum of (lever arm times sigma)^2 at this pose; a prismatic joint adds nothing to it.
+  /// Covariance of the position of a point of a link in the root's frame, m2, from independent errors of all joints above it:
+  /// the sum of (lever arm times sigma) (lever arm times sigma)' at this pose; a prismatic joint adds nothing to it.
+  Mat3 position_covariance_m2(const std::vector<Pose>& link_poses, Index link, const Vec3& point_link_m,
+                              double joint_std_rad) const;
+  /// The square root of its trace: of all three axes together.
   double position_std_m(const std::vector<Pose>& link_poses, Index link, const Vec3& point_link_m,
                         double joint_std_rad) const;
 

@@ -7,18 +7,10 @@
 #include <cmath>
 #include <string>
 
+#include "palpate/core/cross_matrix.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::sensing {
-namespace {
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-}  // namespace
 
 Vec3 torque_about(const Vec3& torque_nm, const Vec3& force_n, const Vec3& from_m, const Vec3& to_m) {
   return torque_nm + (from_m - to_m).cross(force_n);

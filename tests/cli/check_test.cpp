@@ -131,8 +131,9 @@ TEST(Check, CameraAndComplianceThatAreOffAreFoundAndNamed) {
 
 TEST(Check, TheBodyMustBeSaidAndBeOneOfTwo) {
   const Recording recording = pushed_block(Vec3::Zero(), 0);
-  EXPECT_EQ(check(recording, "").exit_code, 3);
-  EXPECT_EQ(check(recording, "--rigid --stiffness 500").exit_code, 3);
+  EXPECT_EQ(check(recording, "").exit_code, 2);
+  EXPECT_EQ(check(recording, "--rigid --stiffness 500").exit_code, 2);
+  EXPECT_EQ(check(recording, "--rigid --placed-within -1").json["error"]["message"], "--placed-within: must be 0 or a number above it, is -1 (`palpate check --help`)");
 }
 
 }  // namespace

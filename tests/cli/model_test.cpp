@@ -73,7 +73,7 @@ TEST_F(Model, sizes_that_make_no_sense_are_refused_and_nothing_is_left_behind) {
   EXPECT_EQ(run(file + out + " --tetrahedra -5").exit_code, 2);
   EXPECT_EQ(run(file + out + " --edge=-1").exit_code, 2);
   EXPECT_EQ(run(file + out + " --edge=nan").exit_code, 2);
-  EXPECT_EQ(run(file + out + " --tetrahedra 0").exit_code, 3);
+  EXPECT_EQ(run(file + out + " --tetrahedra 0").exit_code, 2);
   EXPECT_EQ(run(file + out + " --edge 1e-7").exit_code, 3);
   EXPECT_FALSE(fs::exists(folder_ / "out"));
   fs::create_directories(folder_ / "taken" / "model.msh");

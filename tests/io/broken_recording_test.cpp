@@ -49,6 +49,11 @@ TEST_F(BrokenRecording, NoFolder) {
   expect_refused("broken", "recording.yaml");
 }
 
+TEST_F(BrokenRecording, ASecondDocumentIsNotPassedOver) {
+  folder.put("recording.yaml", index_text + std::string("---\npushes: []\n"));
+  expect_refused("recording.yaml", "more than one document");
+}
+
 TEST_F(BrokenRecording, MissingFile) {
   std::filesystem::remove(folder.path() / "clouds/b.xyz");
   expect_refused("frames.csv:3: cloud", "there is no file 'clouds/b.xyz'");

@@ -57,6 +57,16 @@ TEST_F(Info, ListsAllThatIsWrongAndExitsWithThree) {
   EXPECT_EQ(nlohmann::json::parse(outcome.out)["problems"].size(), 2u) << outcome.out;
 }
 
+TEST_F(Info, AMaterialThatThereIsNotIsNamed) {
+  folder.put("recording.yaml", replaced(index_text, "material: linear", "material: neo_hokean"));
+  const Outcome outcome = info_of(folder);
+  EXPECT_EQ(outcome.code, 3);
+  const nlohmann::json problems = nlohmann::json::parse(outcome.out)["problems"];
+  ASSERT_EQ(problems.size(), 1u) << outcome.out;
+  EXPECT_EQ(problems[0]["where"], "model.material");
+  EXPECT_NE(problems[0]["message"].get<std::string>().find("did you mean 'neo_hookean'?"), std::string::npos) << outcome.out;
+}
+
 TEST_F(Info, WhatCannotBeReadExitsWithThreeAndNamesFileLineAndField) {
   folder.put("recording.yaml", replaced(index_text, "element: tet4", "elemnt: tet4"));
   const Outcome outcome = info_of(folder);

@@ -220,6 +220,15 @@ TEST(Obj, PolygonsNegativeAndSlashedIndices) {
   EXPECT_EQ(mesh.triangles, expected);
 }
 
+TEST(Obj, ABackslashGoesOnWithTheNextLine) {
+  const MeshData mesh = parse_mesh("v 0 0 \\\n0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 \\\r\n 3 \\\n 4\n", "long.obj");
+  EXPECT_EQ(mesh.points_m.rows(), 4);
+  Triangles expected(2, 3);
+  expected << 0, 1, 2, 0, 2, 3;
+  EXPECT_EQ(mesh.triangles, expected);
+  EXPECT_THROW(parse_mesh("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\\", "cut.obj"), Error);
+}
+
 /// A letter C and a star, from every corner, either way round: the triangles cover what the outline encloses, once.
 TEST(Obj, PolygonsThatBendInwardsAreCutIntoWhatTheyEnclose) {
   std::vector<std::vector<Eigen::Vector2d>> outlines(2);

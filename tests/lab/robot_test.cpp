@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "palpate/core/error.hpp"
 #include "refusals.hpp"
@@ -73,6 +74,35 @@ TEST(LabRobot, PushIsRecordedAsItHappened) {
   ASSERT_EQ(loaded, 3);
   // Contact is noticed late by what the threshold needs, at most 1.5 mm here, and the encoders err by 0.4 mm.
   EXPECT_LT(worst, 0.003);
+}
+
+// Travels err from step to step by what each of them states, and all of a push together by what its zero states.
+TEST(LabRobot, TravelsErrAsTheyState) {
+  double steps = 0, spread = 0, zeros = 0;
+  constexpr int seeds = 12;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    LabOptions options = quick();
+    options.seed = std::uint64_t(seed);
+    LabRobot robot(options);
+    std::vector<double> errors, sigmas;
+    double zero_std_m = 0;
+    acquisition::run_push(robot, robot.plan(), small_push(), [&](const Push& push, const Step& step) {
+      zero_std_m = push.travel_offset_std_m;
+      for (const Observation& o : step.observations)
+        if (const auto* travel = std::get_if<ToolTravel>(&o)) {
+          errors.push_back(travel->travel_m - robot.true_travel_m());
+          sigmas.push_back(travel->sigma_m);
+        }
+    });
+    ASSERT_EQ(errors.size(), 3u);
+    const double mean = std::accumulate(errors.begin(), errors.end(), 0.0) / 3;
+    for (std::size_t k = 0; k < 3; ++k) spread += std::pow((errors[k] - mean) / sigmas[k], 2);
+    steps += 2;
+    zeros += std::pow(mean, 2) / (std::pow(zero_std_m, 2) + std::pow(sigmas[0], 2) / 3);
+  }
+  EXPECT_NEAR(std::sqrt(spread / steps), 1, 0.45);  // three standard deviations of 24 numbers' own
+  EXPECT_GT(std::sqrt(zeros / seeds), 0.4);
+  EXPECT_LT(std::sqrt(zeros / seeds), 1.6);
 }
 
 TEST(LabRobot, SameSeedSameRecording) {

@@ -78,12 +78,16 @@ TEST(Kinematics, PositionUncertaintyAgreesWithMonteCarlo) {
   std::mt19937 generator(2);
   std::normal_distribution<double> error(0, 1e-3);
   double variance = 0;
+  Mat3 moved_covariance = Mat3::Zero();
   constexpr int trials = 20000;
   for (int i = 0; i < trials; ++i) {
     const auto moved = arm.link_poses(names, {at[0] + error(generator), at[1] + error(generator), at[2], at[3]});
-    variance += (moved[std::size_t(slide)] * point - poses[std::size_t(slide)] * point).squaredNorm() / trials;
+    const Vec3 off = moved[std::size_t(slide)] * point - poses[std::size_t(slide)] * point;
+    variance += off.squaredNorm() / trials;
+    moved_covariance += off * off.transpose() / trials;
   }
   EXPECT_NEAR(std::sqrt(variance) / predicted, 1, 0.03);
+  EXPECT_LT((moved_covariance - arm.position_covariance_m2(poses, slide, point, 1e-3)).norm(), 0.05 * variance);
 }
 
 TEST(Kinematics, EveryBrokenTreeIsRefusedByName) {

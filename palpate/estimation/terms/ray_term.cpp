@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/grazing.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
@@ -19,7 +20,6 @@ namespace {
 // missed.
 constexpr Index cell_px = 48;
 constexpr double endless = 1e300;
-constexpr double grazing_cosine = 0.17;  // beyond 80 degrees a depth says little and its noise model is void
 
 class RayTerm : public Term {
  public:

@@ -40,7 +40,7 @@ enum RayChoice : char { passes_by = 0, counts_in = 1, grazes = 2 };
 struct TermView {
   bool along_rays = true;  ///< false while the surface may still be far away: closest points are used instead of rays
   /// A RayChoice each: rays that count, whatever they meet and how they graze it; the others are not asked about. nullptr: all that meet the
-  /// surface at less than 80 degrees
+  /// surface at less than 70 degrees (grazing.hpp)
   const std::vector<char>* chosen = nullptr;
   bool surface_slopes = false;  ///< TermRows::surface is wanted, by terms that look at the surface
 };

@@ -4,16 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/core/cross_matrix.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::fem {
 namespace {
-
-Mat3 cross_matrix(const Vec3& a) {
-  Mat3 m;
-  m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
-  return m;
-}
 
 /// d exp(w) = [J dw]x exp(w).
 Mat3 rotation_slope(const Vec3& w) {

@@ -6,16 +6,12 @@
 #include <cmath>
 #include <limits>
 
+#include "palpate/core/cross_matrix.hpp"
+
 namespace palpate::fem {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-Mat3 cross_matrix(const Vec3& a) {
-  Mat3 m;
-  m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
-  return m;
-}
 
 // The nearest positive semi-definite matrix.
 void make_convex(Mat3& h) {
