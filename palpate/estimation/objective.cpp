@@ -9,7 +9,6 @@
 #include <thread>
 
 #include "palpate/core/error.hpp"
-#include "palpate/estimation/grazing.hpp"
 
 namespace palpate::estimation {
 
@@ -140,7 +139,7 @@ Loss Objective::with_chosen_rays(Loss loss) const {
     for (std::size_t t = 0; t < chosen.size(); ++t) {
       const VectorX& facing = rows_[s][t].facing;
       chosen[t].resize(static_cast<std::size_t>(facing.size()));
-      for (Index i = 0; i < facing.size(); ++i) chosen[t][static_cast<std::size_t>(i)] = facing(i) > grazing_cosine ? counts_in : facing(i) > 0 ? grazes : passes_by;
+      for (Index i = 0; i < facing.size(); ++i) chosen[t][static_cast<std::size_t>(i)] = facing(i) > 1 ? counts_in : facing(i) > 0 ? grazes : passes_by;
     }
     loss.rays[s] = std::make_shared<const RaysOfStep>(std::move(chosen));
   }

@@ -165,6 +165,24 @@ MaskImage invalid_pixels(const DepthFrame& frame, const BackProjectionOptions& o
   return invalid;
 }
 
+double trusted_incidence_rad(const DepthFrame& frame, double depth_m, const BackProjectionOptions& options) {
+  check(options);
+  check_frame(frame);
+  constexpr double sigmas = 1.5;
+  const double allowed_m = allowed_jump_m(frame, options, depth_m, 1.0);
+  const double spacing_m = depth_m / std::min(frame.camera.fx_px, frame.camera.fy_px);
+  auto* const lateral = frame.noise.model == "constant" ? nullptr : depth_noise_model(frame.noise.model).lateral_sigma_px;
+  constexpr int most_deg = 75, least_deg = 45;
+  for (int degrees = most_deg; degrees > least_deg; --degrees) {
+    const double incidence_rad = degrees * M_PI / 180, slope = std::tan(incidence_rad);
+    const DepthNoiseInput at{depth_m, incidence_rad, frame.camera.fx_px};
+    const double sideways_m = lateral != nullptr ? lateral(at) * depth_m / frame.camera.fx_px : 0;
+    const double noise_m = std::sqrt(2.0) * std::hypot(axial_sigma_m(frame.noise, at), slope * sideways_m);
+    if (slope * spacing_m + sigmas * noise_m < allowed_m) return incidence_rad;
+  }
+  return least_deg * M_PI / 180;
+}
+
 Points normals(const DepthFrame& frame, const MaskImage& invalid, const BackProjectionOptions& options) {
   check(options);
   check_frame(frame);

@@ -40,6 +40,14 @@ Points normals(const DepthFrame& frame, const MaskImage& invalid, const BackProj
 /// 0 where there is none, or too few different depths to tell.
 double depth_step_m(const DepthImage& depth_m);
 
+/// How steeply a surface may be seen, rad between ray and normal, before its own noise decides which of its pixels count as depth
+/// edges and go: those that stay are then too near on average, by 0.1 (D435, beyond 75 degrees) to 0.5 (Kinect, beyond 75)
+/// standard deviations for the lab's ball. A step between neighbours and one and a half standard deviations of it stay below what
+/// counts as an edge there; between 45 and 75 degrees.
+/// @param depth_m  where the surface is
+/// @throws Error as invalid_pixels does.
+double trusted_incidence_rad(const DepthFrame& frame, double depth_m, const BackProjectionOptions& options = {});
+
 /// Valid pixels as rays in the base frame, with the standard deviation along the ray from the sensor's noise model at that
 /// depth and incidence, and from the rounding to whole steps (a step over the root of 12).
 /// @param normals_base  if given: filled with one unit normal a ray (base frame, facing the camera)

@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "palpate/core/error.hpp"
-#include "palpate/estimation/grazing.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
@@ -20,6 +19,7 @@ namespace {
 // missed.
 constexpr Index cell_px = 48;
 constexpr double endless = 1e300;
+constexpr double steepest_cosine = 0.17;  // a ray that counts may come to a facet that it grazes: its say is bounded
 
 class RayTerm : public Term {
  public:
@@ -29,6 +29,7 @@ class RayTerm : public Term {
         R_base_camera_(observation.R_base_camera),
         pose_(pose),
         camera_(camera),
+        least_cosine_(observation.least_cosine),
         bias_(bias),
         scatter_(scatter),
         rest_tree_(std::move(rest)),
@@ -91,12 +92,11 @@ class RayTerm : public Term {
           hint = hit->triangle;
           const Vec3 normal = face_normal(predicted.surface_m, hit->triangle);
           const double cosine = normal.dot(direction);
-          rows.facing(i) = std::abs(cosine);
-          if (chosen || std::abs(cosine) > grazing_cosine) {
+          rows.facing(i) = std::abs(cosine) / least_cosine_;
+          if (chosen || rows.facing(i) > 1) {
             triangle = hit->triangle;
             barycentric = hit->barycentric;
-            // A ray that counts may come to a facet that it grazes: its residual goes on without a jump, its say is bounded.
-            gradient = normal / std::copysign(std::max(std::abs(cosine), grazing_cosine), cosine);
+            gradient = normal / std::copysign(std::max(std::abs(cosine), steepest_cosine), cosine);
             residual_m = rays_.range_m(i) - bias_m - hit->range_m;
             lever = measured - residual_m * Vec3(rays_.directions.row(i));
             if (scatter_ >= 0) {
@@ -192,8 +192,8 @@ class RayTerm : public Term {
     const Vec3 normal = doubled / size;
     const double cosine = normal.dot(direction);
     Scattered out;
-    out.error = lens_.error(range_m, std::max(std::abs(cosine), grazing_cosine));
-    const bool grazes = std::abs(cosine) < grazing_cosine;
+    out.error = lens_.error(range_m, std::max(std::abs(cosine), steepest_cosine));
+    const bool grazes = std::abs(cosine) < steepest_cosine;
     const Vec3 turned = grazes ? Vec3(Vec3::Zero()) : Vec3(std::copysign(1 / size, cosine) * (direction - cosine * normal));
     out.cosine_per_corner[1] = e2.cross(turned);
     out.cosine_per_corner[2] = turned.cross(e1);
@@ -214,7 +214,9 @@ class RayTerm : public Term {
   RayCloud rays_;
   LensScatter lens_;
   Mat3 R_base_camera_;
-  int pose_, camera_, bias_, scatter_;
+  int pose_, camera_;
+  double least_cosine_;
+  int bias_, scatter_;
   Vec3 pivot_m_ = Vec3::Zero(), centre_m_;
   double typical_ = 0;
   std::shared_ptr<const geometry::TriangleTree> rest_tree_;

@@ -13,6 +13,7 @@
 #include "palpate/core/lens_scatter.hpp"
 #include "palpate/core/recording.hpp"
 #include "palpate/estimation/forward_model.hpp"
+#include "palpate/estimation/grazing.hpp"
 #include "palpate/estimation/unknowns.hpp"
 
 namespace palpate::estimation {
@@ -28,6 +29,7 @@ struct RayObservation {
   /// that carries the camera in the other, and the images tell which.
   std::string camera = {};
   Mat3 R_base_camera = Mat3::Identity();
+  double least_cosine = grazing_cosine;  ///< between ray and normal: below it a ray has no say
 };
 
 using TermInput = std::variant<RayObservation, PointCloud, Markers, ToolTravel, Wrench>;
@@ -40,7 +42,7 @@ enum RayChoice : char { passes_by = 0, counts_in = 1, grazes = 2 };
 struct TermView {
   bool along_rays = true;  ///< false while the surface may still be far away: closest points are used instead of rays
   /// A RayChoice each: rays that count, whatever they meet and how they graze it; the others are not asked about. nullptr: all that meet the
-  /// surface at less than 70 degrees (grazing.hpp)
+  /// surface at no steeper an angle than the term trusts
   const std::vector<char>* chosen = nullptr;
   bool surface_slopes = false;  ///< TermRows::surface is wanted, by terms that look at the surface
 };
@@ -60,7 +62,8 @@ struct TermRows {
   std::string unit = "1";     ///< of residual * sigma
   VectorX sigma;              ///< a row
   Points observed_m;          ///< at the fitted pose; empty for what is not a point
-  VectorX facing;             ///< |cosine| between ray and surface normal, 0 where the ray passes by; empty: not along rays
+  /// |cosine| between ray and surface normal over the least with which a ray counts, 0 where it passes by; empty: not along rays
+  VectorX facing;
   std::vector<SurfaceSlope> surface;  ///< a row; empty: not asked for, or not the term's way
   std::vector<int> cell;      ///< group of neighbours whose errors may be correlated (image or space cell); empty = independent
 };
