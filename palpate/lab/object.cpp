@@ -212,8 +212,8 @@ LabObject bear(const ObjectOptions& o) {
   LabObject object = shaped("bear", o, bear_body, {-0.12, -0.13, 0}, {0.12, 0.08, 0.22});
   object.description = "a sitting plush bear of 200 mm, " + standing(o);
   size_pushes(object, 0.015);
-  object.sites = {site(object, o, "head", {0, -0.004, 0.155}, -Vec3::UnitZ(), 0.45),
-                  site(object, o, "belly", {0, 0, 0.075}, {0, 0.866, -0.5}),
+  object.sites = {site(object, o, "head", {0, -0.004, 0.155}, -Vec3::UnitZ(), 0.7),
+                  site(object, o, "belly", {0, 0, 0.075}, {0, 0.866, -0.5}, 0.5),
                   site(object, o, "back", {0, 0.02, 0.08}, {0, -0.5, -0.866})};
   if (o.region_ratio != 1) {
     object.regions = {region(o, "head", o.region_ratio * object.young_modulus_pa, {{Vec3(-1, -1, 0.118), Vec3(1, 1, 1)}}),
