@@ -79,7 +79,8 @@ void take(Recording& recording, const fem::RefinedMesh& refined) {
 
 /// The object on a recording's finer volume; `object` gives everything else.
 FinerModel on_volume(Recording finer, const Recording& recording, const SimulatedObject& object) {
-  FinerModel out{std::move(finer), {}};
+  FinerModel out;
+  out.recording = std::move(finer);
   out.object.mesh = fem::to_quadratic(*out.recording.rest.volume);
   out.object.material = object.material;
   if (!object.region.empty()) {
@@ -120,20 +121,25 @@ std::optional<FinerModel> finer_model(const Recording& recording, const Simulate
       if (auto anew = filled(recording, object, fill_anew, share)) return anew;
     }
   }
+  if (lists_nodes(recording) || recording.rest.volume->tetrahedra.rows() > most_uniform) return finer_under_tools(recording, object);
   Recording finer = recording;
-  TetMesh& volume = *finer.rest.volume;
-  if (!lists_nodes(recording) && volume.tetrahedra.rows() <= most_uniform) {
-    volume = fem::refine_uniform(volume);
-  } else {
-    const auto contacts = round_contacts(recording);
-    if (contacts.empty()) return std::nullopt;
-    const Index node_limit = most_growth * static_cast<Index>(volume.nodes_m.rows());
-    for (const auto& [patch, force] : contacts) {
-      const double edge_m = longest_edge_near(*recording.rest.volume, patch.centre_m, 1.2 * patch.radius_m);
-      take(finer, fem::refine_near(volume, patch.centre_m, patch.radius_m, 0.5 * edge_m, 1.0, node_limit));
-    }
-  }
+  finer.rest.volume = fem::refine_uniform(*recording.rest.volume);
   return on_volume(std::move(finer), recording, object);
+}
+
+std::optional<FinerModel> finer_under_tools(const Recording& recording, const SimulatedObject& object) {
+  if (!may_be_finer(recording, object)) return std::nullopt;
+  const auto contacts = round_contacts(recording);
+  if (contacts.empty()) return std::nullopt;
+  Recording finer = recording;
+  const Index node_limit = most_growth * static_cast<Index>(recording.rest.volume->nodes_m.rows());
+  for (const auto& [patch, force] : contacts) {
+    const double edge_m = longest_edge_near(*recording.rest.volume, patch.centre_m, 1.2 * patch.radius_m);
+    take(finer, fem::refine_near(*finer.rest.volume, patch.centre_m, patch.radius_m, 0.5 * edge_m, 1.0, node_limit));
+  }
+  FinerModel out = on_volume(std::move(finer), recording, object);
+  out.everywhere = false;
+  return out;
 }
 
 std::optional<FinerModel> refined_within(const Recording& recording, const SimulatedObject& object, double tolerance,
@@ -161,16 +167,19 @@ std::optional<FinerModel> refined_within(const Recording& recording, const Simul
     take(finer, chosen.linear);
     changed = true;
   }
-  if (!changed && fill_anew && !lists_nodes(recording)) {
+  if (changed) {
+    FinerModel out = on_volume(std::move(finer), recording, object);
+    out.everywhere = false;
+    return out;
+  }
+  if (fill_anew && !lists_nodes(recording)) {
     auto better = filled(recording, object, fill_anew, 2.0 / 3);
     if (better && better->recording.rest.volume->nodes_m.rows() > most_corners) return std::nullopt;
     return better;
   }
-  if (!changed) {
-    if (lists_nodes(recording) || recording.rest.volume->tetrahedra.rows() > most_uniform) return std::nullopt;
-    finer.rest.volume = fem::refine_uniform(*recording.rest.volume);
-    if (finer.rest.volume->nodes_m.rows() > most_corners) return std::nullopt;
-  }
+  if (lists_nodes(recording) || recording.rest.volume->tetrahedra.rows() > most_uniform) return std::nullopt;
+  finer.rest.volume = fem::refine_uniform(*recording.rest.volume);
+  if (finer.rest.volume->nodes_m.rows() > most_corners) return std::nullopt;
   return on_volume(std::move(finer), recording, object);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "palpate/core/recording.hpp"
+#include "palpate/estimation/answer_shift.hpp"
 #include "palpate/estimation/forward_model.hpp"
 
 namespace palpate::estimation {
@@ -16,6 +17,8 @@ struct FinerModel {
   Recording recording;
   SimulatedObject object;
   double edge_share = 0.5;  ///< its edges, of those of the mesh that it is finer than
+  bool everywhere = true;   ///< false: under round tools only
+  AnswerShift elsewhere;    ///< if not: what is known of the error that the mesh makes elsewhere
 };
 
 /// The object's volume filled anew from its surface, and its supports with the tolerance that this mesh's nodes need.
@@ -33,6 +36,10 @@ using FillAnew = std::function<Filled(const Recording&, double edge_share)>;
 ///                   that takes no more than some 24 000 tetrahedra
 /// @returns nothing where the volume is not linear, or there is neither
 std::optional<FinerModel> finer_model(const Recording& recording, const SimulatedObject& object, const FillAnew& fill_anew = {});
+
+/// The second alone: halves every edge under round tools.
+/// @returns nothing where the volume is not linear, or no tool is round
+std::optional<FinerModel> finer_under_tools(const Recording& recording, const SimulatedObject& object);
 
 /// A mesh for a fit whose own error in E was too large: under every round tool as fine as fem::discretise asks for at this
 /// tolerance. Where all of them were fine enough already, the error is made elsewhere: then every edge is halved, as

@@ -41,15 +41,15 @@ std::vector<Parameter> young_of_parts(const std::vector<PartialYoung>& parts) {
   return out;
 }
 
+/// Of log E of every region.
 /// @param covariance  of the unknowns `moving`, log E first
-std::vector<YoungDoubt> young_doubts(const AnswerShift& mesh, const MatrixX& covariance, const std::vector<int>& moving,
-                                     Index ratios) {
-  std::vector<YoungDoubt> out;
+std::vector<double> young_stds(const MatrixX& covariance, const std::vector<int>& moving, Index ratios) {
+  std::vector<double> out;
   for (Index r = 0; r <= ratios; ++r) {
     VectorX sum = VectorX::Unit(covariance.rows(), 0);  // a region's log E: that of the first one and a ratio's
     const auto ratio = std::find(moving.begin(), moving.end(), first_ratio + r - 1);
     if (r > 0 && ratio != moving.end()) sum(static_cast<Index>(ratio - moving.begin())) = 1;
-    out.push_back({std::abs(mesh.of_region(r).log_young), std::sqrt(sum.dot(covariance * sum))});
+    out.push_back(std::sqrt(sum.dot(covariance * sum)));
   }
   return out;
 }
@@ -204,8 +204,8 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     next.poisson_start = optimum.unknowns(poisson);
     next.start_is_answer = true;
     if (options.take_finer) {
-      next.take_finer = [&](const std::vector<YoungDoubt>& doubts) -> const FinerMesh* {
-        const FinerMesh* better = options.take_finer(doubts);
+      next.take_finer = [&](const MeshDoubt& found) -> const FinerMesh* {
+        const FinerMesh* better = options.take_finer(found);
         if (better == nullptr) return nullptr;
         taken.push_back({pushed_there(better->mesh), pushed_there(better->finer)});
         return &taken.back();
@@ -266,12 +266,17 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   std::optional<AnswerShift> mesh;
   int load_cases_of_meshes = 0;
   while (finer != nullptr && optimum.termination == Termination::converged) {
-    mesh = mesh_shift(meshed ? meshed->recording : recording, meshed ? meshed->object : object, objective, optimum, loss,
-                      *finer, options, progress, memory != nullptr ? &memory->finer : nullptr);
-    if (!mesh) break;
-    load_cases_of_meshes += mesh->load_cases;
+    const auto shown_by = [&](const FinerModel& by, std::shared_ptr<ForwardModel::Solved>* solved) {
+      auto shift = mesh_shift(meshed ? meshed->recording : recording, meshed ? meshed->object : object, objective, optimum, loss,
+                              by, options, progress, solved);
+      if (shift) load_cases_of_meshes += shift->load_cases;
+      return shift;
+    };
+    mesh = shown_by(*finer, memory != nullptr ? &memory->finer : nullptr);
+    if (!mesh || !options.take_finer) break;
     const FinerMesh* better =
-        options.take_finer ? options.take_finer(young_doubts(*mesh, covariance, moving, unknowns.ratio_count())) : nullptr;
+        options.take_finer({*mesh, young_stds(covariance, moving, unknowns.ratio_count()),
+                            [&](const FinerModel& by) { return shown_by(by, nullptr); }});
     if (better == nullptr) break;
     bool corrected = MeshCorrection::applies_to(model);
     if (corrected) {

@@ -12,6 +12,7 @@
 #include "palpate/core/identification.hpp"
 #include "palpate/core/progress.hpp"
 #include "palpate/core/recording.hpp"
+#include "palpate/estimation/answer_shift.hpp"
 #include "palpate/estimation/objective.hpp"
 
 namespace palpate::estimation {
@@ -28,10 +29,12 @@ struct FinerMesh {
   const FinerModel* finer = nullptr;  ///< nullptr: there is none
 };
 
-/// Of a region's E, as shares of it.
-struct YoungDoubt {
-  double by_mesh = 0;
-  double by_all_else = 0;  ///< one standard deviation
+/// What a fit knows of its mesh once it has found its optimum.
+struct MeshDoubt {
+  AnswerShift shift;              ///< that it causes, as the finer one shows it
+  std::vector<double> young_std;  ///< what all else leaves unknown of E, as a share of it: a region each
+  /// The same as another mesh shows it, of the one that was fitted with; nothing when the caller asked to stop.
+  std::function<std::optional<AnswerShift>(const FinerModel&)> shown_by;
 };
 
 struct FitOptions {
@@ -47,7 +50,7 @@ struct FitOptions {
   /// Asked once it is known what the mesh does to E and what all else leaves unknown of it (a region each): a mesh that is
   /// fine enough, or nullptr. The fit goes on with it where it can (MeshCorrection); else it ends at its optimum, without
   /// intervals (no covariance), and the caller fits again on that mesh.
-  std::function<const FinerMesh*(const std::vector<YoungDoubt>&)> take_finer;
+  std::function<const FinerMesh*(const MeshDoubt&)> take_finer;
 };
 
 struct ShapeDoubt;

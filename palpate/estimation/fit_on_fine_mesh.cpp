@@ -2,6 +2,7 @@
 #include "palpate/estimation/fit_on_fine_mesh.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iomanip>
 #include <list>
 #include <optional>
@@ -26,13 +27,61 @@ std::string mesh_words(const SimulatedObject& object) {
          ", " + std::to_string(object.mesh.nodes_m.rows()) + " nodes";
 }
 
+struct Excess {
+  double young = 0;  // share of E
+  double share = 0;  // of what is borne
+};
+
+/// Of what a mesh does to E, in the region that bears it least.
+Excess most_excess(const MeshDoubt& found, const AnswerShift& by_mesh, double tolerance) {
+  constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
+  Excess most;
+  for (std::size_t r = 0; r < found.young_std.size(); ++r) {
+    const double young = std::abs(by_mesh.of_region(static_cast<Index>(r)).log_young);
+    const double share = young / std::max(tolerance, hardly * found.young_std[r]);
+    if (share > most.share) most = {young, share};
+  }
+  return most;
+}
+
+struct BetterMesh {
+  FinerModel mesh;
+  std::optional<FinerModel> finer;
+};
+
+/// @param shows  what the mesh of `at` and `on` does to the answer
+/// @returns nothing where there is none, or the caller asked to stop
+std::optional<BetterMesh> better_mesh(const Recording& at, const SimulatedObject& on, const FinerModel& shows,
+                                      const MeshDoubt& found, double tolerance, const FillAnew& fill_anew) {
+  constexpr Index most_nodes = 40000;  // of a mesh that is fitted with
+  AnswerShift elsewhere = shows.elsewhere;
+  if (const auto under_tools = shows.everywhere ? finer_under_tools(at, on) : std::nullopt) {
+    const auto there = found.shown_by(*under_tools);
+    if (!there) return std::nullopt;
+    elsewhere = found.shift.plus(there->times(-1));
+    // Too much would be left after refining under the tools, and the mesh that showed the error is at hand.
+    if (most_excess(found, elsewhere, tolerance).share > 0.8 && shows.object.mesh.nodes_m.rows() <= most_nodes) {
+      auto finer = finer_under_tools(shows.recording, shows.object);
+      if (finer) finer->elsewhere = elsewhere.times(std::pow(shows.edge_share, mesh_order));
+      return BetterMesh{shows, std::move(finer)};
+    }
+  }
+  auto better = refined_within(at, on, tolerance, fill_anew);
+  if (!better) return std::nullopt;
+  // A mesh that is filled anew would lose what was refined under the tools.
+  auto finer = better->everywhere || !fill_anew ? finer_model(better->recording, better->object, fill_anew)
+                                                : finer_under_tools(better->recording, better->object);
+  if (finer && !finer->everywhere)
+    finer->elsewhere = elsewhere.times(better->everywhere ? std::pow(better->edge_share, mesh_order) : 1);
+  return BetterMesh{std::move(*better), std::move(finer)};
+}
+
 }  // namespace
 
 Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
                                 const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
                                 const OnProgress& progress, const FillAnew& fill_anew) {
   constexpr int most_refinements = 3;
-  constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
   const auto percent = [](double share) {
     std::ostringstream text;
     text << std::setprecision(2) << 100 * share << " %";
@@ -40,40 +89,37 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
   };
   FitOptions fit_options = options;
   std::string history;
+  std::optional<FinerModel> finer;
+  if (recording.model.refine == "auto") finer = finer_model(recording, object, fill_anew);
   for (int refinements = 0;;) {
-    std::optional<FinerModel> finer;
-    if (recording.model.refine == "auto") finer = finer_model(recording, object, fill_anew);
-    struct Taken {
-      std::optional<FinerModel> mesh, finer;
+    struct Taken : BetterMesh {
       FinerMesh both;
     };
     std::list<Taken> taken;
     bool too_coarse = false;
-    fit_options.take_finer = [&](const std::vector<YoungDoubt>& doubts) -> const FinerMesh* {
-      const auto most = std::max_element(doubts.begin(), doubts.end(), [&](const YoungDoubt& a, const YoungDoubt& b) {
-        const auto over = [&](const YoungDoubt& d) { return d.by_mesh / std::max(mesh_tolerance, hardly * d.by_all_else); };
-        return over(a) < over(b);
-      });
-      const double error = most->by_mesh;
-      too_coarse = error > std::max(mesh_tolerance, hardly * most->by_all_else);
+    fit_options.take_finer = [&](const MeshDoubt& found) -> const FinerMesh* {
+      const Excess excess = most_excess(found, found.shift, mesh_tolerance);
+      too_coarse = excess.share > 1;
       if (!too_coarse || refinements == most_refinements) return nullptr;
-      const Recording& at = taken.empty() ? recording : taken.back().mesh->recording;
-      const SimulatedObject& on = taken.empty() ? object : taken.back().mesh->object;
-      std::optional<FinerModel> better = refined_within(at, on, mesh_tolerance, fill_anew);
-      if (!better) return nullptr;
+      const FinerModel& shows = taken.empty() ? *finer : *taken.back().finer;
+      const Recording& at = taken.empty() ? recording : taken.back().mesh.recording;
+      const SimulatedObject& on = taken.empty() ? object : taken.back().mesh.object;
+      auto next = better_mesh(at, on, shows, found, mesh_tolerance, fill_anew);
+      if (!next) return nullptr;
       ++refinements;
-      history += mesh_words(on) + ": " + percent(error) + " of E; ";
+      history += mesh_words(on) + ": " + percent(excess.young) + " of E; ";
       Taken& now = taken.emplace_back();
-      now.mesh = std::move(better);
-      now.finer = finer_model(now.mesh->recording, now.mesh->object, fill_anew);
-      now.both = {&*now.mesh, now.finer ? &*now.finer : nullptr};
+      now.mesh = std::move(next->mesh);
+      now.finer = std::move(next->finer);
+      now.both = {&now.mesh, now.finer ? &*now.finer : nullptr};
       return &now.both;
     };
     Identification answer =
         fit(recording, object, observed, fit_options, progress, finer ? &*finer : nullptr, nullptr, doubt);
     if (!taken.empty()) {
-      recording = std::move(taken.back().mesh->recording);
-      object = std::move(taken.back().mesh->object);
+      recording = std::move(taken.back().mesh.recording);
+      object = std::move(taken.back().mesh.object);
+      finer = std::move(taken.back().finer);
     }
     if (!taken.empty() && answer.covariance.size() == 0 && answer.termination == Termination::converged) {
       fit_options.young_start_pa = answer.parameters[0].value;

@@ -10,13 +10,6 @@
 #include "palpate/fem/materials.hpp"
 
 namespace palpate::estimation {
-namespace {
-
-// In the edges' length: jumps of the load at a pad's rim and the facets of an outline leave its square, held edges a little less.
-constexpr double order = 2;
-
-}  // namespace
-
 std::optional<AnswerShift> mesh_shift(const Recording& recording, const SimulatedObject& object, const Objective& objective,
                                       const Optimum& optimum, const Loss& loss, const FinerModel& finer,
                                       const FitOptions& options, const OnProgress& progress,
@@ -79,7 +72,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
                              .ldlt()
                              .solve(VectorX(before.gradient(moving)) - VectorX(after.gradient(moving)));
   if (!change.allFinite()) return std::nullopt;
-  const double whole = 1 / (1 - std::pow(finer.edge_share, order));
+  const double whole = 1 / (1 - std::pow(finer.edge_share, mesh_order));
   AnswerShift shift;
   shift.load_cases = load_cases;
   shift.region_log_young = VectorX::Zero(objective.unknowns().ratio_count());
@@ -91,7 +84,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
       shift.region_log_young(moving[k] - first_ratio) = moved;
   }
   shift.region_log_young.array() += shift.log_young;
-  return shift;
+  return shift.plus(finer.elsewhere);
 }
 
 void move(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper) {

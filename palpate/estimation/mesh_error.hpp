@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "palpate/estimation/answer_shift.hpp"
 #include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/optimise.hpp"
@@ -11,19 +12,13 @@
 
 namespace palpate::estimation {
 
-/// Change of an answer.
-struct AnswerShift {
-  double log_young = 0, poisson = 0;
-  VectorX region_log_young;  ///< of further regions
-  int load_cases = 0;        ///< that were solved to find it
-  AnswerShift of_region(Index region) const { return {region == 0 ? log_young : region_log_young(region - 1), poisson, {}, 0}; }
-  AnswerShift times(double share) const { return {share * log_young, share * poisson, share * region_log_young, load_cases}; }
-};
+/// A mesh's error falls with this power of its edges: jumps of the load at a pad's rim and the facets of an outline leave their
+/// square, held edges a little less (docs/uncertainty.md).
+inline constexpr double mesh_order = 2;
 
 /// What the change of the simulated surfaces and travels between the two meshes does to the optimum: one step of Gauss and
 /// Newton. Small strains are used for the change, one factorisation each. Where the error falls with the power p of the edge
-/// length, the coarse mesh is off by the change over 1 - r^p, r the ratio of the edges; p = 2 is what jumps of the load
-/// at a pad's rim and the facets of an outline leave; held edges leave a little less (docs/uncertainty.md).
+/// length, the coarse mesh is off by the change over 1 - r^p, r the ratio of the edges. What `finer` knows of elsewhere is added.
 /// The objective's last evaluation must be the optimum's.
 /// @param object  on the mesh that its answers are those of, with the recording that names its nodes
 /// @param solved  nullptr: the finer mesh is solved for at the optimum's nu. Else what is used and filled: a linear object is

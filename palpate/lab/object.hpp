@@ -39,7 +39,7 @@ struct ObjectOptions {
   double friction_coefficient = 0.6;                 ///< with ContactLaw::friction
   /// An upright wall behind the object, at its outermost points along x; a site more pushes towards it.
   bool wall = false;
-  Index tetrahedra = 8000;                           ///< of the true mesh
+  Index tetrahedra = 20000;                          ///< of the true mesh; a block's feet ask for more
   int cells_in_radius = 5;                           ///< edges across the pad's radius
 };
 

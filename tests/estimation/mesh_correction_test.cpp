@@ -70,9 +70,9 @@ TEST_F(MeshCorrections, LeadToTheAnswerOfTheFinerMesh) {
   const Identification on_fine = fit(finer->recording, finer->object, inputs, options);
   const FinerMesh mesh{&*finer, nullptr};
   int asked = 0;
-  options.take_finer = [&](const std::vector<YoungDoubt>& doubts) {
-    EXPECT_EQ(doubts.size(), 1u);
-    const auto [mesh_error, young_std] = doubts[0];
+  options.take_finer = [&](const MeshDoubt& doubt) {
+    EXPECT_EQ(doubt.young_std.size(), 1u);
+    const double mesh_error = std::abs(doubt.shift.log_young), young_std = doubt.young_std[0];
     EXPECT_GT(mesh_error, 0.2 * std::abs(std::log(on_coarse.parameters[0].value / on_fine.parameters[0].value)));
     EXPECT_NEAR(young_std, on_coarse.parameters[0].std / on_coarse.parameters[0].value, 0.1 * young_std);
     return asked++ == 0 ? &mesh : nullptr;
