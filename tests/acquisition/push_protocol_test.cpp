@@ -25,10 +25,12 @@ struct SpringRobot : Robot {
   Pose tip = Pose(Eigen::Translation3d(0, 0, 0.3));
   bool stopped = false;
   int errs_after_touch = 0;  // motions that end 2 mm short, from the first after the first touch on
+  double repeat_std_m = 0;   // every motion ends this far from where the encoders say
+  double unseen_m = 0;       // the last one's error, deeper
   int images = 0;
   std::mt19937 generator{7};
 
-  double depth() const { return surface_m - tip.translation().z(); }
+  double depth() const { return surface_m - tip.translation().z() + unseen_m; }
   double spring() const {
     if (depth() <= 0 || depth() > loses_at_m) return 0;
     return stiffness_n_m * depth() * (depth() > yields_at_m ? 0.5 : 1.0);
@@ -51,6 +53,7 @@ struct SpringRobot : Robot {
     const bool errs = before > 0 && errs_after_touch > 0;
     clock_s += (pose.translation() - tip.translation()).norm() / speed_m_s;
     tip = pose;
+    if (repeat_std_m > 0) unseen_m = std::normal_distribution<double>(0, repeat_std_m)(generator);
     if (errs) {
       tip.translation().z() += 0.002;
       --errs_after_touch;
@@ -104,6 +107,30 @@ Result run(SpringRobot& robot, const PushOptions& o = options(), const std::func
       },
       keep_going, so_far);
   return result;
+}
+
+// Which motion crosses the target is decided by what the encoders do not see of it: its own travel would read too little,
+// by 0.13 mm here.
+TEST(PushProtocol, StepsAreNotPickedForTheErrorOfTheirTravel) {
+  double in_sum = 0, out_sum = 0;
+  int in_count = 0, out_count = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    SpringRobot robot;
+    robot.repeat_std_m = 3e-4;
+    robot.generator.seed(seed);
+    PushOptions o = options();
+    o.force_step_n = 1;
+    o.travel_limit_m = 0.02;
+    run_push(robot, plan(), o, [&](const Push&, const Step& step) {
+      if (step.loads.empty() || robot.depth() > 0.018) return;  // the deepest is chosen by the encoders
+      (step.unloading ? out_sum : in_sum) += robot.unseen_m;
+      ++(step.unloading ? out_count : in_count);
+    });
+  }
+  EXPECT_GT(in_count, 600);
+  EXPECT_GT(out_count, 300);
+  EXPECT_NEAR(in_sum / in_count, 0, 4 * 3e-4 / std::sqrt(in_count));
+  EXPECT_NEAR(out_sum / out_count, 0, 4 * 3e-4 / std::sqrt(out_count));
 }
 
 double force(const Step& step) { return step.loads.empty() ? 0 : -step.loads[0].force_n->z(); }
