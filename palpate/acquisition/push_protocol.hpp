@@ -27,7 +27,7 @@ Mat3 tip_along(const Vec3& direction);
 struct PushOptions {
   double force_limit_n = 50.0;      ///< the paper's
   double travel_limit_m = 0.10;     ///< the paper's
-  double force_step_n = 2.0;        ///< between recorded steps
+  double force_step_n = 2.0;        ///< between recorded steps; each is recorded an increment after its force was reached
   int unloading_steps = 2;          ///< recorded on the way back, equally spaced in force
   double start_distance_m = 0.05;   ///< before the expected contact: where the approach starts and the push ends
   double search_distance_m = 0.03;  ///< beyond it: how far to look for contact
