@@ -110,7 +110,7 @@ Result run(SpringRobot& robot, const PushOptions& o = options(), const std::func
 }
 
 // Which motion crosses the target is decided by what the encoders do not see of it: its own travel would read too little,
-// by 0.13 mm here.
+// by 0.17 mm here.
 TEST(PushProtocol, StepsAreNotPickedForTheErrorOfTheirTravel) {
   double in_sum = 0, out_sum = 0;
   int in_count = 0, out_count = 0;
