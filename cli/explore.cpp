@@ -43,12 +43,18 @@ nlohmann::json json_of(const ExploredPush& push) {
           {"stop", acquisition::to_words(push.report.stop)},
           {"highest_force_n", push.report.highest_force_n},
           {"deepest_m", push.report.deepest_m},
+          {"pushes_planned", push.pushes_planned > 0 ? nlohmann::json(push.pushes_planned) : nlohmann::json()},
           {"promised", spread_json(push.plan.expected)},
           {"found", spread_json(push.found)},
           {"young_modulus_pa", push.young_modulus.value},
           {"young_modulus_within_95", young_modulus_half_width(push.young_modulus)},
           {"poisson_ratio", push.poisson_ratio.value},
           {"poisson_ratio_within_95", poisson_ratio_half_width(push.poisson_ratio)}};
+}
+
+std::string plans_of(const ExploredPush& push) {
+  if (push.pushes_planned == 0) return "";
+  return push.pushes_planned == 1 ? "; planned as the last one" : fmt::format("; planned with {} more", push.pushes_planned - 1);
 }
 
 /// One whole loop; in the lab, on an object of its own. `writer` and `truth` only where it is recorded, `live` where it may be watched.
@@ -80,11 +86,11 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
     const Vec3 &at = push.plan.candidate.contact_m, &along = push.plan.candidate.direction;
     session.say(fmt::format(
         "{}{} at ({:.3f} {:.3f} {:.3f}) along ({:+.2f} {:+.2f} {:+.2f}): E {} within {:.1f} % (promised {}), nu {:.3f} "
-        "within {:.3f} (promised {})",
+        "within {:.3f} (promised {}){}",
         first ? "" : "  ", push.name, at.x(), at.y(), at.z(), along.x(), along.y(), along.z(),
         report::quantity(push.young_modulus.value, "Pa"), 100 * young_modulus_half_width(push.young_modulus),
         percent_95(push.plan.expected.log_young_std), push.poisson_ratio.value, poisson_ratio_half_width(push.poisson_ratio),
-        plain_95(push.plan.expected.poisson_std)));
+        plain_95(push.plan.expected.poisson_std), plans_of(push)));
   };
   hooks.keep_going = [] { return !Session::interrupted(); };
   hooks.on_progress = session.progress();

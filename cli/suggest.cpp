@@ -16,6 +16,7 @@
 #include "cli/push_words.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/target_plan.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/report/words.hpp"
 
@@ -30,7 +31,10 @@ struct Options {
   SuggestOptions suggest;
   std::vector<double> contact, direction;
   int show = 10, then = 3;
+  std::optional<double> young_modulus_within, poisson_ratio_within;
 };
+
+constexpr int longest_plan = 30;
 
 struct Known {
   Recording recording;
@@ -76,6 +80,32 @@ nlohmann::json json_of(const estimation::RatedPush& push, const PushScene& scene
       {"view", push.view < 0 ? nlohmann::json() : nlohmann::json(scene.viewpoints[std::size_t(push.view)].name)},
       {"expected", spread_json(push.expected)}};
   return json;
+}
+
+/// The fewest pushes that make the intervals as narrow as was asked for, as indices of the ranking.
+std::vector<std::size_t> pushes_to_target(const Options& given, const estimation::PushRanking& ranking, Session& session,
+                                          nlohmann::json& json) {
+  constexpr double any = 1e6;
+  const estimation::SpreadTarget target{given.young_modulus_within.value_or(any), given.poisson_ratio_within.value_or(any)};
+  json["target_reached"] = true;
+  if (target.miss(ranking.so_far) <= 1) {
+    session.say("the intervals are as narrow as was asked for already");
+    return {};
+  }
+  const auto hardest = estimation::hardest_pushes(ranking);
+  std::vector<estimation::RatedPush> pushes;
+  for (const std::size_t i : hardest) pushes.push_back(ranking.pushes[i]);
+  estimation::TargetPlan plan = estimation::plan_for_target(ranking.knowledge, pushes, target, longest_plan);
+  for (std::size_t& push : plan.order) push = hardest[push];
+  json["target_reached"] = plan.reached;
+  if (plan.reached) return plan.order;
+  const std::string why =
+      fmt::format("{} pushes come to E within {} and nu within {}, which is not as narrow as was asked for: no push takes away "
+                  "what is not known of the force's scale, the mesh and the unseen side (`palpate estimate --budget`)",
+                  longest_plan, percent_95(plan.expected.log_young_std), plain_95(plan.expected.poisson_std));
+  session.warn(why);
+  json["warnings"].push_back(why);
+  return {};
 }
 
 int run(const Options& given, Session& session) {
@@ -152,15 +182,19 @@ int run(const Options& given, Session& session) {
     json["views"].push_back(one);
   }
   std::vector<const estimation::RatedPush*> made;
-  const auto order = estimation::plan_sequence(ranking, given.then);
+  const bool with_target = given.young_modulus_within || given.poisson_ratio_within;
+  const auto order =
+      with_target ? pushes_to_target(given, ranking, session, json) : estimation::plan_sequence(ranking, given.then);
   if (order.size() > 1) session.say("one after another:");
   for (std::size_t n = 0; n < order.size(); ++n) {
-    made.push_back(&ranking.pushes[order[n]]);
+    const estimation::RatedPush& push = ranking.pushes[order[n]];
+    made.push_back(&push);
     const auto after = estimation::expected_after(knowledge, made);
     json["sequence"].push_back({{"push", order[n]}, {"expected", spread_json(after)}});
-    if (order.size() > 1)
-      session.say(fmt::format("  {} push{}: no {}, then E within {}, nu within {}", n + 1, n == 0 ? "  " : "es",
-                              order[n] + 1, percent_95(after.log_young_std), plain_95(after.poisson_std)));
+    if (order.size() > 1 || with_target)
+      session.say(fmt::format("  {} push{}: no {}{}, then E within {}, nu within {}", n + 1, n == 0 ? "  " : "es", order[n] + 1,
+                              order[n] < std::size_t(given.show) ? "" : " (" + push_words(push, scene) + ")",
+                              percent_95(after.log_young_std), plain_95(after.poisson_std)));
   }
   session.result(json);
   return exit_done;
@@ -211,6 +245,11 @@ Run verbs::suggest(CLI::App& app) {
   app.add_option("--views", given->suggest.viewpoints, "further places of the camera that are compared, around the object")
       ->check(CLI::Range(0, 24));
   app.add_option("--show", given->show, "rows of the table")->check(positive_number())->capture_default_str();
+  app.add_option("--young-modulus-within", given->young_modulus_within,
+                 "plan the fewest pushes until half of the 95 % interval over E is no wider than this, instead of --then")
+      ->check(positive_number());
+  app.add_option("--poisson-ratio-within", given->poisson_ratio_within, "the same for half of the interval of nu")
+      ->check(positive_number());
   app.add_option("--then", given->then, "pushes that are planned one after another")
       ->check(CLI::Range(0, 20))
       ->capture_default_str();

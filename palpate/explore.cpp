@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/target_plan.hpp"
 
 namespace palpate {
 namespace {
@@ -18,21 +19,6 @@ const Parameter& parameter(const Identification& answer, const std::string& name
   for (const auto& one : answer.parameters)
     if (one.name == name && one.region.empty()) return one;
   throw Error("holds no " + name, "Identification.parameters");
-}
-
-/// Hardest push of every candidate of a ranking, best first: how hard to push is limited, not chosen, once a push is made.
-std::vector<RatedPush> hardest(const PushRanking& ranking) {
-  std::vector<RatedPush> pushes;
-  for (const auto& push : ranking.pushes) {
-    const auto same = std::find_if(pushes.begin(), pushes.end(), [&](const RatedPush& known) {
-      return known.candidate.contact_m == push.candidate.contact_m && known.candidate.direction == push.candidate.direction;
-    });
-    if (same == pushes.end())
-      pushes.push_back(push);
-    else if (push.steps > same->steps)
-      *same = push;
-  }
-  return pushes;
 }
 
 class Loop {
@@ -52,12 +38,14 @@ class Loop {
       if (made >= static_cast<std::size_t>(options_.max_pushes)) return end("all pushes are used up");
       const Identification* so_far = out_.pushes.empty() ? nullptr : &out_.identified.answer;
       const PushRanking ranking = suggest(out_.scene, so_far, options_.suggest, hooks_.on_progress);
-      std::vector<RatedPush> pushes = hardest(ranking);
+      std::vector<RatedPush> pushes;
+      for (const std::size_t i : estimation::hardest_pushes(ranking)) pushes.push_back(ranking.pushes[i]);
       if (pushes.empty()) return end("no push is possible in view of the camera");
       ExploredPush next;
-      next.plan = pushes.front();
-      if (options_.order != PushOrder::next_best) {
-        if (fixed_order.empty()) fixed_order = order_of(pushes);
+      if (options_.order == PushOrder::next_best) {
+        choose(next, ranking, pushes, options_.max_pushes - static_cast<int>(made));
+      } else {
+        if (fixed_order.empty()) fixed_order = order_of(ranking.knowledge, pushes);
         next.plan = again(pushes, fixed_order[made % fixed_order.size()]);
       }
       push(next, so_far != nullptr);
@@ -110,8 +98,21 @@ class Loop {
     return std::max(1e-4, std::sqrt(variance.mean()));
   }
 
-  std::vector<RatedPush> order_of(std::vector<RatedPush> pushes) const {
-    if (options_.order == PushOrder::best_repeated) return {pushes.front()};
+  estimation::SpreadTarget target() const { return {options_.young_modulus_within, options_.poisson_ratio_within}; }
+
+  void choose(ExploredPush& next, const PushRanking& ranking, const std::vector<RatedPush>& pushes, int most) const {
+    next.plan = pushes.front();
+    if (options_.suggest.goal != estimation::PushGoal::both) return;
+    const auto plan = estimation::plan_for_target(ranking.knowledge, pushes, target(), most);
+    next.plan = pushes[plan.order.front()];
+    if (plan.reached) next.pushes_planned = static_cast<int>(plan.order.size());
+  }
+
+  std::vector<RatedPush> order_of(const estimation::Knowledge& knowledge, std::vector<RatedPush> pushes) const {
+    if (options_.order == PushOrder::best_repeated) {
+      const auto plan = estimation::repeat_for_target(knowledge, pushes, target(), 10 * options_.max_pushes);
+      return {plan.reached ? pushes[plan.order.front()] : pushes.front()};
+    }
     std::mt19937_64 random(options_.seed);
     for (std::size_t i = pushes.size(); i > 1; --i) std::swap(pushes[i - 1], pushes[random() % i]);
     return pushes;

@@ -16,9 +16,9 @@ namespace palpate {
 
 /// Which of the candidates comes next. All but `next_best` are there to be compared with.
 enum class PushOrder {
-  next_best,     ///< ranked anew after each estimate
+  next_best,     ///< the first of the fewest pushes that are expected to reach the goal, planned anew after each estimate
   random,        ///< a seeded order over the same candidates
-  best_repeated  ///< the one that is best before the first touch, again and again
+  best_repeated  ///< the one that is expected to need the fewest repetitions before the first touch, again and again
 };
 
 struct ExploreOptions {
@@ -27,7 +27,9 @@ struct ExploreOptions {
   int max_pushes = 8;
   PushOrder order = PushOrder::next_best;
   std::uint64_t seed = 1;         ///< of the random order
-  SuggestOptions suggest;         ///< goal, limits, candidates; its cameras and sensors are the robot's
+  /// Limits, candidates; its cameras and sensors are the robot's. With a goal other than `both`, the next push is the best
+  /// for that parameter, whatever the other needs.
+  SuggestOptions suggest;
   int levels = 4;                 ///< force steps of a push
   double touch_travel_m = 0.002;  ///< of the trial touch that sizes the first push's steps; it is not recorded
   acquisition::PushOptions push;  ///< limits of force and travel are the lower of these and the plan's
@@ -41,6 +43,7 @@ void check(const ExploreOptions& options);
 struct ExploredPush {
   std::string name;
   estimation::RatedPush plan;  ///< `expected` is what was promised for after it
+  int pushes_planned = 0;      ///< from this one on, until the goal; 0: not within max_pushes, or not planned
   acquisition::PushReport report;
   Parameter young_modulus, poisson_ratio;  ///< estimated from all pushes so far
   estimation::ExpectedSpread found;        ///< standard deviations of that estimate

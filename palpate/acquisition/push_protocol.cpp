@@ -196,6 +196,8 @@ class PushRun {
   }
 
   void settle_and_record(bool unloading) {
+    if (recorded_at_m_ == at_m_) return;  // nothing moved since: it would be the same step once more
+    recorded_at_m_ = at_m_;
     std::vector<sensing::ContactSample> samples;
     const double start = robot_.read().time_s;
     sensing::Settling state;
@@ -339,6 +341,7 @@ class PushRun {
   bool loaded_ = false;       // a step under load is recorded
   bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
   double at_m_ = 0;  // commanded, along the push from the expected contact
+  std::optional<double> recorded_at_m_;  // of the last loaded step
   int next_index_ = 0;
   double recorded_force_n_ = 0, recorded_travel_m_ = 0;
   bool recorded_rest_ = false, recorded_unloading_ = false, recorded_again_ = false;

@@ -137,6 +137,22 @@ PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, c
   return ranking;
 }
 
+std::vector<std::size_t> hardest_pushes(const PushRanking& ranking) {
+  std::vector<std::size_t> hardest;
+  for (std::size_t i = 0; i < ranking.pushes.size(); ++i) {
+    const RatedPush& push = ranking.pushes[i];
+    const auto same = std::find_if(hardest.begin(), hardest.end(), [&](std::size_t known) {
+      const PushCandidate& at = ranking.pushes[known].candidate;
+      return at.contact_m == push.candidate.contact_m && at.direction == push.candidate.direction;
+    });
+    if (same == hardest.end())
+      hardest.push_back(i);
+    else if (push.steps > ranking.pushes[*same].steps)
+      *same = i;
+  }
+  return hardest;
+}
+
 std::vector<std::size_t> plan_sequence(const PushRanking& ranking, int count) {
   std::vector<std::size_t> order;
   std::vector<const RatedPush*> made;

@@ -93,6 +93,10 @@ PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, c
 /// What is expected after these pushes on top of what is known.
 ExpectedSpread expected_after(const Knowledge& knowledge, const std::vector<const RatedPush*>& pushes);
 
+/// Indices into ranking.pushes: of every place and direction the hardest push, best first. How hard to push is limited, not
+/// chosen, once a push is made.
+std::vector<std::size_t> hardest_pushes(const PushRanking& ranking);
+
 /// Indices into ranking.pushes, each the best after those before it; the same push may come twice.
 std::vector<std::size_t> plan_sequence(const PushRanking& ranking, int count);
 

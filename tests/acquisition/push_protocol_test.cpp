@@ -20,6 +20,7 @@ struct SpringRobot : Robot {
   double stiffness_n_m = 400, surface_m = 0.1, noise_n = 0.02;
   double relaxation = 0.1, relaxation_s = 0.3;  // share of the last increase that fades
   Vec3 bias_n{0.4, -0.2, 0.9};
+  double stiffens_at_m = 1e9;  // ten times
   double slips_at_m = 1e9, loses_at_m = 1e9, yields_at_m = 1e9, refuses_at_m = 1e9;
   double clock_s = 0, moved_s = -100, faded_n = 0;
   Pose tip = Pose(Eigen::Translation3d(0, 0, 0.3));
@@ -33,7 +34,8 @@ struct SpringRobot : Robot {
   double depth() const { return surface_m - tip.translation().z() + unseen_m; }
   double spring() const {
     if (depth() <= 0 || depth() > loses_at_m) return 0;
-    return stiffness_n_m * depth() * (depth() > yields_at_m ? 0.5 : 1.0);
+    const double stiff_m = std::max(0.0, depth() - stiffens_at_m);
+    return stiffness_n_m * (depth() + 9 * stiff_m) * (depth() > yields_at_m ? 0.5 : 1.0);
   }
   RobotState read() override {
     std::normal_distribution<double> noise(0, noise_n);
@@ -131,6 +133,29 @@ TEST(PushProtocol, StepsAreNotPickedForTheErrorOfTheirTravel) {
   EXPECT_GT(out_count, 300);
   EXPECT_NEAR(in_sum / in_count, 0, 4 * 3e-4 / std::sqrt(in_count));
   EXPECT_NEAR(out_sum / out_count, 0, 4 * 3e-4 / std::sqrt(out_count));
+}
+
+TEST(PushProtocol, NoStepIsRecordedTwiceWhereTheObjectStiffens) {
+  for (const double limit_n : {8.0, 12.0}) {
+    SpringRobot robot;
+    robot.stiffens_at_m = 0.01;
+    robot.relaxation = 0;
+    PushOptions o = options();
+    o.force_step_n = 0.5;  // one motion passes several of them
+    o.force_limit_n = limit_n;
+    const Result result = run(robot, o);
+    EXPECT_EQ(result.report.stop, StopReason::force_limit);
+    double last_m = 1;
+    int steps = 0;
+    for (const Step& step : result.push.steps) {
+      if (step.loads.empty() || step.unloading) continue;
+      EXPECT_LT(step.T_base_tip->translation().z(), last_m - 1e-9);
+      last_m = step.T_base_tip->translation().z();
+      ++steps;
+    }
+    EXPECT_GT(steps, 8);
+    EXPECT_GT(result.report.highest_force_n, limit_n - 1) << "the top is recorded, once";
+  }
 }
 
 double force(const Step& step) { return step.loads.empty() ? 0 : -step.loads[0].force_n->z(); }

@@ -101,6 +101,27 @@ TEST_F(Suggest, SameSeedSameAnswerAndIntervalsHardlyDependOnTheGuess) {
               0.1);
 }
 
+TEST_F(Suggest, SaysHowManyPushesTheIntervalsThatAreAskedForTake) {
+  const Answer wide = suggest(folder_, "--young-modulus-within 0.2 --poisson-ratio-within 0.2");
+  ASSERT_EQ(wide.exit_code, 0);
+  EXPECT_EQ(wide.json["sequence"].size(), 1u);
+  const Answer narrow = suggest(folder_, "--young-modulus-within 0.035 --poisson-ratio-within 0.01");
+  ASSERT_EQ(narrow.exit_code, 0);
+  EXPECT_TRUE(narrow.json["target_reached"].get<bool>());
+  const auto& sequence = narrow.json["sequence"];
+  ASSERT_GT(sequence.size(), 1u);
+  const auto reached = [](const nlohmann::json& after) {
+    return std::sinh(1.96 * after["log_young_std"].get<double>()) <= 0.035001 && 1.96 * after["poisson_std"].get<double>() <= 0.01;
+  };
+  EXPECT_TRUE(reached(sequence.back()["expected"]));
+  EXPECT_FALSE(reached(sequence[sequence.size() - 2]["expected"]));
+  // The force's scale is known to 1 %: no number of pushes comes below.
+  const Answer never = suggest(folder_, "--young-modulus-within 0.015");
+  EXPECT_EQ(never.exit_code, 0);
+  EXPECT_FALSE(never.json["target_reached"].get<bool>());
+  EXPECT_THAT(never.json["warnings"].back().get<std::string>(), testing::HasSubstr("30 pushes come to E within 2"));
+}
+
 TEST_F(Suggest, APlaceThatNoToolReachesIsAnInputErrorThatSaysWhy) {
   EXPECT_EQ(suggest(folder_, "--contact 0.55 0.04 0.09").exit_code, 0);
   const Answer below = suggest(folder_, "--contact 0.55 0.04 0 --direction 0 0 1");

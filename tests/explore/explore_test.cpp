@@ -69,6 +69,8 @@ TEST(Explore, EndsWhenBothIntervalsAreAsNarrowAsAskedForAndHoldTheTruth) {
     EXPECT_LT(std::abs(std::log(push.found.log_young_std / push.plan.expected.log_young_std)), std::log(2.0)) << push.name;
     EXPECT_LT(push.report.highest_force_n, 50);
   }
+  EXPECT_EQ(found.pushes.front().pushes_planned, static_cast<int>(found.pushes.size()));
+  EXPECT_EQ(last.pushes_planned, 1);
   // The recording is the whole of it, and every step was handed over as it was made.
   ASSERT_EQ(found.recording.pushes.size(), found.pushes.size());
   std::size_t steps = 0;
@@ -111,7 +113,7 @@ TEST(Explore, NextBestPushNeedsFewerPushesThanARandomOrderOrTheBestPlaceRepeated
   };
   std::printf("share of the pushes, median of %d: %.2f of the random order's, %.2f of the repeated one's\n", labs,
               median(random_share), median(repeated_share));
-  EXPECT_LE(median(random_share), 1);
+  EXPECT_LE(median(random_share), 2.0 / 3);
   EXPECT_LE(median(repeated_share), 1);
 }
 

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/target_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr double normal_975 = 1.959964;
+
+/// Counts of pushes a and b.
+struct Mix {
+  std::size_t a = 0, b = 0;
+  int of_a = 0, of_b = 0;
+};
+
+class Planner {
+ public:
+  Planner(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target)
+      : knowledge_(knowledge), pushes_(pushes), target_(target) {
+    if (!(target.young_modulus_within > 0)) throw Error("must be positive", "SpreadTarget.young_modulus_within");
+    if (!(target.poisson_ratio_within > 0)) throw Error("must be positive", "SpreadTarget.poisson_ratio_within");
+  }
+
+  /// Each push the best after those before it, until the target is reached.
+  template <class Score>
+  TargetPlan greedy(int most, Score score) const {
+    TargetPlan plan;
+    MatrixX information = knowledge_.information;
+    for (int n = 0; n < most && !plan.reached && !pushes_.empty(); ++n) {
+      std::size_t best = 0;
+      double least = std::numeric_limits<double>::infinity();
+      for (std::size_t i = 0; i < pushes_.size(); ++i) {
+        const double s = score(spread(information + pushes_[i].information));
+        if (s < least) least = s, best = i;
+      }
+      information += pushes_[best].information;
+      plan.order.push_back(best);
+      plan.expected = spread(information);
+      plan.reached = target_.miss(plan.expected) <= 1;
+    }
+    return plan;
+  }
+
+  /// The shortest plan of at most `most` pushes out of one or two of them.
+  TargetPlan mixed(int most, bool one_place) const {
+    for (int n = 1; n <= most; ++n) {
+      Mix best;
+      double least = 1;
+      const auto consider = [&](const Mix& mix) {
+        const double miss = target_.miss(spread(information(mix)));
+        if (miss <= least) least = miss, best = mix;
+      };
+      for (std::size_t a = 0; a < pushes_.size(); ++a) {
+        consider({a, a, n, 0});
+        for (std::size_t b = a + 1; b < pushes_.size() && !one_place; ++b)
+          for (int of_b = 1; of_b < n; ++of_b) consider({a, b, n - of_b, of_b});
+      }
+      if (best.of_a > 0) return planned(best);
+    }
+    return {};
+  }
+
+ private:
+  ExpectedSpread spread(const MatrixX& information) const {
+    Knowledge then = knowledge_;
+    then.information = information;
+    return expected_after(then, {});
+  }
+  MatrixX information(const Mix& mix) const {
+    return knowledge_.information + mix.of_a * pushes_[mix.a].information + mix.of_b * pushes_[mix.b].information;
+  }
+  TargetPlan planned(Mix mix) const {
+    const auto alone = [&](std::size_t i) {
+      return expected_after(knowledge_, {&pushes_[i]}).score(PushGoal::both);
+    };
+    if (mix.of_b > 0 && alone(mix.b) < alone(mix.a)) std::swap(mix.a, mix.b), std::swap(mix.of_a, mix.of_b);
+    TargetPlan plan;
+    plan.order.assign(static_cast<std::size_t>(mix.of_a), mix.a);
+    plan.order.insert(plan.order.end(), static_cast<std::size_t>(mix.of_b), mix.b);
+    plan.expected = spread(information(mix));
+    plan.reached = true;
+    return plan;
+  }
+
+  const Knowledge& knowledge_;
+  const std::vector<RatedPush>& pushes_;
+  const SpreadTarget& target_;
+};
+
+}  // namespace
+
+double SpreadTarget::miss(const ExpectedSpread& spread) const {
+  // Half of the interval over E is sinh(1.96 std of log E).
+  return std::max(std::sinh(normal_975 * std::min(spread.log_young_std, 100.0)) / young_modulus_within,
+                  normal_975 * spread.poisson_std / poisson_ratio_within);
+}
+
+TargetPlan plan_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,
+                           int most) {
+  const Planner planner(knowledge, pushes, target);
+  TargetPlan best = planner.greedy(most, [&](const ExpectedSpread& s) { return target.miss(s); });
+  const auto take_better = [&](const TargetPlan& plan) {
+    const double miss = target.miss(plan.expected), least = target.miss(best.expected);
+    const bool shorter = plan.order.size() < best.order.size();
+    const bool better = plan.reached && best.reached ? shorter || (plan.order.size() == best.order.size() && miss < least)
+                                                     : plan.reached || (!best.reached && miss < least);
+    if (better) best = plan;
+  };
+  if (best.order.empty()) return best;
+  take_better(planner.greedy(most, [](const ExpectedSpread& s) { return s.score(PushGoal::both); }));
+  const int to_beat = best.reached ? static_cast<int>(best.order.size()) : most;
+  const TargetPlan mixed = planner.mixed(to_beat, false);
+  if (mixed.reached) take_better(mixed);
+  return best;
+}
+
+TargetPlan repeat_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,
+                             int most) {
+  return Planner(knowledge, pushes, target).mixed(most, true);
+}
+
+}  // namespace palpate::estimation
