@@ -219,6 +219,8 @@ Run verbs::suggest(CLI::App& app) {
   app.add_option("--direction", given->direction, "of that push, into the object (0 0 -1)")->expected(3)->type_name("")
       ->needs("--contact");
   app.add_option("--tool", given->suggest.tool, "tool of the recording (its only round one)");
+  app.add_option("--tip-link", given->suggest.tip_link,
+                 "of the recording's robot, z along the push: only what its joints reach is compared (found from the pushes)");
   app.add_option("--young-modulus", given->suggest.young_modulus_pa, "guess before the first touch, Pa")
       ->check(positive_number())
       ->capture_default_str();

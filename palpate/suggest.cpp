@@ -4,18 +4,21 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 #include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
+#include "palpate/sensing/arm_reach.hpp"
 #include "palpate/sensing/depth_render.hpp"
 #include "palpate/sensing/observe.hpp"
 
 namespace palpate {
 namespace {
 
+constexpr double in_front_m = 0.02;    // where a push begins
 constexpr double rays_of_fit = 6000;   // a frame, as the fit thins them
 constexpr double rays_of_plan = 1500;  // fewer with more weight say the same
 
@@ -185,6 +188,35 @@ void add_views(PushScene& scene, const Recording& recording, const SuggestOption
   }
 }
 
+/// What the arm of the recording's robot says about a push; empty where nothing is known of the arm.
+std::function<bool(const Vec3&, const Vec3&)> reach_of(const Recording& recording, const SuggestOptions& options,
+                                                       std::vector<std::string>& warnings) {
+  if (!recording.robot) {
+    if (!options.tip_link.empty()) throw Error("the recording has no robot", "tip_link " + options.tip_link);
+    return {};
+  }
+  std::optional<sensing::MountedTool> tool;
+  if (!options.tip_link.empty()) {
+    tool.emplace().link = options.tip_link;
+  } else {
+    std::string why = "its joints do not explain where the pushes touched";
+    try {
+      tool = sensing::find_tool(sensing::Kinematics(*recording.robot), recording);
+    } catch (const Error& error) {
+      why = error.what();
+    }
+    if (!tool) {
+      warnings.push_back("the robot's joint limits are not looked at: " + why + " (name the link of its tip, z along the push)");
+      return {};
+    }
+  }
+  const auto arm = std::make_shared<sensing::ArmReach>(*recording.robot, *tool, recording.environment.planes);
+  const double beyond_m = std::min(options.candidates.limits.travel_m, in_front_m);
+  return [arm, beyond_m](const Vec3& contact_m, const Vec3& direction) {
+    return arm->reaches(contact_m, direction, in_front_m, beyond_m);
+  };
+}
+
 }  // namespace
 
 PushScene prepare_pushes(const Recording& recording, const SuggestOptions& options, const OnProgress& progress) {
@@ -205,8 +237,10 @@ PushScene prepare_pushes(const Recording& recording, const SuggestOptions& optio
   }
   const auto tool =
       std::find_if(recording.tools.begin(), recording.tools.end(), [&](const Tool& t) { return t.name == scene.tool; });
+  estimation::CandidateOptions candidates = options.candidates;
+  if (!candidates.reachable) candidates.reachable = reach_of(recording, options, scene.warnings);
   const estimation::PushSpace space(scene.simulated.surface.rest(), scene.object,
-                                    scene.simulated.mesh.nodes_m(held, Eigen::all), *tool, options.candidates);
+                                    scene.simulated.mesh.nodes_m(held, Eigen::all), *tool, candidates);
   if (options.only.empty()) {
     scene.candidates = space.sample(&scene.refused);
   } else {

@@ -17,7 +17,9 @@ namespace palpate {
 
 struct SuggestOptions {
   estimation::PushGoal goal = estimation::PushGoal::both;
-  estimation::CandidateOptions candidates;        ///< with the robot's limits
+  /// With the robot's limits. Where `reachable` is empty and the recording has a robot, its joints' limits decide.
+  estimation::CandidateOptions candidates;
+  std::string tip_link;                           ///< of that robot, z along the push; empty = found from the pushes' joints
   std::vector<estimation::PushCandidate> only;    ///< pushes to be rated, instead of sampled ones
   std::string tool;                               ///< of the recording; empty = its only one
   double young_modulus_pa = 2e4;                  ///< guess before the first touch

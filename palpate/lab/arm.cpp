@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/lab/arm.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "palpate/core/error.hpp"
-#include "palpate/lab/random.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -100,72 +98,6 @@ RobotModel arm(const ArmOptions& o) {
   eye.rotate(Eigen::AngleAxisd(-0.25, Vec3::UnitY()));
   joint("camera_mount", "hand_tilt", "camera", eye, Vec3::UnitZ(), 0);
   return robot;
-}
-
-std::optional<std::vector<double>> reach(const sensing::Kinematics& kinematics, Index link, const Pose& target,
-                                         const std::vector<double>& start, const ReachOptions& options) {
-  const std::vector<std::string>& names = kinematics.free_joints();
-  if (start.size() != names.size()) throw Error("needs one value a free joint", "start");
-  std::vector<double> lower, upper;
-  for (const std::string& name : names)
-    for (const RobotJoint& joint : kinematics.robot().joints)
-      if (joint.name == name) {
-        const bool turns = joint.kind == RobotJoint::Kind::continuous;
-        lower.push_back(turns ? -1e9 : joint.lower);
-        upper.push_back(turns ? 1e9 : joint.upper);
-      }
-  const int free = options.any_roll ? 1 : 0;
-  const auto miss = [&](const std::vector<double>& q) {
-    const Pose pose = kinematics.link_poses(names, q)[std::size_t(link)];
-    Vec6 error;
-    error.head<3>() = target.translation() - pose.translation();
-    if (free) {  // only the axis must agree: the rotation that takes one axis to the other
-      const Vec3 have = pose.linear().col(2), want = target.linear().col(2);
-      const Vec3 turn = have.cross(want);
-      const double sine = turn.norm(), angle = std::atan2(sine, have.dot(want));
-      error.tail<3>() =
-          sine > 1e-12 ? Vec3(angle / sine * turn) : Vec3(angle > 1 ? Vec3(angle * pose.linear().col(0)) : Vec3::Zero());
-    } else {
-      const Eigen::AngleAxisd turn(target.linear() * pose.linear().transpose());
-      error.tail<3>() = turn.angle() * turn.axis();
-    }
-    return error;
-  };
-  Random random(20100918);
-  std::vector<double> q = start;
-  for (int attempt = 0; attempt < 20; ++attempt) {
-    if (attempt > 0)
-      for (std::size_t k = 0; k < q.size(); ++k) q[k] = random.uniform(std::max(lower[k], -M_PI), std::min(upper[k], M_PI));
-    double damping = 1e-3;
-    Vec6 error = miss(q);
-    for (int i = 0; i < options.max_iterations; ++i) {
-      if (error.head<3>().norm() < options.position_tolerance_m && error.tail<3>().norm() < options.angle_tolerance_rad)
-        return q;
-      Eigen::Matrix<double, 6, Eigen::Dynamic> slope(6, Eigen::Index(q.size()));
-      for (std::size_t k = 0; k < q.size(); ++k) {
-        std::vector<double> moved = q;
-        const double h = 1e-6;
-        moved[k] += h;
-        slope.col(Eigen::Index(k)) = (miss(moved) - error) / h;
-      }
-      const MatrixX normal = slope.transpose() * slope;
-      const VectorX step =
-          (normal + damping * MatrixX::Identity(normal.rows(), normal.cols())).ldlt().solve(-slope.transpose() * error);
-      std::vector<double> next = q;
-      for (std::size_t k = 0; k < q.size(); ++k)
-        next[k] = std::clamp(q[k] + std::clamp(step(Eigen::Index(k)), -0.3, 0.3), lower[k], upper[k]);
-      const Vec6 next_error = miss(next);
-      if (next_error.squaredNorm() < error.squaredNorm()) {
-        q = next;
-        error = next_error;
-        damping = std::max(damping * 0.3, 1e-12);
-      } else {
-        damping *= 10;
-        if (damping > 1e6) break;
-      }
-    }
-  }
-  return std::nullopt;
 }
 
 }  // namespace palpate::lab

@@ -11,6 +11,7 @@
 #include "palpate/lab/box_surface.hpp"
 #include "palpate/lab/random.hpp"
 #include "palpate/lab/scene.hpp"
+#include "palpate/sensing/reach.hpp"
 #include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate::lab {
@@ -236,7 +237,7 @@ acquisition::RobotState LabRobot::read() {
 acquisition::Motion LabRobot::move(const Pose& T_base_tip, double speed_m_s) {
   Impl& lab = *impl_;
   if (!(speed_m_s > 0)) throw Error("must be positive", "speed_m_s");
-  const auto joints = reach(lab.mask.kinematics(), lab.tip, T_base_tip, lab.commanded);
+  const auto joints = sensing::reach(lab.mask.kinematics(), lab.tip, T_base_tip, lab.commanded);
   if (!joints) return acquisition::Motion::refused;
   const double before = lab.force();
   lab.clock_s += (T_base_tip.translation() - lab.tip_of(lab.commanded).translation()).norm() / speed_m_s;
@@ -387,7 +388,7 @@ bool LabRobot::reaches(const Vec3& contact_m, const Vec3& direction, double star
   std::vector<double> joints = lab.commanded;
   for (const double before_m : {start_distance_m, 0.0}) {
     pose.translation() = contact_m - before_m * direction;
-    const auto found = reach(lab.mask.kinematics(), lab.tip, pose, joints);
+    const auto found = sensing::reach(lab.mask.kinematics(), lab.tip, pose, joints);
     if (!found) return false;
     joints = *found;
   }

@@ -12,6 +12,7 @@
 
 #include "geometry/shapes.hpp"
 #include "palpate/io/recording.hpp"
+#include "palpate/lab/arm.hpp"
 #include "temporary_folder.hpp"
 
 namespace {
@@ -120,6 +121,28 @@ TEST_F(Suggest, SaysHowManyPushesTheIntervalsThatAreAskedForTake) {
   EXPECT_EQ(never.exit_code, 0);
   EXPECT_FALSE(never.json["target_reached"].get<bool>());
   EXPECT_THAT(never.json["warnings"].back().get<std::string>(), testing::HasSubstr("30 pushes come to E within 2"));
+}
+
+TEST_F(Suggest, TheArmOfTheRecordingLimitsWhatIsCompared) {
+  Recording recording = box_on_table();
+  recording.robot = lab::arm();
+  const std::string near = (files_ / "near").string(), far = (files_ / "far").string();
+  io::write_recording(recording, near);
+  const Answer some = suggest(near, "--tip-link tip");
+  ASSERT_EQ(some.exit_code, 0);
+  EXPECT_GT(some.json["refused"]["out of the robot's reach"].get<int>(), 0);
+  EXPECT_GT(some.json["pushes"].size(), 0u);
+  recording.rest.surface->vertices_m.col(0).array() += 1.5;
+  io::write_recording(recording, far);
+  const Answer none = suggest(far, "--tip-link tip");
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_THAT(none.json["error"]["message"].get<std::string>(), testing::HasSubstr("out of the robot's reach"));
+  // Nothing was pushed, so nobody knows where the tip is: said, and not looked at.
+  const Answer unasked = suggest(far, "");
+  ASSERT_EQ(unasked.exit_code, 0);
+  EXPECT_THAT(unasked.json["warnings"].dump(), testing::HasSubstr("joint limits are not looked at"));
+  EXPECT_EQ(suggest(near, "--tip-link nail").exit_code, 3);
+  EXPECT_EQ(suggest(folder_, "--tip-link tip").exit_code, 3);
 }
 
 TEST_F(Suggest, APlaceThatNoToolReachesIsAnInputErrorThatSaysWhy) {

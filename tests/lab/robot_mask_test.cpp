@@ -16,6 +16,7 @@
 #include "palpate/lab/random.hpp"
 #include "palpate/lab/scene.hpp"
 #include "palpate/sensing/camera.hpp"
+#include "palpate/sensing/reach.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -57,7 +58,7 @@ Share measure(std::uint64_t seed) {
   Pose T_base_tip = Pose::Identity();
   T_base_tip.linear() << 1, 0, 0, 0, -1, 0, 0, 0, -1;
   T_base_tip.translation() = contact;
-  const auto joints = reach(kinematics, kinematics.link("tip"), T_base_tip, {0, 0.6, 1.2, 0, 1.3, 0, 0.05});
+  const auto joints = sensing::reach(kinematics, kinematics.link("tip"), T_base_tip, {0, 0.6, 1.2, 0, 1.3, 0, 0.05});
   if (!joints) throw Error("the arm does not reach the cube", "measure");
   std::vector<double> read = *joints;
   for (double& q : read) q += 0.02 * M_PI / 180 * random.normal();
@@ -134,7 +135,7 @@ TEST(RobotMaskInTheLab, ArmReachesWhereItIsSent) {
     target.linear() =
         Eigen::AngleAxisd(M_PI - 0.3 * random.uniform(), Vec3(random.normal(), 1, 0).normalized()).toRotationMatrix();
     target.translation() = Vec3(random.uniform(0.45, 0.7), random.uniform(-0.3, 0.3), random.uniform(0.05, 0.3));
-    const auto joints = reach(kinematics, kinematics.link("tip"), target, {0, 0.6, 1.2, 0, 1.3, 0, 0.05});
+    const auto joints = sensing::reach(kinematics, kinematics.link("tip"), target, {0, 0.6, 1.2, 0, 1.3, 0, 0.05});
     if (!joints) continue;
     ++reached;
     const Pose pose = kinematics.link_poses(kinematics.free_joints(), *joints)[std::size_t(kinematics.link("tip"))];
@@ -144,7 +145,7 @@ TEST(RobotMaskInTheLab, ArmReachesWhereItIsSent) {
   EXPECT_GE(reached, 19);
   Pose far = Pose::Identity();
   far.translation() = Vec3(5, 0, 0);
-  EXPECT_FALSE(reach(kinematics, kinematics.link("tip"), far, std::vector<double>(7, 0.1)));
+  EXPECT_FALSE(sensing::reach(kinematics, kinematics.link("tip"), far, std::vector<double>(7, 0.1)));
 }
 
 }  // namespace
