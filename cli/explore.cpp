@@ -54,7 +54,8 @@ nlohmann::json json_of(const ExploredPush& push) {
 
 std::string plans_of(const ExploredPush& push) {
   if (push.pushes_planned == 0) return "";
-  return push.pushes_planned == 1 ? "; planned as the last one" : fmt::format("; planned with {} more", push.pushes_planned - 1);
+  if (push.pushes_planned == 1) return "; planned as the last one";
+  return fmt::format("; planned with {} more", push.pushes_planned - 1);
 }
 
 /// One whole loop; in the lab, on an object of its own. `writer` and `truth` only where it is recorded, `live` where it may be watched.

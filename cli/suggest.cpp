@@ -192,7 +192,8 @@ int run(const Options& given, Session& session) {
     const auto after = estimation::expected_after(knowledge, made);
     json["sequence"].push_back({{"push", order[n]}, {"expected", spread_json(after)}});
     if (order.size() > 1 || with_target)
-      session.say(fmt::format("  {} push{}: no {}{}, then E within {}, nu within {}", n + 1, n == 0 ? "  " : "es", order[n] + 1,
+      session.say(fmt::format("  {} push{}: no {}{}, then E within {}, nu within {}", n + 1, n == 0 ? "  " : "es",
+                              order[n] + 1,
                               order[n] < std::size_t(given.show) ? "" : " (" + push_words(push, scene) + ")",
                               percent_95(after.log_young_std), plain_95(after.poisson_std)));
   }

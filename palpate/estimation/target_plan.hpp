@@ -3,7 +3,6 @@
 // the first of them where E and nu want different places.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "palpate/estimation/next_push.hpp"

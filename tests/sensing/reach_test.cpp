@@ -85,14 +85,13 @@ TEST(Reach, AgreesWithTheClosedFormOfThreeJoints) {
     if (possible && !within(one, 0.02) && !within(other, 0.02)) continue;  // at the very edge, either will do
     const Pose target = looking(tip_m, along);
     const auto joints = reach(kinematics, kinematics.link("hand"), target, {0, 0.5, 0}, options);
-    // Shoulder and wrist stop short of half a turn: a way that needs it is no way.
     if (!possible) {
       EXPECT_FALSE(joints) << trial;
       ++refused;
       continue;
     }
     ++asked;
-    if (!joints) continue;
+    if (!joints) continue;  // shoulder and wrist stop short of half a turn: a way that needs it is no way
     ++reached;
     EXPECT_GE((*joints)[1], from);
     EXPECT_LE((*joints)[1], to);
