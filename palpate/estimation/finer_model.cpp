@@ -17,6 +17,9 @@ namespace {
 
 constexpr Index most_uniform = 5000;  // tetrahedra of a mesh that is halved everywhere
 constexpr double most_filled = 24000;  // of one that is filled anew
+/// Of what a mesh errs by whose outline is not the object's: parts that are too thin for its edges lose their shape, and get it
+/// back faster than by the square (bear 3.1 to 4.3, animal 2.6 and 3.9, ball 2: docs/uncertainty.md).
+constexpr double order_of_filling = 3;
 constexpr Index most_growth = 4;      // of the number of nodes, where it is not
 constexpr Index most_corners = 4000;  // of a mesh that is fitted with
 
@@ -108,6 +111,7 @@ std::optional<FinerModel> filled(const Recording& recording, const SimulatedObje
   anew.supports = std::move(inside.supports);
   FinerModel out = on_volume(std::move(anew), recording, object);
   out.edge_share = std::min(0.9, 1 / std::cbrt(growth));
+  out.order = order_of_filling;
   return out;
 }
 

@@ -2,6 +2,7 @@
 // The same object on finer meshes: one that shows what the mesh does to the answer, and one that is fine enough for it.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -17,8 +18,11 @@ struct FinerModel {
   Recording recording;
   SimulatedObject object;
   double edge_share = 0.5;  ///< its edges, of those of the mesh that it is finer than
+  double order = 2;         ///< of its edges: the error that is left falls with this power (docs/uncertainty.md)
   bool everywhere = true;   ///< false: under round tools only
   AnswerShift elsewhere;    ///< if not: what is known of the error that the mesh makes elsewhere
+  /// Of the coarser mesh's error, what this one has left.
+  double left() const { return std::pow(edge_share, order); }
 };
 
 /// The object's volume filled anew from its surface, and its supports with the tolerance that this mesh's nodes need.

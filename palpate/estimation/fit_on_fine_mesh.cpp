@@ -62,7 +62,7 @@ std::optional<BetterMesh> better_mesh(const Recording& at, const SimulatedObject
     // Too much would be left after refining under the tools, and the mesh that showed the error is at hand.
     if (most_excess(found, elsewhere, tolerance).share > 0.8 && shows.object.mesh.nodes_m.rows() <= most_nodes) {
       auto finer = finer_under_tools(shows.recording, shows.object);
-      if (finer) finer->elsewhere = elsewhere.times(std::pow(shows.edge_share, mesh_order));
+      if (finer) finer->elsewhere = elsewhere.times(shows.left());
       return BetterMesh{shows, std::move(finer)};
     }
   }
@@ -72,7 +72,7 @@ std::optional<BetterMesh> better_mesh(const Recording& at, const SimulatedObject
   auto finer = better->everywhere || !fill_anew ? finer_model(better->recording, better->object, fill_anew)
                                                 : finer_under_tools(better->recording, better->object);
   if (finer && !finer->everywhere)
-    finer->elsewhere = elsewhere.times(better->everywhere ? std::pow(better->edge_share, mesh_order) : 1);
+    finer->elsewhere = elsewhere.times(better->everywhere ? better->left() : 1);
   return BetterMesh{std::move(*better), std::move(finer)};
 }
 

@@ -72,7 +72,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
                              .ldlt()
                              .solve(VectorX(before.gradient(moving)) - VectorX(after.gradient(moving)));
   if (!change.allFinite()) return std::nullopt;
-  const double whole = 1 / (1 - std::pow(finer.edge_share, mesh_order));
+  const double whole = 1 / (1 - finer.left());
   AnswerShift shift;
   shift.load_cases = load_cases;
   shift.region_log_young = VectorX::Zero(objective.unknowns().ratio_count());

@@ -12,13 +12,9 @@
 
 namespace palpate::estimation {
 
-/// A mesh's error falls with this power of its edges: jumps of the load at a pad's rim and the facets of an outline leave their
-/// square, held edges a little less (docs/uncertainty.md).
-inline constexpr double mesh_order = 2;
-
 /// What the change of the simulated surfaces and travels between the two meshes does to the optimum: one step of Gauss and
 /// Newton. Small strains are used for the change, one factorisation each. Where the error falls with the power p of the edge
-/// length, the coarse mesh is off by the change over 1 - r^p, r the ratio of the edges. What `finer` knows of elsewhere is added.
+/// length, the coarse mesh is off by the change over 1 - r^p, r the ratio of the edges (FinerModel::left). What `finer` knows of elsewhere is added.
 /// The objective's last evaluation must be the optimum's.
 /// @param object  on the mesh that its answers are those of, with the recording that names its nodes
 /// @param solved  nullptr: the finer mesh is solved for at the optimum's nu. Else what is used and filled: a linear object is
