@@ -17,11 +17,11 @@ namespace {
 
 constexpr Index most_uniform = 5000;  // tetrahedra of a mesh that is halved everywhere
 constexpr double most_filled = 24000;  // of one that is filled anew
-/// Of what a mesh errs by whose outline is not the object's: parts that are too thin for its edges lose their shape, and get it
-/// back faster than by the square (bear 3.1 to 4.3, animal 2.6 and 3.9, ball 2: docs/uncertainty.md).
-constexpr double order_of_filling = 3;
 constexpr Index most_growth = 4;      // of the number of nodes, where it is not
 constexpr Index most_corners = 4000;  // of a mesh that is fitted with
+/// Where a mesh does not follow the outline, most of its error is in parts that are too thin or too curved for its edges, and
+/// falls faster than their square: compliance with powers of 3.1 to 4.3 (bear), 2.6 and 3.9 (animal), 2 (ball).
+constexpr double order_of_filling = 3;
 
 struct RoundContact {
   fem::ContactPatch patch;
