@@ -14,8 +14,8 @@ namespace palpate::estimation {
 
 /// What the change of the simulated surfaces and travels between the two meshes does to the optimum: one step of Gauss and
 /// Newton. Small strains are used for the change, one factorisation each. Where the error falls with the power p of the edge
-/// length, the coarse mesh is off by the change over 1 - r^p, r the ratio of the edges (FinerModel::left). What `finer` knows of elsewhere is added.
-/// The objective's last evaluation must be the optimum's.
+/// length, the coarse mesh is off by the change over 1 - r^p, r the ratio of the edges (FinerModel::left). What `finer` knows
+/// of elsewhere is added. The objective's last evaluation must be the optimum's.
 /// @param object  on the mesh that its answers are those of, with the recording that names its nodes
 /// @param solved  nullptr: the finer mesh is solved for at the optimum's nu. Else what is used and filled: a linear object is
 ///                then solved for over all of nu's range, once for all fits that share it

@@ -52,7 +52,7 @@ std::vector<double> compliances(const lab::LabObject& object, const Recording& s
 
 class FillingOrder : public testing::TestWithParam<std::string> {};
 
-TEST_P(FillingOrder, IsAboutTheThird) {
+TEST_P(FillingOrder, IsAboutThree) {
   lab::ObjectOptions truth;
   truth.poisson_ratio = 0.3;
   const lab::LabObject object = lab::make_object(GetParam(), truth);

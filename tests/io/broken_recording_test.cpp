@@ -54,6 +54,13 @@ TEST_F(BrokenRecording, ASecondDocumentIsNotPassedOver) {
   expect_refused("recording.yaml", "more than one document");
 }
 
+TEST_F(BrokenRecording, AFileThatIsNone) {
+  folder.put("recording.yaml", "notes of Tuesday\nthe foam was softer\n");
+  expect_refused("recording.yaml:1", "holds no keys with values");
+  change_index("tools:\n", "tools:\n  - hand\nregions:\n  - a word\n  - another\n");
+  expect_refused("recording.yaml:", "keys and values are expected here");
+}
+
 TEST_F(BrokenRecording, MissingFile) {
   std::filesystem::remove(folder.path() / "clouds/b.xyz");
   expect_refused("frames.csv:3: cloud", "there is no file 'clouds/b.xyz'");
