@@ -20,7 +20,7 @@ constexpr double most_filled = 24000;  // of one that is filled anew
 constexpr Index most_growth = 4;      // of the number of nodes, where it is not
 constexpr Index most_corners = 4000;  // of a mesh that is fitted with
 /// Where a mesh does not follow the outline, most of its error is in parts that are too thin or too curved for its edges, and
-/// falls faster than their square: compliance with powers of 3.1 to 4.3 (bear), 2.6 and 3.9 (animal), 2 (ball).
+/// falls faster than their square (estimation_filling_order_test).
 constexpr double order_of_filling = 3;
 
 struct RoundContact {
