@@ -155,9 +155,11 @@ std::vector<YamlField> YamlField::items() const {
 }
 
 std::vector<std::pair<std::string, YamlField>> YamlField::entries() const {
-  if (!node_.IsMap())
-    fail(path_.empty() ? "holds no keys with values (`key: value`); give another file if this was not meant to be YAML (docs/recording-format.md)"
-                       : "keys and values are expected here");
+  if (!node_.IsMap()) {
+    if (!path_.empty()) fail("keys and values are expected here");
+    fail("holds no keys with values (`key: value`); give another file if this was not meant to be YAML "
+         "(docs/recording-format.md)");
+  }
   std::vector<std::pair<std::string, YamlField>> result;
   for (const auto& entry : node_) {
     if (!entry.first.IsScalar()) fail("a key must be a single word");
