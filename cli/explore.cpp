@@ -83,6 +83,9 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
     session.say(fmt::format("{}, {:.1f} s: {:.2f} N{}", push.name, step.time_s,
                             step.loads.empty() ? 0.0 : step.loads[0].force_n->norm(), step.unloading ? ", going back" : ""));
   };
+  hooks.on_push_end = [&](const acquisition::PushReport& report) {
+    if (writer != nullptr && report.drift) writer->end_push(*report.drift);
+  };
   hooks.on_push = [&](const ExploredPush& push) {
     const Vec3 &at = push.plan.candidate.contact_m, &along = push.plan.candidate.direction;
     session.say(fmt::format(

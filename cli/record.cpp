@@ -111,6 +111,13 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
                                   step.unloading ? ", going back" : ""));
         },
         [] { return !Session::interrupted(); }, so_far);
+    if (report.drift && report.steps > 0) {
+      writer.end_push(*report.drift);
+      if (report.drift_n > 0.05 * report.highest_force_n)
+        session.warn(fmt::format("{}: the zero of the force moved by {:.3g} N during the push ({:.1f} N at most); taken off evenly over "
+                                 "its time. Let the sensor warm up, and keep cables from pulling",
+                                 plan.name, report.drift_n, report.highest_force_n));
+    }
     for (const int step : report.unsettled)
       session.warn(fmt::format("step {} of {} had not settled when it was recorded", step, plan.name));
     if (!report.came_back)

@@ -150,6 +150,9 @@ class Loop {
       if (hooks_.on_step) hooks_.on_step(made, step);
     };
     next.report = acquisition::run_push(robot_, plan, protocol, on_step, hooks_.keep_going);
+    if (!begun) return;
+    if (next.report.drift) take_off(*next.report.drift, out_.recording.pushes.back());
+    if (hooks_.on_push_end) hooks_.on_push_end(next.report);
   }
 
   /// A short touch says how stiff it is there; nothing of it is recorded.

@@ -64,6 +64,7 @@ struct ExploreHooks {
   std::function<acquisition::PushPlan(const estimation::PushCandidate& candidate)> plan;
   std::function<void(const Push& push)> on_push_begin;    ///< before its first step is handed over
   acquisition::OnStep on_step;                            ///< every recorded step
+  std::function<void(const acquisition::PushReport& report)> on_push_end;  ///< after its last step; not for one of no step
   std::function<void(const ExploredPush& push)> on_push;  ///< after each estimate
   std::function<bool()> keep_going;                       ///< false: stop where it is
   OnProgress on_progress;

@@ -54,7 +54,27 @@ struct FreeAir {
   Vec3 tare_n = Vec3::Zero();
   double std_n = 0;
   std::size_t samples = 0;
+  double time_s = 0;  // its middle
 };
+
+/// From the free air before a push to that between it and the next one, which begins with sample `next`.
+ForceDrift drift_after(const Track& track, const ForceSums& sums, const ContactSpan& span, double tared_at_s, std::size_t next, double tare_s) {
+  constexpr double clear_m = 0.002, turned_cos = 0.9994;  // two degrees
+  const auto& samples = track.samples;
+  const auto is_clear = [&](std::size_t i) {
+    return (samples[i].tip_m - span.contact_m).dot(span.direction) < -clear_m && track.direction[i].dot(span.direction) > turned_cos;
+  };
+  const double latest_s = next < samples.size() ? samples[next].time_s - guard_s : samples.back().time_s;
+  std::size_t begin = span.end;
+  while (begin < next && !is_clear(begin)) ++begin;
+  if (begin == next) return {};
+  begin = first_after(track, samples[begin].time_s + guard_s);
+  std::size_t end = begin;
+  while (end < next && samples[end].time_s <= std::min(latest_s, samples[begin].time_s + tare_s) && is_clear(end)) ++end;
+  if (end < begin + 2 || samples[end - 1].time_s - samples[begin].time_s < 0.5 * tare_s) return {};
+  const double after_s = 0.5 * (samples[begin].time_s + samples[end - 1].time_s);
+  return {(sums.mean(begin, end) - span.tare_n) / (after_s - tared_at_s), tared_at_s};
+}
 
 }  // namespace
 
@@ -87,7 +107,8 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
           window_end > window_begin && samples[window_end - 1].time_s - samples[window_begin].time_s > 0.5 * plan.tare_s;
       if (run == 0 && enough)
         air = {plan.tare == Tare::none ? Vec3(Vec3::Zero()) : sums.mean(window_begin, window_end),
-               sums.std_of(window_begin, window_end), window_end - window_begin};
+               sums.std_of(window_begin, window_end), window_end - window_begin,
+               0.5 * (samples[window_begin].time_s + samples[window_end - 1].time_s)};
       if (air.samples == 0) {
         if (plan.tare == Tare::before_contact) continue;  // nothing to compare with yet
       }
@@ -108,6 +129,7 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
       span.tare_n = air.tare_n;
       span.free_air_std_n = air.std_n;
       span.free_air_samples = air.samples;
+      span.drift.zero_at_s = air.time_s;
       span.contact_m = samples[first].tip_m;
       span.direction = track.direction[first];
       spans.push_back(span);
@@ -122,6 +144,10 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
   for (const ContactSpan& span : spans) {
     const bool close = !joined.empty() && samples[span.begin].time_s - samples[joined.back().end - 1].time_s < plan.hold_s;
     close ? void(joined.back().end = span.end) : joined.push_back(span);
+  }
+  for (std::size_t k = 0; k < joined.size() && plan.tare == Tare::before_contact; ++k) {
+    const std::size_t next = k + 1 < joined.size() ? joined[k + 1].begin : samples.size();
+    joined[k].drift = drift_after(track, sums, joined[k], joined[k].drift.zero_at_s, next, plan.tare_s);
   }
   std::erase_if(joined, [&](const ContactSpan& span) {
     return samples[span.end - 1].time_s - samples[span.begin].time_s < plan.hold_s;

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "palpate/core/force_drift.hpp"
 #include "palpate/core/streams.hpp"
 #include "palpate/sensing/push_events.hpp"
 
@@ -19,6 +20,7 @@ struct Track {
 struct ContactSpan {
   std::size_t begin = 0, end = 0;  ///< samples of the track, end excluded
   Vec3 tare_n = Vec3::Zero();
+  ForceDrift drift;  ///< of the tare, to the free air after the push; zero where there is none, or `tare` is not before_contact
   double free_air_std_n = 0;         ///< of one sample, largest of the three axes
   std::size_t free_air_samples = 0;  ///< that made the tare
   Vec3 contact_m = Vec3::Zero();     ///< tip at the first sample in contact
@@ -27,7 +29,8 @@ struct ContactSpan {
 
 /// Contact begins where the force along the push exceeds the plan's threshold and five standard deviations of the free air
 /// before it, three samples in a row, while the tip comes nearer, and ends below half of that. Spans that are closer than
-/// `hold_s` are one.
+/// `hold_s` are one. The free air after a push is `tare_s` of it once the tip has left the contact, with the tool as it was: a
+/// heavy one that turns would pass for drift.
 std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& plan);
 
 struct StillTime {

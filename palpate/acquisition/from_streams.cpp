@@ -34,6 +34,11 @@ std::string seconds(double value) {
   return text.substr(0, text.find('.') + 4) + " s";
 }
 
+std::string newtons(double value) {
+  const std::string text = std::to_string(value);
+  return text.substr(0, text.find('.') + 3) + " N";
+}
+
 class Assembly {
  public:
   Assembly(const StreamPlan& plan, const SensorStreams& streams)
@@ -215,7 +220,8 @@ class Assembly {
                   plan_.source + ": steps.pushes");
     const Vec3 contact = plan.contact_m ? *plan.contact_m : times.span != nullptr ? times.span->contact_m : Vec3::Zero();
     Vec3 direction = plan.direction ? *plan.direction : Vec3::Zero();
-    double highest_n = 0, deepest_m = 0;
+    const ForceDrift drift = times.span != nullptr ? times.span->drift : ForceDrift();
+    double highest_n = 0, deepest_m = 0, drifted_n = 0;
     std::size_t loaded_steps = 0;
     std::vector<double> moving;  // times of steps whose force had not settled
     for (const StepTime& at : times.steps) {
@@ -241,13 +247,15 @@ class Assembly {
       step.source = plan_.source + ": " + push.name + " at " + seconds(at.time_s);
       step.T_base_tip = tip;
       step.joints_rad = joints_of(at.time_s);
-      const Vec3 pressing = force ? Vec3(force->force_n - tare) : Vec3(Vec3::Zero());
+      const Vec3 drifted = drift.at(at.time_s);
+      const Vec3 pressing = force ? Vec3(force->force_n - tare - drifted) : Vec3(Vec3::Zero());
       const double along = pressing.dot(direction), travel = tip ? direction.dot(tip->translation() - contact) : 0;
       const double noise = times.span != nullptr ? 5 * times.span->free_air_std_n : 0;
       const bool loaded = at.loaded.value_or(along > std::max(plan_.contact_threshold_n, noise));
       step.unloading = at.unloading.value_or(loaded ? along < highest_n && travel < deepest_m - 1e-4 : highest_n > 0);
       highest_n = std::max(highest_n, along);
       deepest_m = std::max(deepest_m, travel);
+      drifted_n = std::max(drifted_n, drifted.norm());
       if (loaded) {
         Load load;
         load.tool = plan.tool;
@@ -268,6 +276,9 @@ class Assembly {
       look(step);
       push.steps.push_back(std::move(step));
     }
+    if (drifted_n > 0.05 * highest_n && highest_n > 0)
+      out_.notes.push_back(push.name + ": the zero of the force moved by " + newtons(drifted_n) + " during the push (" + newtons(highest_n) +
+                           " at most); taken off evenly over its time. Let the sensor warm up, and keep cables from pulling");
     if (plan.travel_sigma_m.size() > 1 && plan.travel_sigma_m.size() != loaded_steps)
       out_.notes.push_back(push.name + ": travel_sigma_m holds " + std::to_string(plan.travel_sigma_m.size()) + " numbers for " +
                            std::to_string(loaded_steps) + " loaded steps; the last one stands for those that follow");

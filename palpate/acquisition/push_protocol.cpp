@@ -84,23 +84,38 @@ class PushRun {
     at_m_ = distance_m;
   }
 
+  struct FreeAir {
+    Vec3 mean_n = Vec3::Zero();
+    double time_s = 0;  // its middle
+    double std_n = 0;   // of one sample, along the push
+    RobotState last;
+  };
+  FreeAir listen() {
+    FreeAir air;
+    std::vector<Vec3> forces;
+    for (int i = 0; i < options_.free_air_samples; ++i) {
+      robot_.wait(options_.sample_period_s);
+      air.last = robot_.read();
+      forces.push_back(air.last.force_n);
+      air.mean_n += air.last.force_n / options_.free_air_samples;
+      air.time_s += air.last.time_s / options_.free_air_samples;
+    }
+    double square = 0;
+    for (const Vec3& f : forces) square += std::pow(along(f - air.mean_n), 2);
+    air.std_n = std::sqrt(square / std::max(1, options_.free_air_samples - 1));
+    return air;
+  }
+
   // Free air: the tare, its noise, and the object untouched.
   void look_at_rest() {
     move_to(-options_.start_distance_m, options_.approach_speed_m_s);
-    std::vector<Vec3> forces;
-    RobotState state = robot_.read();
-    for (int i = 0; i < options_.free_air_samples; ++i) {
-      robot_.wait(options_.sample_period_s);
-      state = robot_.read();
-      forces.push_back(state.force_n);
-      report_.tare_n += state.force_n / options_.free_air_samples;
-    }
-    double square = 0;
-    for (const Vec3& f : forces) square += std::pow(along(f - report_.tare_n), 2);
-    free_air_std_n_ = std::sqrt(square / std::max(1, options_.free_air_samples - 1));
+    const FreeAir air = listen();
+    report_.tare_n = air.mean_n;
+    tared_at_s_ = air.time_s;
+    free_air_std_n_ = air.std_n;
     push_.force_tare_std_n = free_air_std_n_ / std::sqrt(double(options_.free_air_samples));
     push_.travel_offset_std_m = travel_offset_std_m(options_, robot_.travel_sigma_m());
-    if (!recorded_rest_) record(state, {}, 0, false);
+    if (!recorded_rest_) record(air.last, {}, 0, false);
   }
 
   void approach() {
@@ -324,8 +339,10 @@ class PushRun {
       report_.message += "; then " + stop.message;
       return;
     }
-    robot_.wait(options_.sample_period_s);
-    if (report_.stop != StopReason::no_contact && !recorded_again_) record(robot_.read(), {}, 0, true);
+    const FreeAir air = listen();
+    report_.drift = ForceDrift{(air.mean_n - report_.tare_n) / (air.time_s - tared_at_s_), tared_at_s_};
+    report_.drift_n = (air.mean_n - report_.tare_n).norm();
+    if (report_.stop != StopReason::no_contact && !recorded_again_) record(air.last, {}, 0, true);
   }
 
   Robot& robot_;
@@ -336,7 +353,7 @@ class PushRun {
   Push push_;
   PushReport report_;
   std::vector<sensing::ContactSample> history_;  // since contact
-  double free_air_std_n_ = 0;
+  double free_air_std_n_ = 0, tared_at_s_ = 0;
   std::vector<sensing::ContactSample> approach_;  // before contact was noticed
   bool loaded_ = false;       // a step under load is recorded
   bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
@@ -410,6 +427,18 @@ PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& optio
   if (std::abs(plan.direction.norm() - 1) > 1e-6) throw Error("must have unit length", "PushPlan.direction");
   if (plan.tool.empty()) throw Error("must name a tool of the recording", "PushPlan.tool");
   return PushRun(robot, plan, options, on_step, keep_going, so_far).run();
+}
+
+Push whole_push(Robot& robot, const PushPlan& plan, const PushOptions& options) {
+  Push made;
+  std::vector<Step> steps;
+  const PushReport report = run_push(robot, plan, options, [&](const Push& push, const Step& step) {
+    made = push;
+    steps.push_back(step);
+  });
+  made.steps = std::move(steps);
+  if (report.drift) take_off(*report.drift, made);
+  return made;
 }
 
 }  // namespace palpate::acquisition

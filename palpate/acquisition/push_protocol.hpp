@@ -4,9 +4,11 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "palpate/acquisition/robot.hpp"
+#include "palpate/core/force_drift.hpp"
 #include "palpate/core/recording.hpp"
 #include "palpate/sensing/push_events.hpp"
 
@@ -62,6 +64,9 @@ struct PushReport {
   int steps = 0;               ///< recorded now, resumed ones not counted
   std::vector<int> unsettled;  ///< indices (in the push) of steps whose force still crept
   Vec3 tare_n = Vec3::Zero();  ///< taken off every force
+  /// From the tare to the free air after the retreat; not taken off the steps that were handed over. Nothing: no such free air.
+  std::optional<ForceDrift> drift;
+  double drift_n = 0;          ///< what it had come to by then
   bool came_back = true;       ///< false: what the camera sees after the push is not what it saw before
   double changed_share = 0;    ///< of its pixels (sensing::changed_share)
 };
@@ -77,5 +82,8 @@ using OnStep = std::function<void(const Push& push, const Step& step)>;
 /// @throws Error for bad options or plan, and whatever the robot throws.
 PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
                     const std::function<bool()>& keep_going = {}, const Push* so_far = nullptr);
+
+/// Runs one push and hands it over whole, the sensor's drift taken off.
+Push whole_push(Robot& robot, const PushPlan& plan, const PushOptions& options);
 
 }  // namespace palpate::acquisition

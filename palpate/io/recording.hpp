@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/core/force_drift.hpp"
 #include "palpate/core/recording.hpp"
 
 namespace palpate::io {
@@ -42,6 +43,8 @@ class RecordingWriter {
   /// Following steps belong to this push; of `push` the steps are not looked at. It is written with its first step.
   void begin_push(const Push& push);
   void add_step(const Step& step);
+  /// Says how the zero of the forces of the push just written went away; `read_recording` takes it off them.
+  void end_push(const ForceDrift& drift);
 
   struct Pages;  ///< of the writer alone
 

@@ -148,6 +148,12 @@ void read_pushes(const YamlField& field, RecordingContext& context) {
     push.site = keys.text_or("site", "");
     push.force_tare_std_n = keys.non_negative_or("force_tare_std_n", 0);
     push.travel_offset_std_m = keys.non_negative_or("travel_offset_std_m", 0);
+    std::optional<ForceDrift> drift;
+    if (const auto moving = keys.optional("force_drift")) {
+      YamlKeys inner(*moving);
+      drift = ForceDrift{inner.required("rate_n_s").vector3(), inner.required("zero_at_s").number()};
+      inner.finish();
+    }
     const auto steps = keys.optional("steps"), table = keys.optional("table");
     if (static_cast<bool>(steps) == static_cast<bool>(table)) item.fail("give either 'steps' or 'table'");
     if (table) {
@@ -158,6 +164,7 @@ void read_pushes(const YamlField& field, RecordingContext& context) {
       keys.finish();
       read_step_list(*steps, push, context);
     }
+    if (drift) take_off(*drift, push);
     pushes.push_back(std::move(push));
   }
 }

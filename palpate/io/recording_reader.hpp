@@ -8,6 +8,7 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/force_drift.hpp"
 #include "palpate/core/recording.hpp"
 #include "palpate/io/csv.hpp"
 #include "palpate/io/yaml_field.hpp"

@@ -428,6 +428,13 @@ void RecordingWriter::add_step(const Step& step) {
   pages_->put_index();
 }
 
+void RecordingWriter::end_push(const ForceDrift& drift) {
+  if (pages_->push_count == 0 || !pages_->pending.empty())
+    throw Error("a push was ended before its first step", "RecordingWriter::end_push");
+  pages_->pushes += fmt::format("    force_drift: {{rate_n_s: {}, zero_at_s: {}}}\n", yaml_vector(drift.rate_n_s), drift.zero_at_s);
+  pages_->put_index();
+}
+
 void write_recording(const Recording& recording, const fs::path& folder) {
   std::error_code code;
   if (fs::exists(folder, code) && !(fs::is_directory(folder, code) && fs::is_empty(folder, code))) {

@@ -37,7 +37,7 @@ bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& de
   protocol.contact.threshold_n = std::min(protocol.contact.threshold_n, 0.2 * protocol.force_step_n);
   std::vector<Step> steps;
   bool wanted = true;
-  acquisition::run_push(
+  const acquisition::PushReport report = acquisition::run_push(
       robot, plan, protocol,
       [&](const Push& now, const Step& step) {
         push = now;
@@ -50,6 +50,7 @@ bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& de
         return wanted && static_cast<int>(steps.size()) <= depth.samples;
       });
   push.steps = std::move(steps);
+  if (report.drift) take_off(*report.drift, push);
   // Sideways the tip is where the plan puts it; one place then serves all seeds.
   for (Step& step : push.steps)
     for (Load& load : step.loads) load.contact_m = plan.contact_m;

@@ -53,6 +53,27 @@ TEST(FromStreams, FindsThePushItsStepsAndItsUnloading) {
   EXPECT_NEAR(push.force_tare_std_n, 0.02 / std::sqrt(200.0), 0.0005);
 }
 
+// 20 mN a second while the tool goes in and back: the free air after the push says so.
+TEST(FromStreams, ADriftBetweenTheFreeAirBeforeAndAfterIsTakenOff) {
+  LabOptions drifts;
+  drifts.drift_n_s = Vec3(0.01, -0.02, 0.01);
+  const Push still = recording_from(plan(), lab()).recording.pushes.at(0), made = recording_from(plan(), lab(drifts)).recording.pushes.at(0);
+  ASSERT_EQ(made.steps.size(), still.steps.size());
+  for (std::size_t i = 1; i + 1 < made.steps.size(); ++i)
+    EXPECT_LT((*made.steps[i].loads.at(0).force_n - *still.steps[i].loads.at(0).force_n).norm(), 0.012) << "a sample's worth of tare's noise";
+  const double duration_s = made.steps[made.steps.size() - 2].time_s - made.steps[0].time_s;
+  EXPECT_GT(duration_s * drifts.drift_n_s.norm(), 0.2) << "what would be left of it without";
+
+  LabOptions much = drifts;
+  much.drift_n_s *= 5;
+  EXPECT_THAT(recording_from(plan(), lab(much)).notes, testing::Contains(HasSubstr("the zero of the force moved by")));
+  StreamPlan kept = plan();
+  kept.tare = Tare::between;
+  kept.tare_to_s = 2;
+  const Push by_hand = recording_from(kept, lab(drifts)).recording.pushes.at(0);
+  EXPECT_GT((*by_hand.steps[4].loads.at(0).force_n - *still.steps[4].loads.at(0).force_n).norm(), 0.1) << "as it was asked for";
+}
+
 TEST(FromStreams, AForceOnTheObjectKeepsItsSign) {
   SensorStreams streams = lab();
   for (WrenchSample& one : streams.wrenches) one.force_n = -one.force_n;

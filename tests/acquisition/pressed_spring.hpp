@@ -34,6 +34,7 @@ struct LabOptions {
   double wrench_late_s = 0, camera_late_s = 0;
   double noise_n = 0.02;
   Vec3 bias_n{1.5, -0.7, 3};
+  Vec3 drift_n_s = Vec3::Zero();  ///< of the bias, sensor axes
 };
 
 inline Pose tip_at(double time_s) {
@@ -69,7 +70,7 @@ inline SensorStreams lab(const LabOptions& options = {}) {
     const Mat3 R_base_sensor = tip_at(time).linear() * askew.linear();
     const Vec3 noise(normal(random), normal(random), normal(random));
     streams.wrenches.push_back({time + options.wrench_late_s,
-                                -(R_base_sensor.transpose() * on_object) + options.bias_n + options.noise_n * noise,
+                                -(R_base_sensor.transpose() * on_object) + options.bias_n + time * options.drift_n_s + options.noise_n * noise,
                                 Vec3::Zero()});
   }
   DepthStream depth;

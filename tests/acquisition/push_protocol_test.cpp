@@ -19,7 +19,7 @@ namespace {
 struct SpringRobot : Robot {
   double stiffness_n_m = 400, surface_m = 0.1, noise_n = 0.02;
   double relaxation = 0.1, relaxation_s = 0.3;  // share of the last increase that fades
-  Vec3 bias_n{0.4, -0.2, 0.9};
+  Vec3 bias_n{0.4, -0.2, 0.9}, drift_n_s = Vec3::Zero();
   double stiffens_at_m = 1e9;  // ten times
   double slips_at_m = 1e9, loses_at_m = 1e9, yields_at_m = 1e9, refuses_at_m = 1e9;
   double clock_s = 0, moved_s = -100, faded_n = 0;
@@ -46,7 +46,7 @@ struct SpringRobot : Robot {
     if (depth() > slips_at_m) state.T_base_tip.translation().x() += 0.004;
     const double fading = depth() > 0 ? faded_n * std::exp(-(clock_s - moved_s) / relaxation_s) : 0;
     state.force_n =
-        bias_n + Vec3(noise(generator), noise(generator), noise(generator) - (spring() > 0 ? spring() + fading : 0));
+        bias_n + clock_s * drift_n_s + Vec3(noise(generator), noise(generator), noise(generator) - (spring() > 0 ? spring() + fading : 0));
     return state;
   }
   Motion move(const Pose& pose, double speed_m_s) override {
@@ -196,6 +196,28 @@ TEST(PushProtocol, RisesStepByStepToTheForceLimitAndBack) {
   EXPECT_THAT(unloading, testing::ElementsAre(false, false, false, false, false, true, true, true));
   EXPECT_TRUE(result.report.unsettled.empty());
   EXPECT_LT(robot.depth(), 0) << "retreated";
+}
+
+TEST(PushProtocol, ADriftOfTheSensorIsFoundInTheFreeAirAfterThePush) {
+  SpringRobot steady, drifts;
+  drifts.drift_n_s = Vec3(0.002, -0.001, 0.004);
+  const Result without = run(steady);
+  Result made = run(drifts);
+  ASSERT_TRUE(without.report.drift && made.report.drift);
+  const double duration_s = made.push.steps.back().time_s - made.push.steps.front().time_s;
+  const double tare_std_n = 0.02 * std::sqrt(2 * 3 / 50.);
+  EXPECT_LT(without.report.drift_n, 4 * tare_std_n);
+  EXPECT_LT((made.report.drift->rate_n_s - drifts.drift_n_s).norm() * duration_s, 4 * tare_std_n);
+  const Step before = made.push.steps[made.push.steps.size() - 2];
+  take_off(*made.report.drift, made.push);
+  const Step& after = made.push.steps[made.push.steps.size() - 2];
+  ASSERT_EQ(after.loads.size(), 1u);
+  const double waited_s = after.time_s - made.report.drift->zero_at_s;
+  EXPECT_LT((*before.loads[0].force_n - *after.loads[0].force_n - waited_s * drifts.drift_n_s).norm(), 4 * tare_std_n);
+  EXPECT_GT(waited_s * drifts.drift_n_s.norm(), 6 * tare_std_n) << "or it could not be told from noise";
+  SpringRobot nothing;
+  nothing.surface_m = 0.05;
+  EXPECT_TRUE(run(nothing).push.steps.size() == 1 && run(nothing).report.stop == StopReason::no_contact);
 }
 
 TEST(PushProtocol, WaitsForTheForceToSettleAndSaysWhenItDoesNot) {

@@ -312,6 +312,17 @@ TEST(RecordingWriter, AfterEveryStepTheFolderIsAWholeRecording) {
   const Recording whole = read_recording(folder.path() / "live");
   ASSERT_EQ(whole.pushes.size(), 1u);
   EXPECT_EQ(whole.pushes[0].steps.size(), 3u);
+
+  // What is known only after the last step.
+  again.end_push({Vec3(0, 0.01, 0.1), 2});
+  const Recording ended = read_recording(folder.path() / "live");
+  const auto force = [](const Recording& of, std::size_t step) { return *of.pushes[0].steps[step].loads.at(0).force_n; };
+  EXPECT_EQ(force(ended, 1), force(whole, 1)) << "of before";
+  EXPECT_LT((force(ended, 2) - force(whole, 2) + 5 * Vec3(0, 0.01, 0.1)).norm(), 1e-12);
+  write_recording(ended, folder.path() / "copy");
+  EXPECT_EQ(force(read_recording(folder.path() / "copy"), 2), force(ended, 2)) << "taken off once";
+  again.begin_push(push);
+  EXPECT_THROW(again.end_push({}), Error);
 }
 
 TEST(ReadRecording, EveryExampleOfTheDocumentationIsUnderstood) {

@@ -93,7 +93,7 @@ TEST_P(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
         std::printf("  nu %.4f +- %.4f (truth %.4f, pull %+.2f)", p.value, p.std, lab.poisson_ratio, (p.value - lab.poisson_ratio) / p.std);
       }
     }
-    std::printf("  chi2 %.3f ", answer.fit.chi2_per_dof);
+    std::printf("  chi2 %.3f  mesh %s ", answer.fit.chi2_per_dof, answer.provenance.at("mesh").c_str());
     for (const Verdict& verdict : answer.verdicts) {
       std::printf(" %s", verdict.code.c_str());
       ++verdicts[verdict.code];
@@ -133,15 +133,8 @@ Lab pushed(const std::string& name, std::uint64_t seed, double region_ratio = 1)
   Lab lab{robot.scene(), robot.object().young_modulus_pa, robot.object().poisson_ratio};
   for (const TrueRegion& one : robot.object().regions) lab.region_pa[one.region.name] = one.young_modulus_pa;
   for (std::size_t site = 0; site < robot.object().sites.size(); ++site) {
-    std::vector<Step> steps;
-    Push push;
     protocol.force_step_n = robot.object().force_step_at(robot.object().sites[site]);
-    acquisition::run_push(robot, robot.plan(site), protocol, [&](const Push& now, const Step& step) {
-      push = now;
-      steps.push_back(step);
-    });
-    push.steps = std::move(steps);
-    lab.recording.pushes.push_back(std::move(push));
+    lab.recording.pushes.push_back(acquisition::whole_push(robot, robot.plan(site), protocol));
   }
   return lab;
 }

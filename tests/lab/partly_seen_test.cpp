@@ -30,14 +30,7 @@ Push push_at(LabRobot& robot, std::size_t site) {
   protocol.travel_limit_m = robot.object().travel_limit_m;
   protocol.force_step_n = 1.4 * robot.object().force_step_at(robot.object().sites[site]);
   protocol.unloading_steps = 0;
-  std::vector<Step> steps;
-  Push push;
-  acquisition::run_push(robot, robot.plan(site), protocol, [&](const Push& now, const Step& step) {
-    push = now;
-    steps.push_back(step);
-  });
-  push.steps = std::move(steps);
-  return push;
+  return acquisition::whole_push(robot, robot.plan(site), protocol);
 }
 
 class PartlySeen : public testing::TestWithParam<const char*> {};

@@ -52,14 +52,7 @@ Recording bear() {
   protocol.travel_limit_m = 0.004;
   protocol.unloading_steps = 1;
   protocol.force_step_n = robot.object().force_step_at(robot.object().sites[1]);
-  Push push;
-  std::vector<Step> steps;
-  acquisition::run_push(robot, robot.plan(1), protocol, [&](const Push& now, const Step& step) {
-    push = now;
-    steps.push_back(step);
-  });
-  push.steps = std::move(steps);
-  recording.pushes.push_back(std::move(push));
+  recording.pushes.push_back(acquisition::whole_push(robot, robot.plan(1), protocol));
   return recording;
 }
 

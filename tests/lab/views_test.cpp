@@ -29,14 +29,7 @@ TEST(Views, ShapeOutOfDepthImagesIsGoodEnoughToMeasureWith) {
   protocol.travel_limit_m = robot.object().travel_limit_m;
   protocol.force_step_n = 3 * robot.object().force_step_at(robot.object().sites[0]);
   protocol.unloading_steps = 0;
-  std::vector<Step> steps;
-  Push push;
-  acquisition::run_push(robot, robot.plan(0), protocol, [&](const Push& now, const Step& step) {
-    push = now;
-    steps.push_back(step);
-  });
-  push.steps = std::move(steps);
-  recording.pushes.push_back(std::move(push));
+  recording.pushes.push_back(acquisition::whole_push(robot, robot.plan(0), protocol));
 
   IdentifyOptions identification;
   identification.refine = "none";
