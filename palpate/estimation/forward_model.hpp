@@ -16,6 +16,7 @@
 #include "palpate/estimation/surface_field.hpp"
 #include "palpate/estimation/unknowns.hpp"
 #include "palpate/fem/contact_statics.hpp"
+#include "palpate/fem/response_span.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
@@ -24,13 +25,28 @@ struct StepIndex {
   std::size_t push = 0, step = 0;
 };
 
+/// Where a step leads the surface of a linear body, as coordinates: a vertex moves by the sum of the acting unit loads' fields,
+/// one a coordinate.
+struct SpanPlace {
+  std::shared_ptr<const fem::ResponseSpan> span;
+  std::vector<Index> loads;  ///< unit loads that act
+  VectorX at;
+  MatrixX d_at;  ///< coordinates x StepPrediction::columns
+
+  bool is_along(const std::shared_ptr<const fem::ResponseSpan>& other, const std::vector<Index>& others) const {
+    return span == other && loads == others;
+  }
+  VectorX moved_m() const;  ///< 3v
+};
+
 /// One column of every derivative below is one unknown.
 struct StepPrediction {
   bool converged = false;
   std::string reason;
   Points surface_m;           ///< simulated surface vertices, base frame
   std::vector<int> columns;   ///< unknowns that the step depends on
-  MatrixX d_surface;          ///< 3v x columns
+  MatrixX d_surface;          ///< 3v x columns; empty after ForwardModel::predict_in_span where `in_span` says the same
+  std::optional<SpanPlace> in_span;  ///< what surface and d_surface say; nothing: they are no such sum
   VectorX travel_m;           ///< a load: mean motion of its patch along the load's direction (work-conjugate)
   MatrixX d_travel;           ///< loads x columns
   std::vector<Vec3> force_n;  ///< a load: resultant on the object, base frame
@@ -97,6 +113,10 @@ class ForwardModel {
   /// @param derivatives  false: surface and converged only (the paper's method differentiates numerically)
   StepPrediction predict(std::size_t s, const VectorX& unknowns, bool derivatives = true);
 
+  /// The same with StepPrediction::in_span, where the surface is a sum of a linear body's fields: where nothing turns the body or
+  /// lets it slide, once nu's range was solved for. @param d_surface  false: then without it, at a fraction of the time
+  StepPrediction predict_in_span(std::size_t s, const VectorX& unknowns, bool d_surface);
+
   /// Elements whose volume is gone at these unknowns; solves the step in full where the prediction cannot rule them out.
   int inverted_elements(std::size_t s, const VectorX& unknowns);
 
@@ -152,7 +172,9 @@ class ForwardModel {
   struct ContactState;
   using ContactStatePtr = std::shared_ptr<const ContactState>;
 
-  StepPrediction unchanged(std::size_t s, const VectorX& unknowns, bool derivatives);
+  enum class Wanted { surface, derivatives, in_span };
+  StepPrediction unchanged(std::size_t s, const VectorX& unknowns, Wanted wanted);
+  std::optional<SpanPlace> place_in_span(std::size_t s, const Body& body, const Coefficients& c, const VectorX& unknowns) const;
   int unit_load_cases() const;
   /// False: no equilibrium, and `out` says why.
   bool solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
@@ -169,7 +191,8 @@ class ForwardModel {
   std::size_t first_step_of_push(std::size_t s) const { return s - steps_[s].step; }
   /// False: too far from where the step was last solved.
   bool follow(std::size_t s, const VectorX& unknowns, Watched& watched, StepPrediction& out);
-  Watched superpose(const Body& body, const Coefficients& c, const VectorX& unknowns, StepPrediction& out) const;
+  Watched superpose(const Body& body, const Coefficients& c, const VectorX& unknowns, const fem::UnitResponses& unit,
+                    StepPrediction& out) const;
 
   std::size_t worker_of(std::size_t s) const;
   void set_ratios(Body& body, const VectorX& unknowns) const;

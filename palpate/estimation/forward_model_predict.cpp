@@ -24,12 +24,28 @@ void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const V
 }
 
 StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {
-  StepPrediction out = unchanged(s, unknowns, derivatives);
+  StepPrediction out = unchanged(s, unknowns, derivatives ? Wanted::derivatives : Wanted::surface);
   if (out.converged && s < changes_.size() && changes_[s]) changes_[s]->add_to(out, unknowns, derivatives);
   return out;
 }
 
-StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, bool derivatives) {
+StepPrediction ForwardModel::predict_in_span(std::size_t s, const VectorX& unknowns, bool d_surface) {
+  if (!linear_ || !changes_.empty()) return predict(s, unknowns);
+  if (!d_surface) return unchanged(s, unknowns, Wanted::in_span);
+  StepPrediction out = predict(s, unknowns);
+  const Body& body = body_of(push(s), worker_of(s));
+  out.in_span = place_in_span(s, body, coefficients(s, body, unknowns), unknowns);
+  if (out.in_span) {  // what only readings depend on does not move the surface
+    MatrixX& d_at = out.in_span->d_at;
+    const Index known = static_cast<Index>(d_at.cols()), count = static_cast<Index>(out.columns.size());
+    d_at.conservativeResize(d_at.rows(), count);
+    d_at.rightCols(count - known).setZero();
+  }
+  return out;
+}
+
+StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, Wanted wanted) {
+  const bool derivatives = wanted != Wanted::surface;
   const std::size_t worker = worker_of(s);
   Body& body = body_of(push(s), worker);
   Coefficients c = coefficients(s, body, unknowns);
@@ -38,7 +54,14 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, b
   StepPrediction out;
   Watched at;
   if (linear_) {
-    at = superpose(body, c, unknowns, out);
+    if (wanted == Wanted::in_span) out.in_span = place_in_span(s, body, c, unknowns);
+    if (out.in_span) {
+      const Index surface_rows = 3 * object_.surface.vertex_count();
+      at = superpose(body, c, unknowns, body.response->rows_from(surface_rows, unknowns(poisson)), out);
+      at.moved_m = out.in_span->moved_m();
+    } else {
+      at = superpose(body, c, unknowns, *body.response->at(unknowns(poisson)), out);
+    }
     ++solves_[worker];
   } else if (!(reuse_ > 0 && derivatives && follow(s, unknowns, at, out)) &&
              !solve_step(s, body, c, unknowns, derivatives, at, out)) {
@@ -137,6 +160,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, b
     };
     widen(out.d_surface);
     if (out.d_material.size() > 0) widen(out.d_material);
+    if (out.in_span) widen(out.in_span->d_at);
     widen(out.d_travel);
     for (auto& block : out.d_force) widen(block);
     return wider - 1;

@@ -8,31 +8,30 @@
 namespace palpate::estimation {
 
 ForwardModel::Watched ForwardModel::superpose(const Body& body, const Coefficients& c, const VectorX& unknowns,
-                                              StepPrediction& out) const {
-  const auto unit = body.response->at(unknowns(poisson));
+                                              const fem::UnitResponses& unit, StepPrediction& out) const {
   const double young_pa = std::exp(unknowns(log_young));
-  const Index others = static_cast<Index>(c.columns.size()), rows = static_cast<Index>(unit->force.rows());
+  const Index others = static_cast<Index>(c.columns.size()), rows = static_cast<Index>(unit.force.rows());
   const Index seen = rows - static_cast<Index>(body.forces.cols());
-  const VectorX loaded = unit->force * (c.force / young_pa);
-  const VectorX all = loaded + unit->motion * c.motion;
+  const VectorX loaded = unit.force * (c.force / young_pa);
+  const VectorX all = loaded + unit.motion * c.motion;
   MatrixX d(rows, 2 + others);
   d.col(0) = -loaded;
-  d.col(1) = unit->force_d_poisson * (c.force / young_pa) + unit->motion_d_poisson * c.motion;
-  d.rightCols(others) = unit->force * (c.d_force / young_pa) + unit->motion * c.d_motion;
+  d.col(1) = unit.force_d_poisson * (c.force / young_pa) + unit.motion_d_poisson * c.motion;
+  d.rightCols(others) = unit.force * (c.d_force / young_pa) + unit.motion * c.d_motion;
   Watched watched;
   watched.moved_m = all.head(seen);
   watched.conjugate_m = all.tail(rows - seen);
   watched.d_moved = d.topRows(seen);
   watched.d_conjugate = d.bottomRows(rows - seen);
-  watched.reaction_n = unit->reaction_force * c.force + young_pa * (unit->reaction_motion * c.motion);
+  watched.reaction_n = unit.reaction_force * c.force + young_pa * (unit.reaction_motion * c.motion);
   watched.d_reaction.resize(c.motion.size(), 2 + others);
-  watched.d_reaction.col(0) = young_pa * (unit->reaction_motion * c.motion);
+  watched.d_reaction.col(0) = young_pa * (unit.reaction_motion * c.motion);
   watched.d_reaction.col(1) =
-      unit->reaction_force_d_poisson * c.force + young_pa * (unit->reaction_motion_d_poisson * c.motion);
-  watched.d_reaction.rightCols(others) = unit->reaction_force * c.d_force + young_pa * (unit->reaction_motion * c.d_motion);
+      unit.reaction_force_d_poisson * c.force + young_pa * (unit.reaction_motion_d_poisson * c.motion);
+  watched.d_reaction.rightCols(others) = unit.reaction_force * c.d_force + young_pa * (unit.reaction_motion * c.d_motion);
   // Gradients add up at most; the polynomial knows them at its nodes only, hence the margin.
-  const double gradient = c.force.cwiseAbs().dot(unit->largest_gradient_force) / young_pa +
-                          c.motion.cwiseAbs().dot(unit->largest_gradient_motion);
+  const double gradient = c.force.cwiseAbs().dot(unit.largest_gradient_force) / young_pa +
+                          c.motion.cwiseAbs().dot(unit.largest_gradient_motion);
   out.converged = true;
   out.inverted_elements = gradient < 0.7 ? 0 : -1;
   return watched;

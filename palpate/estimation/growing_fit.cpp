@@ -83,7 +83,11 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
     kept_ = {};
     objective.set_reuse(reuse);
     // Which rays of a new step count is chosen where the steps before it say that it should be.
-    if (objective.evaluate(start, *weighed, progress).usable) weighed = objective.with_chosen_rays(*weighed);
+    if (model.superposes()) {
+      weighed = objective.choose_rays(start, *weighed);
+    } else if (objective.evaluate(start, *weighed, progress).usable) {
+      weighed = objective.with_chosen_rays(*weighed);
+    }
     optimum = optimise(objective, start, *weighed, optimiser, progress);
     if (optimum.termination == Termination::no_progress &&
         newton_step(optimum.evaluation, free_unknowns(unknowns)).gain < least_gain) {

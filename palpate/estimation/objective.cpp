@@ -29,9 +29,7 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
   Evaluation out;
   const bool anchored = reuse_ > 0 && model_.superposes();
   if (anchored) {
-    if (!pattern_) pattern_ = std::make_shared<const SurfacePattern>(model_.object().surface.rest());
-    anchors_.resize(model_.step_count());
-    rows_.resize(model_.step_count());  // those of the anchors stay
+    prepare_anchors();
   } else {
     rows_.assign(model_.step_count(), {});
   }
@@ -48,7 +46,7 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
       for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
         if (terms_[s].empty() || !loss.counts(s)) continue;
         if (anchored) {
-          predictions_[s] = model_.predict(s, unknowns);
+          predictions_[s] = model_.predict_in_span(s, unknowns, anchors_[s].terms.empty());
           normals[s] = follow(s, unknowns, loss);
         } else if (reuse_ > 0 && find_kept(s, unknowns, loss)) {
           if (rows_wanted_) rows_[s] = kept_[s].back().rows;

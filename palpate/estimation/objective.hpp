@@ -47,6 +47,9 @@ class Objective {
   /// `loss` with a choice of rays for every evaluated step that has none: those that met the object well inside its outline in
   /// the last evaluation. It hangs on the simulated surface and not on what was measured, so that it does not bias.
   Loss with_chosen_rays(Loss loss) const;
+  /// The same where nothing was evaluated yet: casts the rays of the steps that have no choice, and an evaluation at these unknowns
+  /// goes on with what they met. Of a linear body, with set_reuse.
+  Loss choose_rays(const VectorX& unknowns, const Loss& loss);
 
   /// Normal equations of one step, of the unknowns that it depends on and without priors.
   struct StepNormal {
@@ -67,7 +70,7 @@ class Objective {
     Loss loss;
     std::vector<std::optional<SurfaceQuadratic>> terms;
     double patience = 1;  ///< how many times as far as at first it is followed
-    VectorX last;         ///< where it was asked last, and what it said
+    VectorX last;         ///< where it was asked last, and what it said; where rays were cast, as long as there are no terms
     StepNormal said;
   };
   /// What an objective hands on to that of the same steps and more.
@@ -115,9 +118,11 @@ class Objective {
   bool find_kept(std::size_t s, const VectorX& unknowns, const Loss& loss);
   void keep(std::size_t s, const VectorX& unknowns, const Loss& loss);
   StepNormal moved_along(const KeptStep& kept, const VectorX& unknowns) const;
+  void prepare_anchors();
+  bool stays_in_span(std::size_t s) const;
   StepNormal follow(std::size_t s, const VectorX& unknowns, const Loss& loss);
   Anchor anchor_of(const std::vector<TermRows>& rows, const StepPrediction& there, const VectorX& unknowns, const Loss& loss) const;
-  StepNormal normal_around(const Anchor& anchor, std::size_t s, const VectorX& unknowns, const Loss& loss);
+  StepNormal normal_around(Anchor& anchor, std::size_t s, const VectorX& unknowns, const Loss& loss);
   Evaluation sum(const std::vector<StepNormal>& steps, const VectorX& unknowns) const;
   void add_priors(const VectorX& unknowns, Evaluation& out) const;
 

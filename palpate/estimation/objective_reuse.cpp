@@ -81,16 +81,49 @@ Objective::Anchor Objective::anchor_of(const std::vector<TermRows>& rows, const 
   return anchor;
 }
 
+void Objective::prepare_anchors() {
+  if (!pattern_) pattern_ = std::make_shared<const SurfacePattern>(model_.object().surface.rest());
+  anchors_.resize(model_.step_count());
+  rows_.resize(model_.step_count());  // those of the anchors stay
+}
+
+Loss Objective::choose_rays(const VectorX& unknowns, const Loss& loss) {
+  prepare_anchors();
+  for (std::size_t s = 0; s < model_.step_count(); ++s) {
+    if (terms_[s].empty() || !loss.counts(s) || loss.rays_of(s) != nullptr) continue;
+    ++steps_evaluated_;
+    rows_[s] = rows_of(s, model_.predict(s, unknowns), unknowns, loss, true);
+    anchors_[s] = {};
+    anchors_[s].loss = loss;
+    anchors_[s].last = unknowns;
+  }
+  return with_chosen_rays(loss);
+}
+
+/// True where the step's terms need no more of its prediction than it holds.
+bool Objective::stays_in_span(std::size_t s) const {
+  const StepPrediction& here = predictions_[s];
+  if (here.d_surface.rows() > 0) return true;
+  for (std::size_t t = 0; t < terms_[s].size(); ++t) {
+    const auto& anchored = anchors_[s].terms[t];
+    if (anchored ? !anchored->shares_span(here) : terms_[s][t]->looks_at_surface()) return false;
+  }
+  return true;
+}
+
 Objective::StepNormal Objective::follow(std::size_t s, const VectorX& unknowns, const Loss& loss) {
   const StepPrediction& here = predictions_[s];
   Anchor& anchor = anchors_[s];
+  const bool same_rays = anchor.loss.rays_of(s) == loss.rays_of(s);
   double moved = std::numeric_limits<double>::infinity();  // in standard deviations of a point
   if (!anchor.terms.empty() && anchor.loss.weighs_like(loss)) {
     moved = 0;
     for (std::size_t t = 0; t < anchor.terms.size(); ++t)
       if (anchor.terms[t]) moved = std::max(moved, anchor.terms[t]->moved_m(here, unknowns, unknowns_) / terms_[s][t]->typical_sigma());
+  } else if (anchor.terms.empty() && !same_rays && anchor.last.size() == unknowns.size() && anchor.last == unknowns &&
+             anchor.loss.weighs_like(loss)) {
+    moved = 0;  // rays were cast just here
   }
-  const bool same_rays = anchor.loss.rays_of(s) == loss.rays_of(s);
   if (moved == 0 && !same_rays && anchor.loss.rays_of(s) == nullptr) {  // a choice among what was cast
     for (std::size_t t = 0; t < rows_[s].size(); ++t) {
       const std::vector<char>& chosen = (*loss.rays_of(s))[t];
@@ -100,6 +133,7 @@ Objective::StepNormal Objective::follow(std::size_t s, const VectorX& unknowns, 
     anchor = anchor_of(rows_[s], here, unknowns, loss);
   } else if (!same_rays || !(moved <= 0.5 * reuse_ * anchor.patience)) {
     ++steps_evaluated_;
+    if (here.d_surface.rows() == 0) predictions_[s] = model_.predict_in_span(s, unknowns, true);
     std::vector<TermRows> rows = rows_of(s, here, unknowns, loss, true);
     Anchor fresh = anchor_of(rows, here, unknowns, loss);
     if (!rows_wanted_) return normal_around(fresh, s, unknowns, loss);
@@ -109,13 +143,14 @@ Objective::StepNormal Objective::follow(std::size_t s, const VectorX& unknowns, 
     rows_[s] = std::move(rows);
   }
   if (anchor.last.size() != unknowns.size() || anchor.last != unknowns) {
+    if (!stays_in_span(s)) predictions_[s] = model_.predict_in_span(s, unknowns, true);
     anchor.said = normal_around(anchor, s, unknowns, loss);
     anchor.last = unknowns;
   }
   return anchor.said;
 }
 
-Objective::StepNormal Objective::normal_around(const Anchor& anchor, std::size_t s, const VectorX& unknowns, const Loss& loss) {
+Objective::StepNormal Objective::normal_around(Anchor& anchor, std::size_t s, const VectorX& unknowns, const Loss& loss) {
   const StepPrediction& here = predictions_[s];
   std::vector<std::vector<int>> involved(anchor.terms.size());
   std::vector<TermRows> asked(anchor.terms.size());

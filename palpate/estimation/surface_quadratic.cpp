@@ -53,6 +53,8 @@ SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows
   own_.assign(rows.unknowns.begin() + first, rows.unknowns.end());
   const Index count = static_cast<Index>(own_.size());
   own_at_ = unknowns(own_);
+  span_ = there.in_span;
+  if (span_) span_->d_at.resize(0, 0);
   radius_m_ = 0.5 * (there.surface_m.colwise().maxCoeff() - there.surface_m.colwise().minCoeff()).norm();
 
   const VectorX weight = row_weights(rows, loss);
@@ -172,36 +174,67 @@ void SurfaceQuadratic::multiply(const RowMajor& columns, Index from, RowMajor& o
   out.middleCols(from, used) = product.leftCols(used);
 }
 
-void SurfaceQuadratic::add_to(const StepPrediction& there, const VectorX& unknowns, const std::vector<int>& places,
-                              Evaluation& out) const {
-  const Index columns = static_cast<Index>(there.columns.size()), count = static_cast<Index>(own_.size());
+SurfaceQuadratic::RowMajor SurfaceQuadratic::times_blocks(const RowMajor& columns) const {
+  RowMajor out(columns.rows(), columns.cols());
+  constexpr Index narrow = 4, wide = 8;  // vector registers
+  for (Index from = 0; from < columns.cols();) {
+    const bool few = columns.cols() - from <= narrow;
+    few ? multiply<narrow>(columns, from, out) : multiply<wide>(columns, from, out);
+    from += few ? narrow : wide;
+  }
+  return out;
+}
+
+SurfaceQuadratic::InSpan SurfaceQuadratic::summed_up() const {
+  const fem::ResponseSpan& span = *span_->span;
+  RowMajor fields(3 * static_cast<Index>(seen_.size()), span_->at.size());
+  Index column = 0;
+  for (Index load : span_->loads) {
+    for (Index field = span.first[static_cast<std::size_t>(load)]; field < span.first[static_cast<std::size_t>(load) + 1]; ++field, ++column)
+      for (std::size_t i = 0; i < seen_.size(); ++i)
+        fields.col(column).segment<3>(3 * static_cast<Index>(i)) = span.fields.col(field).segment<3>(3 * seen_[i]);
+  }
+  InSpan out;
+  out.block.noalias() = fields.transpose() * times_blocks(fields);
+  out.cross.noalias() = fields.transpose() * cross_;
+  out.slope.noalias() = fields.transpose() * surface_slope_;
+  return out;
+}
+
+void SurfaceQuadratic::add_to(const StepPrediction& there, const VectorX& unknowns, const std::vector<int>& places, Evaluation& out) {
+  const Index columns = static_cast<Index>(there.columns.size());
+  if (shares_span(there) && (in_span_ || there.d_surface.rows() == 0)) {
+    if (!in_span_) in_span_ = summed_up();
+    RowMajor follow(there.in_span->at.size(), columns + 1);
+    follow << there.in_span->d_at, there.in_span->at - span_->at;
+    add_form(follow, in_span_->block * follow, in_span_->cross, in_span_->slope, unknowns, places, out);
+    return;
+  }
   const Index size = static_cast<Index>(seen_.size());
-  // How the vertices follow the unknowns, and in the last column how far they have moved.
   RowMajor follow(3 * size, columns + 1);
   for (Index i = 0; i < size; ++i) {
     const Index v = seen_[static_cast<std::size_t>(i)];
     follow.block(3 * i, 0, 3, columns) = there.d_surface.middleRows<3>(3 * v);
     follow.block<3, 1>(3 * i, columns) = (there.markers_m().row(v) - seen_m_.row(i)).transpose();
   }
-  RowMajor bent(3 * size, columns + 1);
-  constexpr int narrow = 4, wide = 8;  // vector registers
-  for (Index from = 0; from <= columns;) {
-    const bool few = columns + 1 - from <= narrow;
-    few ? multiply<narrow>(follow, from, bent) : multiply<wide>(follow, from, bent);
-    from += few ? narrow : wide;
-  }
+  add_form(follow, times_blocks(follow), cross_, surface_slope_, unknowns, places, out);
+}
+
+void SurfaceQuadratic::add_form(const RowMajor& follow, const RowMajor& bent, const RowMajor& cross, const VectorX& slope_there,
+                                const VectorX& unknowns, const std::vector<int>& places, Evaluation& out) const {
+  const Index columns = static_cast<Index>(follow.cols()) - 1, count = static_cast<Index>(own_.size());
   const VectorX own_moved = unknowns(own_) - own_at_;
   const VectorX moved = follow.col(columns);
-  const VectorX turn = bent.col(columns) + cross_ * own_moved, own_turn = cross_.transpose() * moved + own_block_ * own_moved;
+  const VectorX turn = bent.col(columns) + cross * own_moved, own_turn = cross.transpose() * moved + own_block_ * own_moved;
 
-  const double gain = surface_slope_.dot(moved) + own_slope_.dot(own_moved) + 0.5 * bend_ * (moved.dot(turn) + own_moved.dot(own_turn));
+  const double gain = slope_there.dot(moved) + own_slope_.dot(own_moved) + 0.5 * bend_ * (moved.dot(turn) + own_moved.dot(own_turn));
   (robust_ ? out.robust_cost : out.cost) += cost_ + gain;
   const auto followed = follow.leftCols(columns).transpose();
   VectorX slope(columns + count);
-  slope << followed * (surface_slope_ + bend_ * turn), own_slope_ + bend_ * own_turn;
+  slope << followed * (slope_there + bend_ * turn), own_slope_ + bend_ * own_turn;
   MatrixX block(slope.size(), slope.size());
   block.topLeftCorner(columns, columns) = followed * bent.leftCols(columns);
-  block.topRightCorner(columns, count) = followed * cross_;
+  block.topRightCorner(columns, count) = followed * cross;
   block.bottomLeftCorner(count, columns) = block.topRightCorner(columns, count).transpose();
   block.bottomRightCorner(count, count) = own_block_;
   for (std::size_t a = 0; a < places.size(); ++a) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "palpate/estimation/normal_equations.hpp"
@@ -35,9 +36,15 @@ class SurfaceQuadratic {
   /// How far a vertex or a point of the frame has moved at most since, m.
   double moved_m(const StepPrediction& there, const VectorX& unknowns, const Unknowns& list) const;
 
+  /// True where the prediction's coordinates (StepPrediction::in_span) are those that the rows were made with: its d_surface may
+  /// be empty.
+  bool shares_span(const StepPrediction& there) const {
+    return span_ && there.in_span && there.in_span->is_along(span_->span, span_->loads);
+  }
+
   /// Adds cost, slope and curvature at another prediction. @param places  where in `out` are: the prediction's columns, the own
   /// unknowns
-  void add_to(const StepPrediction& there, const VectorX& unknowns, const std::vector<int>& places, Evaluation& out) const;
+  void add_to(const StepPrediction& there, const VectorX& unknowns, const std::vector<int>& places, Evaluation& out);
 
  private:
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -47,6 +54,17 @@ class SurfaceQuadratic {
   /// Columns `from` to `from + width` of the blocks times `columns`; beyond the last one they count as zero.
   template <int width>
   void multiply(const RowMajor& columns, Index from, RowMajor& out) const;
+  RowMajor times_blocks(const RowMajor& columns) const;
+  /// The form of coordinates in place of vertices.
+  struct InSpan {
+    RowMajor block, cross;  ///< coordinates x coordinates, x own
+    VectorX slope;
+  };
+  InSpan summed_up() const;
+  /// @param follow  of the form's variables a row: how they follow the prediction's columns, and last how far they have moved
+  /// @param bent  the form's block times that  @param cross, slope  the form's, of its variables
+  void add_form(const RowMajor& follow, const RowMajor& bent, const RowMajor& cross, const VectorX& slope, const VectorX& unknowns,
+                const std::vector<int>& places, Evaluation& out) const;
 
   std::vector<int> own_;
   VectorX own_at_;
@@ -62,6 +80,8 @@ class SurfaceQuadratic {
   RowMajor cross_;  ///< 3 seen x own
   MatrixX own_block_;
   VectorX surface_slope_, own_slope_;
+  std::optional<SpanPlace> span_;  ///< of the surface then, without derivatives; nothing: there is no span
+  std::optional<InSpan> in_span_;  ///< made when it is first of use
 };
 
 }  // namespace palpate::estimation

@@ -100,7 +100,7 @@ std::shared_ptr<const UnitResponses> LinearResponse::at(double poisson_ratio) co
   if (inside && usable_ && coefficients_.empty() && options_.poisson_upper > options_.poisson_lower) make_polynomial();
   std::shared_ptr<const UnitResponses> answer;
   if (inside && !coefficients_.empty()) {
-    answer = std::make_shared<UnitResponses>(interpolate(poisson_ratio));
+    answer = std::make_shared<UnitResponses>(interpolate(poisson_ratio, 0));
   } else {
     answer = std::make_shared<UnitResponses>(solve(poisson_ratio));
   }
@@ -164,28 +164,39 @@ void LinearResponse::make_polynomial() const {
   }
 }
 
-UnitResponses LinearResponse::interpolate(double poisson_ratio) const {
+std::shared_ptr<const ResponseSpan> LinearResponse::span(Index rows, double poisson_ratio) const {
+  const std::lock_guard lock(mutex_);
+  if (coefficients_.empty() || poisson_ratio < options_.poisson_lower || poisson_ratio > options_.poisson_upper) return nullptr;
+  if (!span_) {
+    const double low = poisson_to_z(options_.poisson_lower), high = poisson_to_z(options_.poisson_upper);
+    span_ = std::make_shared<const ResponseSpan>(span_of(coefficients_, rows, 0.5 * (low + high), 0.5 * (high - low)));
+  }
+  return span_;
+}
+
+UnitResponses LinearResponse::interpolate(double poisson_ratio, Index first_row) const {
   const double low = poisson_to_z(options_.poisson_lower), high = poisson_to_z(options_.poisson_upper);
   const Range range{0.5 * (low + high), 0.5 * (high - low)};
   const double z = poisson_to_z(poisson_ratio);
   VectorX value(static_cast<Index>(coefficients_.size())), slope;
   chebyshev(range.to_unit(z), value, slope);
   const double chain = 1 / (range.half * poisson_d_z(z));
-  MatrixX y(coefficients_[0].rows(), coefficients_[0].cols()), dy(y.rows(), y.cols());
-  constexpr Eigen::Index piece = 512;  // sums stay in the first cache while every coefficient is read once
-  for (Eigen::Index from = 0; from < y.size(); from += piece) {
-    const Eigen::Index size = std::min(piece, y.size() - from);
-    const auto part = [&](auto& matrix) { return Eigen::Map<VectorX>(matrix.data() + from, size); };
-    auto sum = part(y), sum_of_slopes = part(dy);
-    sum = Eigen::Map<const VectorX>(coefficients_[0].data() + from, size);
-    sum_of_slopes.setZero();
-    for (std::size_t i = 1; i < coefficients_.size(); ++i) {
-      const Eigen::Map<const VectorX> coefficient(coefficients_[i].data() + from, size);
-      sum += value(static_cast<Index>(i)) * coefficient;
-      sum_of_slopes += chain * slope(static_cast<Index>(i)) * coefficient;
+  MatrixX y(coefficients_[0].rows() - first_row, coefficients_[0].cols()), dy(y.rows(), y.cols());
+  constexpr Index piece = 512;  // sums stay in the first cache while every coefficient is read once
+  for (Index column = 0; column < y.cols(); ++column) {
+    for (Index from = 0; from < y.rows(); from += piece) {
+      const Index size = std::min<Index>(piece, static_cast<Index>(y.rows()) - from);
+      auto sum = y.col(column).segment(from, size), sum_of_slopes = dy.col(column).segment(from, size);
+      sum = coefficients_[0].col(column).segment(first_row + from, size);
+      sum_of_slopes.setZero();
+      for (std::size_t i = 1; i < coefficients_.size(); ++i) {
+        const auto coefficient = coefficients_[i].col(column).segment(first_row + from, size);
+        sum += value(static_cast<Index>(i)) * coefficient;
+        sum_of_slopes += chain * slope(static_cast<Index>(i)) * coefficient;
+      }
     }
   }
-  const Index rows = static_cast<Index>(watched_.rows()), m = static_cast<Index>(y.rows()) - rows - 1;
+  const Index rows = static_cast<Index>(watched_.rows()) - first_row, m = static_cast<Index>(y.rows()) - rows - 1;
   const Index k = static_cast<Index>(y.cols()) - m;
   UnitResponses out;
   out.poisson_ratio = poisson_ratio;

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <vector>
 
+#include "palpate/fem/response_span.hpp"
 #include "palpate/fem/statics.hpp"
 
 namespace palpate::fem {
@@ -30,6 +31,12 @@ class LinearResponse {
   /// Answers at one nu, solved for or interpolated.
   std::shared_ptr<const UnitResponses> at(double poisson_ratio) const;
 
+  /// Fields that the first `rows` watched rows of all answers are sums of; always for the same `rows`. nullptr: the polynomial was
+  /// not needed yet, or does not reach this ratio.
+  std::shared_ptr<const ResponseSpan> span(Index rows, double poisson_ratio) const;
+  /// What at() says of the watched rows from `first_row` on, where span() has an answer.
+  UnitResponses rows_from(Index first_row, double poisson_ratio) const { return interpolate(poisson_ratio, first_row); }
+
   /// Of the polynomial, relative: the larger of its last coefficients and what the solver left over (0: not made).
   double interpolation_error() const;
   int factorisations() const;
@@ -39,7 +46,7 @@ class LinearResponse {
  private:
   UnitResponses solve(double poisson_ratio) const;
   void make_polynomial() const;
-  UnitResponses interpolate(double poisson_ratio) const;
+  UnitResponses interpolate(double poisson_ratio, Index first_row) const;
 
   const Statics& statics_;
   Eigen::SparseMatrix<double> watched_;
@@ -49,6 +56,7 @@ class LinearResponse {
   mutable int factorisations_ = 0, load_cases_ = 0;
   mutable bool usable_ = true;                 // false: the polynomial would be too large, or not accurate enough
   mutable std::vector<MatrixX> coefficients_;  // of T_i: [watched; reactions of forces and motions; gradients] x (k + m)
+  mutable std::shared_ptr<const ResponseSpan> span_;
   mutable double error_ = 0, residual_ = 0;
 };
 

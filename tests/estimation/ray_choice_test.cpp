@@ -131,6 +131,30 @@ TEST(RayChoice, TheSameRaysCountForEveryPoissonRatio) {
   EXPECT_GT(ball.finite_rows(nu, ball.loss), 0.9 * ball.finite_rows(nu, all));
 }
 
+TEST(RayChoice, IsMadeFromOneCast) {
+  PressedBall ball;
+  ASSERT_EQ(ball.optimum.termination, Termination::converged) << ball.optimum.message;
+  const VectorX at = ball.optimum.unknowns;
+  Loss none = ball.loss;
+  none.rays.clear();
+  ball.objective->evaluate(at, none);
+  const Loss expected = ball.objective->with_chosen_rays(none);
+  const double cost = ball.objective->evaluate(at, expected).cost;
+
+  ball.objective->set_reuse(0.3);
+  const int before = ball.objective->steps_evaluated();
+  const Loss chosen = ball.objective->choose_rays(at, none);
+  ASSERT_EQ(chosen.rays.size(), expected.rays.size());
+  for (std::size_t s = 0; s < chosen.rays.size(); ++s) EXPECT_EQ(*chosen.rays[s], *expected.rays[s]) << s;
+  EXPECT_EQ(ball.objective->steps_evaluated(), before + 2);
+  EXPECT_NEAR(ball.objective->evaluate(at, chosen).cost, cost, 1e-9 * cost);
+  EXPECT_EQ(ball.objective->steps_evaluated(), before + 2) << "cast twice at one place";
+  VectorX moved = at;
+  moved(log_young) += 1;
+  ball.objective->evaluate(moved, chosen);
+  EXPECT_EQ(ball.objective->steps_evaluated(), before + 3) << "the pressed step: the other one has no load";
+}
+
 TEST(RayChoice, TheSearchOverThePoissonRatioAgreesWithTheFit) {
   PressedBall ball;
   ASSERT_EQ(ball.optimum.termination, Termination::converged) << ball.optimum.message;

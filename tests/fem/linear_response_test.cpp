@@ -112,6 +112,39 @@ TEST_P(LinearResponseContract, SolvesOutsideItsRange) {
   EXPECT_EQ(response.interpolation_error(), 0);
 }
 
+// The first rows of all answers as sums of few fields, and the others alone.
+TEST_P(LinearResponseContract, SpansItsAnswers) {
+  const Statics statics(mesh, "linear", driven(), options);
+  const LinearResponse response(statics, everything(), range);
+  const Index all = 3 * static_cast<Index>(mesh.nodes_m.rows()), rows = all - 30;
+  const double middle = 0.5 * (range.poisson_lower + range.poisson_upper);
+  EXPECT_EQ(response.span(rows, middle), nullptr) << "nothing was solved for yet";
+  response.at(middle);
+  EXPECT_EQ(response.span(rows, range.poisson_upper + 1e-3), nullptr);
+  for (double share : {0.0, 0.3, 0.9}) {
+    const double nu = range.poisson_lower + share * (range.poisson_upper - range.poisson_lower);
+    const auto unit = response.at(nu);
+    const auto span = response.span(rows, nu);
+    ASSERT_NE(span, nullptr);
+    const ResponseSpan::Terms terms = span->terms_at(nu);
+    EXPECT_LT(span->fields.cols(), 8 * terms.value.size()) << "no fewer than the polynomial has terms";
+    for (Index load = 0; load < 8; ++load) {
+      const auto fields = span->fields.middleCols(span->first[static_cast<std::size_t>(load)], span->count_of(load));
+      const MatrixX& shares = span->share[static_cast<std::size_t>(load)];
+      const bool pushes = load < 6;
+      const VectorX value = (pushes ? unit->force.col(load) : unit->motion.col(load - 6)).head(rows);
+      const VectorX slope = (pushes ? unit->force_d_poisson.col(load) : unit->motion_d_poisson.col(load - 6)).head(rows);
+      EXPECT_LT((fields * (shares * terms.value) - value).norm(), 1e-6 * value.norm()) << load;
+      EXPECT_LT((fields * (shares * terms.d_poisson) - slope).norm(), 2 * slope_tolerance(nu, slope.norm(), value.norm())) << load;
+    }
+    const UnitResponses last = response.rows_from(rows, nu);
+    EXPECT_EQ(last.force, unit->force.bottomRows(30));
+    EXPECT_EQ(last.motion_d_poisson, unit->motion_d_poisson.bottomRows(30));
+    EXPECT_EQ(last.reaction_motion, unit->reaction_motion);
+    EXPECT_EQ(last.largest_gradient_force, unit->largest_gradient_force);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Elements, LinearResponseContract,
                          testing::Values(Case{4, Dilatation::pointwise, 0, 0.49}, Case{4, Dilatation::averaged, 0.05, 0.499},
                                          Case{10, Dilatation::pointwise, -0.5, 0.45},

@@ -129,8 +129,10 @@ class RayTerm : public Term {
                              (share * scattered->error.per_cosine / sigma_m * scattered->cosine_per_corner[k]);
       }
       for (int k = 0; k < 3; ++k) {
-        slope.noalias() -=
-            slopes.middleCols<3>(3 * rest_.triangles(triangle, k)) * (barycentric(k) / sigma_m * gradient);
+        const Vec3 weighed = barycentric(k) / sigma_m * gradient;
+        const double* const of_corner = slopes.data() + 3 * count * rest_.triangles(triangle, k);
+        for (Index c = 0; c < count; ++c)
+          slope(c) -= of_corner[c] * weighed(0) + of_corner[count + c] * weighed(1) + of_corner[2 * count + c] * weighed(2);
       }
       rows.jacobian.row(i).head(count) = slope.transpose();
       if (view.surface_slopes) {

@@ -33,6 +33,7 @@ class TravelTerm : public Term {
     rows.unit = "m";
     return rows;
   }
+  bool looks_at_surface() const override { return false; }
   double typical_sigma() const override { return sigma_m_; }
 
  private:
@@ -66,6 +67,7 @@ class WrenchTerm : public Term {
     rows.unit = "N";
     return rows;
   }
+  bool looks_at_surface() const override { return false; }
   double typical_sigma() const override { return wrench_.force_sigma_n; }
 
  private:

@@ -1,0 +1,117 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// A linear body's surface in few coordinates: the same surface, and a quadratic form of its vertices says the same of them.
+#include "palpate/estimation/surface_quadratic.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/estimation/objective.hpp"
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// Forces that err in all directions, at contacts that may be elsewhere.
+Recording uncertain_push() {
+  Recording recording = pushed_block_recording();
+  recording.pushes[0].force_tare_std_n = 2e-3;
+  for (Step& step : recording.pushes[0].steps) step.loads[0].contact_std_m = 1e-3;
+  return recording;
+}
+
+struct Scene {
+  Recording recording;
+  Unknowns unknowns;
+  std::unique_ptr<ForwardModel> model;
+  std::unique_ptr<Objective> objective;
+  VectorX here, there;
+
+  explicit Scene(Recording of = uncertain_push()) : recording(std::move(of)) {
+    PushedBlock truth;
+    truth.material = "linear";
+    Inputs inputs = clouds_of(truth, recording);
+    for (auto& step : inputs) {
+      std::get<PointCloud>(step[0]).pose_std_m = 5e-4;
+      std::get<PointCloud>(step[0]).pose_std_rad = 2e-3;
+    }
+    model = std::make_unique<ForwardModel>(recording, coarse_block("linear"), unknowns);
+    objective = std::make_unique<Objective>(*model, inputs, unknowns);
+    here = unknowns.prior_mean();
+    here(log_young) = std::log(truth.young_pa);
+    here(poisson) = 0.3;
+    model->predict(1, here);  // what is solved for is there from now on
+    there = here;
+    for (int k = 0; k < unknowns.size(); ++k) there(k) += k == log_young ? 0.1 : k == poisson ? -0.12 : 0.3 * unknowns[k].prior_std;
+  }
+};
+
+TEST(SpanPlace, IsWhereTheSurfaceGoes) {
+  Scene scene;
+  for (const VectorX& at : {scene.here, scene.there}) {
+    const StepPrediction all = scene.model->predict(1, at), few = scene.model->predict_in_span(1, at, false);
+    ASSERT_TRUE(few.in_span);
+    EXPECT_EQ(few.d_surface.rows(), 0) << "nothing is saved";
+    EXPECT_EQ(few.columns, all.columns);
+    const double size_m = (all.surface_m - scene.model->object().surface.rest().vertices_m).norm();
+    EXPECT_LT((few.surface_m - all.surface_m).norm(), 1e-6 * size_m);
+    EXPECT_LT((few.travel_m - all.travel_m).norm(), 1e-9 * all.travel_m.norm());
+    EXPECT_LT((few.d_travel - all.d_travel).norm(), 1e-9 * all.d_travel.norm());
+    for (std::size_t k = 0; k < all.columns.size(); ++k) {
+      SpanPlace slope = *few.in_span;
+      slope.at = few.in_span->d_at.col(static_cast<Index>(k));
+      const VectorX expected = all.d_surface.col(static_cast<Index>(k));
+      EXPECT_LT((slope.moved_m() - expected).norm(), 1e-5 * expected.norm()) << scene.unknowns[all.columns[k]].name;
+    }
+  }
+}
+
+TEST(SpanPlace, IsNotSaidOfABodyThatAClampTurns) {
+  Recording recording = uncertain_push();
+  recording.supports[0].pose_std_m = recording.supports[0].pose_std_rad = 1e-3;
+  Scene scene(recording);
+  const StepPrediction turned = scene.model->predict_in_span(1, scene.there, false);
+  EXPECT_FALSE(turned.in_span);
+  EXPECT_EQ(turned.d_surface, scene.model->predict(1, scene.there).d_surface);
+}
+
+TEST(SurfaceQuadratic, SaysTheSameOfFieldsAsOfVertices) {
+  Scene scene;
+  const Loss loss;
+  const SurfacePattern pattern(scene.model->object().surface.rest());
+  const StepPrediction then = scene.model->predict_in_span(1, scene.here, true);
+  const std::vector<TermRows> rows = scene.objective->rows_of(1, then, scene.here, loss, true);
+  SurfaceQuadratic form(pattern, rows[0], loss, then, scene.here);
+  const StepPrediction all = scene.model->predict(1, scene.there), few = scene.model->predict_in_span(1, scene.there, false);
+  EXPECT_FALSE(form.shares_span(all));
+  ASSERT_TRUE(form.shares_span(few));
+  const auto ask = [&](const StepPrediction& now) {
+    std::vector<int> places = now.columns;
+    places.insert(places.end(), form.own().begin(), form.own().end());
+    Evaluation out = Evaluation::nothing(scene.unknowns.size());
+    form.add_to(now, scene.there, places, out);
+    return out;
+  };
+  const Evaluation of_vertices = ask(all), of_fields = ask(few);
+  EXPECT_GT(of_vertices.robust_cost, 0);
+  EXPECT_NEAR(of_fields.robust_cost, of_vertices.robust_cost, 1e-6 * of_vertices.robust_cost);
+  EXPECT_LT((of_fields.gradient - of_vertices.gradient).norm(), 1e-5 * of_vertices.gradient.norm());
+  for (int k = 0; k < scene.unknowns.size(); ++k) {
+    const VectorX expected = of_vertices.curvature.col(k);
+    EXPECT_LT((of_fields.curvature.col(k) - expected).norm(), 1e-5 * expected.norm() + 1e-12) << scene.unknowns[k].name;
+  }
+}
+
+TEST(SurfaceQuadratic, KnowsFieldsOfAnotherBodyFromItsOwn) {
+  Scene scene, other;
+  const SurfacePattern pattern(scene.model->object().surface.rest());
+  const StepPrediction then = scene.model->predict_in_span(1, scene.here, true);
+  const std::vector<TermRows> rows = scene.objective->rows_of(1, then, scene.here, {}, true);
+  const SurfaceQuadratic form(pattern, rows[0], {}, then, scene.here);
+  EXPECT_TRUE(form.shares_span(scene.model->predict_in_span(1, scene.there, false)));
+  EXPECT_FALSE(form.shares_span(other.model->predict_in_span(1, scene.there, false)));
+}
+
+}  // namespace
+}  // namespace palpate::estimation
