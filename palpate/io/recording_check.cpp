@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "palpate/io/recording.hpp"
+#include "palpate/io/recording_reader.hpp"
 
 namespace palpate::io {
 namespace {
@@ -64,6 +65,7 @@ class Checker {
       }
     }
     for (const Tool& tool : recording_.tools) check_platen(tool);
+    check_numbers(recording_, problems_);
     for (const Push& push : recording_.pushes) check_signs(push);
     check_loads(loaded);
     if (recording_.pushes.empty())
