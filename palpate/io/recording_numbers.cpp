@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <vector>
 
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_reader.hpp"
@@ -193,14 +194,22 @@ class OddNumbers {
     if (g > 0 && (g < 9.5 || g > 10.1))
       say(fmt::format("gravity_m_s2 is {:.4g} m/s2 long; on earth it is 9.81", g), recording_.source);
     for (const Tool& tool : recording_.tools) look_at(tool);
+    const double usual_n = usual_force();
     for (const Push& push : recording_.pushes) {
+      look_at_signs(push);
+      if (usual_n > 0 && push.force_tare_std_n > usual_n && !push.steps.empty())
+        say(fmt::format("force_tare_std_n of {:.3g} N is more than most forces ({:.3g} N)", push.force_tare_std_n, usual_n),
+            push.steps.front().source);
       for (const Step& step : push.steps) {
-        for (const Load& load : step.loads) look_at(load, step);
+        for (const Load& load : step.loads) look_at(load, usual_n, step);
         for (const Observation& one : step.observations) {
           if (const auto* frame = std::get_if<DepthFrame>(&one)) look_at(*frame, step);
           if (const auto* cloud = std::get_if<PointCloud>(&one); cloud && cloud->sigma_m.size() > 0)
             look_at_sigma(cloud->sigma_m.minCoeff(), "the cloud's points", step);
           if (const auto* wrench = std::get_if<Wrench>(&one)) look_at_time(wrench->time_s, "wrench", step);
+          const auto* travel = std::get_if<ToolTravel>(&one);
+          if (travel && travel->travel_m < -(5 * travel->sigma_m + 3 * push.travel_offset_std_m + 1e-4) && !step.loads.empty())
+            say("the observed travel is negative: the tool would stand off the object; is its sign right?", step.source);
         }
         look_at_joints(step);
       }
@@ -220,10 +229,42 @@ class OddNumbers {
     if (tool.friction_coefficient > 2) say(fmt::format("a friction_coefficient of {:.3g} is unusual", tool.friction_coefficient), where);
   }
 
-  void look_at(const Load& load, const Step& step) {
+  /// Median of the forces that act.
+  double usual_force() const {
+    std::vector<double> all;
+    for (const Push& push : recording_.pushes)
+      for (const Step& step : push.steps)
+        for (const Load& load : step.loads)
+          if (load.force_n && load.force_n->norm() > 0) all.push_back(load.force_n->norm());
+    if (all.empty()) return 0;
+    const std::size_t middle = (all.size() - 1) / 2;
+    std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(middle), all.end());
+    return all[middle];
+  }
+
+  /// One step in which a tool pulls among steps in which it presses is a sign lost on the way.
+  void look_at_signs(const Push& push) {
+    int presses = 0;
+    const Step* pulls = nullptr;
+    for (const Step& step : push.steps) {
+      for (const Load& load : step.loads) {
+        if (!load.force_n) continue;
+        const double along_n = load.force_n->dot(load.direction), unsure_n = 5 * (load.force_std_n + push.force_tare_std_n);
+        presses += along_n > unsure_n ? 1 : 0;
+        if (along_n < -std::max(unsure_n, 0.5 * load.force_n->norm()) && pulls == nullptr) pulls = &step;
+      }
+    }
+    if (pulls != nullptr && presses > 0)
+      say(fmt::format("force_n pulls, against 'direction', where other steps of push '{}' press; is its sign right?", push.name),
+          pulls->source);
+  }
+
+  void look_at(const Load& load, double usual_n, const Step& step) {
     if (!load.force_n) return;
     const double force_n = load.force_n->norm();
     if (force_n > 1e4) say(fmt::format("the force of '{}' is above 10 kN; is it in mN?", load.tool), step.source);
+    if (force_n > 100 * usual_n)
+      say(fmt::format("the force of {:.3g} N is more than a hundred times that of most steps ({:.3g} N)", force_n, usual_n), step.source);
     if (force_n > 0 && load.force_std_n > force_n)
       say(fmt::format("the force of '{}' is known to worse than itself (force_std_n {:.3g} N); such steps tell next to nothing",
                       load.tool, load.force_std_n),
@@ -237,8 +278,9 @@ class OddNumbers {
       say(fmt::format("fx_px {:.4g} and fy_px {:.4g} of its camera are far from each other; pixels are mostly square",
                       camera.fx_px, camera.fy_px),
           step.source);
-    if (camera.cx_px < 0 || camera.cy_px < 0 || camera.cx_px > camera.width_px || camera.cy_px > camera.height_px)
-      say(fmt::format("cx_px {:.4g}, cy_px {:.4g} of its camera lie outside the image of {} x {} pixels", camera.cx_px,
+    const auto far_aside = [](double at_px, int size_px) { return at_px < 0.1 * size_px || at_px > 0.9 * size_px; };
+    if (far_aside(camera.cx_px, camera.width_px) || far_aside(camera.cy_px, camera.height_px))
+      say(fmt::format("cx_px {:.4g}, cy_px {:.4g} of its camera are far from the middle of the image of {} x {} pixels", camera.cx_px,
                       camera.cy_px, camera.width_px, camera.height_px),
           step.source);
     if (frame.noise.model == "constant") look_at_sigma(frame.noise.sigma_m, "the depth", step);

@@ -136,11 +136,14 @@ TEST_F(AbsurdRecording, WhatIsMeasuredTwiceInOneStepIsRefused) {
 TEST_F(AbsurdRecording, WhatIsOnlyOddIsSaidAndRead) {
   EXPECT_THAT(warnings_with("radius_m: 0.02", "radius_m: 0.5"), ElementsAre(HasSubstr("more than the whole object")));
   EXPECT_THAT(warnings_with("fx_px: 10", "fx_px: 30"), ElementsAre(HasSubstr("pixels are mostly square")));
-  EXPECT_THAT(warnings_with("cx_px: 3.5", "cx_px: 20"), ElementsAre(HasSubstr("outside the image of 8 x 6")));
+  EXPECT_THAT(warnings_with("cx_px: 3.5", "cx_px: 20"), ElementsAre(HasSubstr("far from the middle of the image of 8 x 6")));
   EXPECT_THAT(warnings_with("sigma_m: 0.002", "sigma_m: 0.9"), ElementsAre(HasSubstr("nothing is seen so")));
   EXPECT_THAT(warnings_with("sigma_m: 0.002", "sigma_m: 1e-8"), ElementsAre(HasSubstr("finer than any sensor")));
   EXPECT_THAT(warnings_with("force_std_n: 0.02", "force_std_n: 5"), ElementsAre(HasSubstr("worse than itself")));
   EXPECT_THAT(warnings_with("time_s: 1.1", "time_s: 900"), ElementsAre(HasSubstr("of one clock?")));
+  EXPECT_THAT(warnings_with("force_n: [0, 0, -1]", "direction: [0, 0, -1], force_n: [0, 0, 1]"),
+              ElementsAre(HasSubstr("pulls, against 'direction'")));
+  EXPECT_THAT(warnings_with("force_n: [0, 0, -1]", "force_n: [0, 0, -999]"), ElementsAre(HasSubstr("hundred times")));
   EXPECT_THAT(warnings_with("environment: {", "density_kg_m3: 30\nenvironment: {gravity_m_s2: [0, 0, -98.1], "),
               ElementsAre(HasSubstr("gravity_m_s2")));
 }
