@@ -104,6 +104,10 @@ TEST_F(AbsurdRecording, WhatCannotBeIsRefusedByFieldValueAndLikelyMistake) {
       {"time_s: 1.1", "time_s: -7", "recording.yaml:18", "time_s of its image goes back, to -7 s"},
       {"time_s: 1\n", "time_s: 1\n        T_base_tip: {position_m: [0, 0, 600], quaternion_xyzw: [1, 0, 0, 0]}\n",
        "recording.yaml:18", "T_base_tip is 600 m from the object"},
+      {"{kind: vertices, file: fixed.csv}", "{kind: plane, name: table, point_m: [0, 0, 0], normal: [0, 0, 1], tolerance_m: 0.5}",
+       "recording.yaml:5", "every node lies within tolerance_m (500 mm) of the plane of 'table'"},
+      {"{kind: vertices, file: fixed.csv}", "{kind: box, name: grip, min_m: [-1, -1, -1], max_m: [1, 1, 1]}", "recording.yaml:5",
+       "every node lies in the box of 'grip'"},
       {"normal: [0, 0, 1]", "normal: [0, 0, -1]", "environment.planes[0]", "behind this plane"},
       {"point_m: [0, 0, 0]", "point_m: [0, 0, -750]", "environment.planes[0]", "750 m from the object"},
   };
