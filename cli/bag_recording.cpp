@@ -54,6 +54,7 @@ Recording load_recording(Session& session, const fs::path& path, const fs::path&
         problems.size() > 1 ? fmt::format(" ({} more: `palpate info` lists them)", problems.size() - 1) : std::string();
     throw Error(problems.front().what + more, problems.front().where);
   }
+  for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
   return recording;
 }
 

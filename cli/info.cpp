@@ -252,7 +252,8 @@ int look(Session& session, const Arguments& given) {
     }
     all["bag"] = bag;
   }
-  const Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
+  Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
+  for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
   std::vector<io::Problem> problems = io::check_recording(recording);
   if (const auto wrong = wrong_material(recording.model.material)) problems.push_back({"model.material", *wrong});
   all.update(described(recording, problems));

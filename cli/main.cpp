@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <string>
 #include <vector>
@@ -131,6 +132,10 @@ int main(int argc, char** argv) {
   } catch (const palpate::Error& error) {
     const bool usage = is_usage(error.where());
     return fail(session, usage ? exit_usage : exit_input, usage ? "usage" : "input", with_option(error), error.where());
+  } catch (const std::filesystem::filesystem_error& error) {
+    const std::string where = error.path1().empty() ? "file" : error.path1().string();
+    return fail(session, exit_input, "input",
+                error.code().message() + "; check that it is there, its permissions and the room on the disk", where);
   } catch (const std::bad_alloc&) {
     return fail(session, exit_internal, "internal",
                 "not enough memory for this problem; use a coarser mesh or fewer points");

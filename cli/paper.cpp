@@ -10,6 +10,7 @@
 #include "cli/number_checks.hpp"
 #include "cli/paper_json.hpp"
 #include "cli/paper_page.hpp"
+#include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/file.hpp"
@@ -72,6 +73,7 @@ int remake(Session& session, const PaperArguments& arguments) {
       throw Error("takes the place of the cow, which is not among the scenes: add --scene cow", "--object " + arguments.object);
   }
   const int seeds = arguments.seeds > 0 ? arguments.seeds : arguments.quick ? 1 : 100;
+  must_take_files(arguments.output);
   fs::create_directories(arguments.output);
   std::string command = fmt::format("palpate paper -o OUT{} --seeds {} --seed {}", arguments.quick ? " --quick" : "", seeds, session.seed);
   for (const std::string& name : arguments.scenes) command += " --scene " + name;

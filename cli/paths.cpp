@@ -65,6 +65,11 @@ void must_take_files(const fs::path& folder) {
   if (access(there.c_str(), W_OK | X_OK) != 0) {
     throw Error(which + "may not be written by you; give another folder, or change its permissions", folder.string());
   }
+  // Some places refuse whoever may write: better known before the work than after it.
+  fs::create_directories(folder, code);
+  if (code) throw Error(fmt::format("cannot be made ({}); give another folder", code.message()), folder.string());
+  for (fs::path made = fs::absolute(without_slash(folder)); made != there; made = made.parent_path())
+    if (!fs::remove(made, code)) break;
 }
 
 }  // namespace palpate::cli

@@ -112,6 +112,21 @@ void put_on_surface(const TetMesh& mesh, const Tool& tool, Load& load, Session& 
                 "--direction " + words(load.direction));
 }
 
+/// A solver looks long for an equilibrium that no material has.
+void must_be_bearable(const prediction::NewPush& push, const Tool& tool, const TetMesh& mesh, double young_modulus_pa) {
+  const double size_m = mesh_size_m(mesh);
+  if (push.travel_m && *push.travel_m > size_m)
+    throw Error(fmt::format("is further than the object is large ({}); it is in metres", report::quantity(size_m, "m")),
+                fmt::format("--travel {:g}", *push.travel_m));
+  const bool round = tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc;
+  const double area_m2 = round && tool.radius_m > 0 ? EIGEN_PI * tool.radius_m * tool.radius_m : size_m * size_m;
+  constexpr double most_over_young = 10;
+  if (push.force_n && *push.force_n > most_over_young * young_modulus_pa * area_m2)
+    throw Error(fmt::format("is {:.2g} times what E ({}) bears on the pressed patch; no such object stands that. It is in newtons",
+                            *push.force_n / (young_modulus_pa * area_m2), report::quantity(young_modulus_pa, "Pa")),
+                fmt::format("--force {:g}", *push.force_n));
+}
+
 int run(const Options& given, Session& session) {
   end_at_first_interrupt();
   const LearnedObject learned = load_learned_object(given.result);
@@ -136,6 +151,7 @@ int run(const Options& given, Session& session) {
   if (!given.out.empty()) must_take_files(given.out);
   fem::Boundary boundary = boundary_of(object, tool, load, push.background);
   const prediction::Elasticity elasticity = prediction::elasticity_of(learned.answer);
+  must_be_bearable(push, tool, mesh, elasticity.young_modulus_pa);
   fem::StaticsOptions options;
   options.threads = session.thread_count();
   if (mesh.tetrahedra.cols() == 10 && elasticity.poisson_ratio > 0.45) options.dilatation = fem::Dilatation::averaged;

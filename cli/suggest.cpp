@@ -110,8 +110,14 @@ std::vector<std::size_t> pushes_to_target(const Options& given, const estimation
 
 int run(const Options& given, Session& session) {
   std::vector<std::string> warnings;
-  const Known known = read(session, given, warnings);
+  Known known = read(session, given, warnings);
   SuggestOptions options = given.suggest;
+  if (const std::string why = known.answer ? why_not_to_build_on(*known.answer) : ""; !why.empty()) {
+    options.young_modulus_pa = estimation::after_fit(known.recording, *known.answer).young_modulus_pa;
+    known.answer.reset();
+    warnings.push_back("the result is not built on, its E is a guess only and pushes are ranked as before the first touch (" + why +
+                       "). Estimate again without that push, or push anew");
+  }
   options.goal = estimation::push_goal(given.goal);
   options.threads = session.thread_count();
   options.candidates.seed = session.seed;
@@ -139,6 +145,8 @@ int run(const Options& given, Session& session) {
     session.say(fmt::format(
         "before the first touch: E is taken as {} (--young-modulus), nu as {:.2f}; forces go with E, intervals hardly do",
         report::quantity(knowledge.young_modulus_pa, "Pa"), knowledge.poisson_ratio));
+  if (ranking.too_soft > 0)
+    session.say(fmt::format("left out         {} pushes along which the supports do not hold the object", ranking.too_soft));
   if (ranking.pushes.empty()) {
     session.warn(
         fmt::format("none of {} possible pushes is in view: give more viewpoints (--views)", scene.candidates.size()));
@@ -171,6 +179,7 @@ int run(const Options& given, Session& session) {
                          {"sequence", nlohmann::json::array()},
                          {"refused", scene.refused},
                          {"out_of_view", ranking.out_of_view},
+                         {"not_held", ranking.too_soft},
                          {"warnings", warnings}};
   for (const auto& push : ranking.pushes) json["pushes"].push_back(json_of(push, scene));
   for (const auto& viewpoint : scene.viewpoints) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <memory>
 #include <utility>
 
@@ -217,7 +218,25 @@ std::function<bool(const Vec3&, const Vec3&)> reach_of(const Recording& recordin
   };
 }
 
+/// What supports do that the linear model of all candidates does not.
+void warn_of_supports(const Recording& recording, std::vector<std::string>& warnings) {
+  for (const Support& support : recording.supports) {
+    if (support.contact == ContactLaw::bonded) continue;
+    warnings.push_back("'" + support.name + "' (" + (support.contact == ContactLaw::friction ? "friction" : "frictionless") +
+                       ") is taken to hold the object " +
+                       (support.contact == ContactLaw::friction ? "without a slip" : "down, and to let it slide freely") +
+                       ": pushes that would lift, tilt or slide it are not known to the ranking; look whether it stays where it is");
+  }
+}
+
 }  // namespace
+
+std::string why_not_to_build_on(const Identification& so_far) {
+  constexpr const char* moved[] = {"contact_slipped", "contact_elsewhere", "object_moved"};
+  for (const Verdict& verdict : so_far.verdicts)
+    if (std::find(std::begin(moved), std::end(moved), verdict.code) != std::end(moved)) return verdict.code + ": " + verdict.message;
+  return {};
+}
 
 PushScene prepare_pushes(const Recording& recording, const SuggestOptions& options, const OnProgress& progress) {
   PushScene scene;
@@ -229,6 +248,7 @@ PushScene prepare_pushes(const Recording& recording, const SuggestOptions& optio
   scene.sensors = options.sensors ? *options.sensors : errors_of(recording, scene.warnings);
   scene.sensors.views.clear();
   add_views(scene, recording, options);
+  warn_of_supports(recording, scene.warnings);
 
   std::vector<Index> held;
   for (const auto& support : scene.object.supports) {

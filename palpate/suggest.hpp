@@ -46,6 +46,10 @@ struct PushScene {
   std::vector<std::string> warnings;   ///< what was assumed
 };
 
+/// Why what is known so far cannot be built on: a tool that slipped or an object that moved is not in the model that pushes are
+/// ranked by, and its intervals are those of that model. Empty: it can.
+std::string why_not_to_build_on(const Identification& so_far);
+
 /// @throws Error where the shape cannot be simulated, the tool is not round, or no candidate is left.
 PushScene prepare_pushes(const Recording& recording, const SuggestOptions& options, const OnProgress& progress = {});
 

@@ -243,6 +243,29 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   const auto torn = [&](double volume_m3, double share) {
     return reference > 0 && std::abs(volume_m3 / reference - 1) > (solid.watertight() ? share : share + 0.2);
   };
+  const double takes = 0.4 * solid.area_m2() / (wall * wall);  // walls of this width
+  const auto too_thin = [&] {
+    if (!(wall < 0.4 * cell))
+      return Error(fmt::format("{} tetrahedra cannot follow it: parts of it are too thin, or tiny and far from the rest; ask for more, or "
+                               "leave those parts out",
+                               o.tetrahedra),
+                   "surface");
+    if (takes > most_tetrahedra)
+      return Error(fmt::format("its walls, {:.2g} m thick on average, are too thin to be filled: walls of that width and size take some "
+                               "{:.0e} tetrahedra, at most {} are made",
+                               wall, takes, most_tetrahedra),
+                   "surface");
+    return Error(
+        fmt::format("its walls, {:.2g} m thick on average, are too thin for {} tetrahedra; walls of that width and size "
+                    "take some {:.1g} or more",
+                    wall, o.tetrahedra, std::max(3.0 * o.tetrahedra, takes)),
+        "surface");
+  };
+  // Improved for long, walls come out with about as many as they take, and more than four times what was asked for is refused.
+  constexpr double hopeless = 8;
+  if (reference > 0 && solid.watertight() && o.improve && o.edge_m == 0 && o.finer.empty() && wall < 0.4 * cell &&
+      takes > hopeless * o.tetrahedra)
+    throw too_thin();
   std::optional<Draft> best;
   double best_ratio = 0, intact_cell = cell;
   for (int attempt = 0; attempt < attempts; ++attempt) {
@@ -261,24 +284,6 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     if ((ratio > 0.95 && ratio < 5) || out.cancelled) break;
     cell *= std::pow(std::clamp(ratio / 1.25, 0.2, 3.0), 0.43);
   }
-  const auto too_thin = [&] {
-    const double takes = 0.4 * solid.area_m2() / (wall * wall);
-    if (!(wall < 0.4 * cell))
-      return Error(fmt::format("{} tetrahedra cannot follow it: parts of it are too thin, or tiny and far from the rest; ask for more, or "
-                               "leave those parts out",
-                               o.tetrahedra),
-                   "surface");
-    if (takes > most_tetrahedra)
-      return Error(fmt::format("its walls, {:.2g} m thick on average, are too thin to be filled: walls of that width and size take some "
-                               "{:.0e} tetrahedra, at most {} are made",
-                               wall, takes, most_tetrahedra),
-                   "surface");
-    return Error(
-        fmt::format("its walls, {:.2g} m thick on average, are too thin for {} tetrahedra; walls of that width and size "
-                    "take some {:.1g} or more",
-                    wall, o.tetrahedra, std::max(3.0 * o.tetrahedra, takes)),
-        "surface");
-  };
   if (!best) throw too_thin();
   const bool shell = reference > 0 && wall < 0.4 * intact_cell;
   if (best_ratio > 1.05 && o.edge_m == 0 && o.improve && !out.cancelled) {

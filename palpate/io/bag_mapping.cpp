@@ -36,8 +36,8 @@ void read_depth(const YamlField& list, BagMapping& mapping) {
     camera.frame = keys.text_or("frame", "");
     if (const auto wanted = keys.optional("mask_robot")) camera.mask_robot = wanted->boolean();
     if (const auto straight = keys.optional("rectified")) camera.rectified = straight->boolean();
-    camera.like.pose_std_m = keys.non_negative_or("pose_std_m", 0);
-    camera.like.pose_std_rad = keys.non_negative_or("pose_std_rad", 0);
+    camera.like.pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std);
+    camera.like.pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);
     camera.like.noise = read_depth_noise(keys.required("noise", "e.g. {model: constant, sigma_m: 0.002}"));
     keys.finish();
     mapping.cameras.push_back(std::move(camera));
@@ -50,9 +50,9 @@ void read_clouds(const YamlField& list, BagMapping& mapping) {
     MappedCloud cloud;
     cloud.topic = topic_of(keys.required("topic"));
     cloud.frame = keys.text_or("frame", "");
-    cloud.sigma_m = keys.required("sigma_m", "the standard deviation of a point, per axis").positive();
-    cloud.pose_std_m = keys.non_negative_or("pose_std_m", 0);
-    cloud.pose_std_rad = keys.non_negative_or("pose_std_rad", 0);
+    cloud.sigma_m = keys.required("sigma_m", "the standard deviation of a point, per axis").within(ranges::length_sigma);
+    cloud.pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std);
+    cloud.pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);
     keys.finish();
     mapping.clouds.push_back(std::move(cloud));
   }
@@ -122,7 +122,7 @@ void read_wrench(const YamlField& field, StreamPlan& plan) {
     }
   }
   if (const auto duration = keys.optional("tare_s")) plan.tare_s = duration->positive();
-  plan.tool_mass_kg = keys.non_negative_or("tool_mass_kg", 0);
+  plan.tool_mass_kg = keys.within_or("tool_mass_kg", 0, ranges::tool_mass);
   if (const auto centre = keys.optional("tool_centre_m")) plan.tool_centre_m = centre->vector3();
   if (const auto gravity = keys.optional("gravity_m_s2")) plan.gravity_m_s2 = gravity->vector3();
   keys.finish();
@@ -143,15 +143,15 @@ void read_push_keys(YamlKeys& keys, const Recording& recording, PlannedPush& pus
   push.site = keys.text_or("site", push.site);
   if (const auto contact = keys.optional("contact_m")) push.contact_m = contact->vector3();
   if (const auto direction = keys.optional("direction")) push.direction = direction->unit_vector();
-  push.force_tare_std_n = keys.non_negative_or("force_tare_std_n", push.force_tare_std_n);
-  push.travel_offset_std_m = keys.non_negative_or("travel_offset_std_m", push.travel_offset_std_m);
-  push.contact_std_m = keys.non_negative_or("contact_std_m", push.contact_std_m);
-  push.force_relative_std = keys.non_negative_or("force_relative_std", push.force_relative_std);
-  if (const auto sigma = keys.optional("force_std_n")) push.force_std_n = sigma->non_negative();
+  push.force_tare_std_n = keys.within_or("force_tare_std_n", push.force_tare_std_n, ranges::force_std);
+  push.travel_offset_std_m = keys.within_or("travel_offset_std_m", push.travel_offset_std_m, ranges::length_std);
+  push.contact_std_m = keys.within_or("contact_std_m", push.contact_std_m, ranges::length_std);
+  push.force_relative_std = keys.within_or("force_relative_std", push.force_relative_std, ranges::share_std);
+  if (const auto sigma = keys.optional("force_std_n")) push.force_std_n = sigma->within(ranges::force_std);
   if (const auto sigma = keys.optional("travel_sigma_m")) {
-    push.travel_sigma_m = sigma->is_list() ? sigma->numbers() : std::vector<double>{sigma->positive()};
-    for (const double value : push.travel_sigma_m)
-      if (!(value > 0)) sigma->fail("must be larger than 0");
+    push.travel_sigma_m.clear();
+    for (const YamlField& one : sigma->is_list() ? sigma->items() : std::vector<YamlField>{*sigma})
+      push.travel_sigma_m.push_back(one.within(ranges::length_sigma));
   }
 }
 

@@ -2,6 +2,7 @@
 // ROS 1 bags, version 2.0 (wiki.ros.org/Bags/Format/2.0): records of a header (fields `name=value`) and data; messages and
 // the connections that they came over stand in chunks. Read front to back, without the index at the end, so that a bag that
 // was never closed (.bag.active) is read as well.
+#include <algorithm>
 #include <deque>
 #include <map>
 #include <optional>
@@ -51,14 +52,26 @@ class Ros1Parser {
   bool records(std::string_view bytes, bool in_chunk) {
     ByteFields fields(bytes);
     while (!fields.at_end()) {
+      const std::size_t begin = fields.position();
       const std::string_view head = fields.view();
+      const bool has_head = fields.good;
       const std::string_view data = fields.view();
-      if (!fields.good) return false;
+      if (!fields.good) {
+        if (!in_chunk) cut_at_ = magic.size() + begin;
+        if (!in_chunk && has_head) cut_chunk(head, fields.rest());
+        return false;
+      }
       const auto header = header_of(head);
       if (!header || !record(*header, data, in_chunk)) ++damaged_;
     }
     return true;
   }
+
+  /// What the file's length says against its header: it was closed, and its index lies beyond its end.
+  bool lacks_index(std::size_t file_bytes) const { return index_at_ > file_bytes; }
+  std::size_t cut_at() const { return cut_at_; }
+  std::optional<std::int64_t> first_ns() const { return edge([](const auto& a, const auto& b) { return a.time_ns < b.time_ns; }); }
+  std::optional<std::int64_t> last_ns() const { return edge([](const auto& a, const auto& b) { return a.time_ns > b.time_ns; }); }
 
   MessageCollector collector;
   std::size_t damaged() const { return damaged_; }
@@ -79,11 +92,32 @@ class Ros1Parser {
     std::string_view data;
   };
 
+  template <typename Before>
+  std::optional<std::int64_t> edge(Before before) const {
+    const auto found = std::min_element(waiting_.begin(), waiting_.end(), before);
+    return found == waiting_.end() ? std::nullopt : std::optional(found->time_ns);
+  }
+
+  /// The file ends within this chunk: its first messages are whole all the same.
+  void cut_chunk(std::string_view head, std::string_view data) {
+    const auto header = header_of(head);
+    if (!header || number_of<std::uint8_t>(*header, "op") != op_chunk) return;
+    const auto size = number_of<std::uint32_t>(*header, "size");
+    if (!size) return;
+    const std::string compression = text_of(*header, "compression");
+    if (compression != "none") {
+      storage_.push_back(unpack_what_is_left(data, compression, *size));
+      data = storage_.back();
+    }
+    records(data, true);
+  }
+
   bool record(const Header& header, std::string_view data, bool in_chunk) {
     const auto op = number_of<std::uint8_t>(header, "op");
     if (!op) return false;
     if (*op == op_bag) {
-      if (!text_of(header, "encryptor").empty()) throw Error("is encrypted", "bag");
+      if (!text_of(header, "encryptor").empty()) throw Error("is encrypted; record it without encryption", "bag");
+      index_at_ = number_of<std::uint64_t>(header, "index_pos").value_or(0);
     } else if (*op == op_connection) {
       const auto id = number_of<std::uint32_t>(header, "conn");
       const auto inner = header_of(data);
@@ -111,7 +145,8 @@ class Ros1Parser {
   std::deque<std::string>& storage_;
   std::map<std::uint32_t, std::size_t> connections_;
   std::vector<Waiting> waiting_;
-  std::size_t damaged_ = 0, orphans_ = 0;
+  std::size_t damaged_ = 0, orphans_ = 0, cut_at_ = 0;
+  std::uint64_t index_at_ = 0;
 };
 
 }  // namespace
@@ -123,8 +158,10 @@ MessageSource parse_ros1_bag(std::string bytes, const std::string& name) {
   if (!all.starts_with(magic)) throw Error("is not of version 2.0; convert it with `rosbag fix` or `rosbag reindex`", name);
   Ros1Parser parser(*storage);
   try {
-    if (!parser.records(all.substr(magic.size()), false))
-      parser.collector.warnings.push_back("the file is cut off: what was recorded up to there is read");
+    const bool whole = parser.records(all.substr(magic.size()), false);
+    if (!whole || parser.lacks_index(all.size()))
+      parser.collector.warnings.push_back(
+          cut_off_warning(all.size(), whole ? all.size() : parser.cut_at(), parser.first_ns(), parser.last_ns()));
   } catch (const Error& error) {
     throw Error(error.message(), name);
   }

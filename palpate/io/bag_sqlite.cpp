@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // rosbag2's older container (rosbag2_storage_sqlite3): table `topics` (id, name, type, serialization_format) and table
 // `messages` (topic_id, timestamp in ns, data). SQLite itself reads it, from memory.
+#include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <map>
 
 #include "palpate/core/error.hpp"
@@ -42,6 +44,21 @@ bool mend(std::string& bytes) {
   return true;
 }
 
+struct Row {
+  std::size_t topic;
+  std::int64_t time_ns;
+};
+
+std::string cut_or_damaged(const std::vector<Row>& found, std::size_t file_bytes) {
+  const std::string where = fmt::format("the file of {} bytes is cut off or damaged: ", file_bytes);
+  if (found.empty()) return where + "there is no message to be read";
+  const auto [first, last] = std::minmax_element(found.begin(), found.end(),
+                                                 [](const Row& a, const Row& b) { return a.time_ns < b.time_ns; });
+  return fmt::format("{}what could be read up to there is read, {} messages; the last is of {:.6f} s, {:.3f} s after the first",
+                     where, found.size(), 1e-9 * static_cast<double>(last->time_ns),
+                     1e-9 * static_cast<double>(last->time_ns - first->time_ns));
+}
+
 struct Storage {
   sqlite3* database = nullptr;
   std::string bytes;
@@ -53,6 +70,7 @@ struct Storage {
 
 MessageSource parse_sqlite_bag(std::string bytes, const std::string& name) {
   const auto storage = std::make_shared<Storage>();
+  const std::size_t file_bytes = bytes.size();
   storage->bytes = std::move(bytes);
   const bool is_cut = mend(storage->bytes);
   auto* raw = reinterpret_cast<unsigned char*>(storage->bytes.data());
@@ -84,10 +102,6 @@ MessageSource parse_sqlite_bag(std::string bytes, const std::string& name) {
   if (!topics.is_done()) throw Error("is damaged: the table of topics cannot be read", name);
   // In the order of the rows, without the index, which a crash may have left behind.
   Statement rows(database, "SELECT topic_id, timestamp, data FROM messages NOT INDEXED");
-  struct Row {
-    std::size_t topic;
-    std::int64_t time_ns;
-  };
   std::vector<Row> found;
   std::size_t orphans = 0;
   while (rows.next()) {
@@ -103,7 +117,7 @@ MessageSource parse_sqlite_bag(std::string bytes, const std::string& name) {
   }
   for (std::size_t i = 0; i < found.size(); ++i) collector.add(found[i].topic, found[i].time_ns, storage->data[i]);
   if (!rows.is_done() || is_cut)
-    collector.warnings.push_back("the file is cut off or damaged: what could be read up to there is read");
+    collector.warnings.push_back(cut_or_damaged(found, file_bytes));
   if (orphans > 0)
     collector.warnings.push_back(std::to_string(orphans) + " messages of topics that are not described were left out");
   return collector.finish(storage, name);

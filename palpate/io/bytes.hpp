@@ -50,6 +50,7 @@ class ByteFields {
     return result;
   }
   std::string_view rest() { return take(bytes_.size() - at_); }
+  std::size_t position() const { return at_; }
   bool at_end() const { return at_ == bytes_.size(); }
   bool good = true;
 

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "palpate/core/error.hpp"
+#include "palpate/io/bag_formats.hpp"
 #include "palpate/io/bytes.hpp"
 #include "palpate/io/unpack.hpp"
 
@@ -54,20 +55,30 @@ class McapParser {
   /// Records one after the other; false when the bytes end within one.
   bool records(std::string_view bytes, bool in_chunk) {
     for (std::size_t at = 0; at < bytes.size();) {
-      if (bytes.size() - at < 9) return false;
+      if (bytes.size() - at < 9) {
+        cut_at_ = at;
+        return false;
+      }
       const auto opcode = static_cast<std::uint8_t>(bytes[at]);
       const auto size = load<std::uint64_t>(bytes.data() + at + 1);
       at += 9;
       if (opcode == op_footer && whole_) return true;
-      if (size > bytes.size() - at) return false;
+      if (size > bytes.size() - at) {
+        cut_at_ = at - 9;
+        if (opcode == op_chunk && !in_chunk) cut_chunk(ByteFields(bytes.substr(at)));
+        return false;
+      }
       const std::string_view content = bytes.substr(at, size);
       at += size;
       if (opcode == op_data_end && !in_chunk) whole_ = true;  // the summary that follows repeats schemas and channels
       if (!record_of(opcode, ByteFields(content), in_chunk)) ++damaged_;
     }
+    cut_at_ = bytes.size();
     return in_chunk || whole_;
   }
 
+  /// Where in the bytes the first record begins that is not whole.
+  std::size_t cut_at() const { return cut_at_; }
   std::size_t damaged() const { return damaged_; }
   bool has_header() const { return has_header_; }
 
@@ -106,6 +117,25 @@ class McapParser {
     return fields.good;  // other records are of no interest here
   }
 
+  /// The file ends within this chunk: its first messages are whole all the same, though its check sum cannot be compared.
+  void cut_chunk(ByteFields fields) {
+    fields.number<std::uint64_t>();
+    fields.number<std::uint64_t>();
+    const auto size = fields.number<std::uint64_t>();
+    fields.number<std::uint32_t>();
+    const std::string compression = fields.text();
+    fields.number<std::uint64_t>();
+    if (!fields.good) return;
+    std::string_view left = fields.rest();
+    if (!compression.empty()) {
+      file_.storage_.push_back(unpack_what_is_left(left, compression, size));
+      left = file_.storage_.back();
+    }
+    const std::size_t here = cut_at_;
+    records(left, true);
+    cut_at_ = here;
+  }
+
   bool chunk(ByteFields& fields) {
     fields.number<std::uint64_t>();  // first and last time
     fields.number<std::uint64_t>();
@@ -127,7 +157,7 @@ class McapParser {
 
   McapFile& file_;
   std::map<std::uint16_t, std::pair<std::string, std::string>> schemas_;
-  std::size_t damaged_ = 0;
+  std::size_t damaged_ = 0, cut_at_ = 0;
   bool has_header_ = false, whole_ = false;
 };
 
@@ -139,7 +169,6 @@ McapFile McapFile::parse(std::string bytes, const std::string& name) {
   McapParser parser(file);
   const bool whole = parser.records(all.substr(magic.size()), false);
   if (!parser.has_header()) throw Error("is cut off before its first record; record it again", name);
-  if (!whole) file.warnings.push_back("the file is cut off: what was recorded up to there is read");
   // A channel that was lost with a damaged chunk is found in the summary, if there is one.
   const auto orphans = std::remove_if(file.messages.begin(), file.messages.end(),
                                       [&](const McapMessage& message) { return file.channels.count(message.channel) == 0; });
@@ -152,6 +181,14 @@ McapFile McapFile::parse(std::string bytes, const std::string& name) {
     file.warnings.push_back(std::to_string(parser.damaged()) + " damaged records or chunks were left out");
   std::stable_sort(file.messages.begin(), file.messages.end(),
                    [](const McapMessage& a, const McapMessage& b) { return a.log_time_ns < b.log_time_ns; });
+  if (!whole) {
+    const auto time = [&](const McapMessage& one) { return static_cast<std::int64_t>(one.log_time_ns); };
+    const bool any = !file.messages.empty();
+    file.warnings.insert(file.warnings.begin(),
+                         cut_off_warning(all.size(), magic.size() + parser.cut_at(),
+                                         any ? std::optional(time(file.messages.front())) : std::nullopt,
+                                         any ? std::optional(time(file.messages.back())) : std::nullopt));
+  }
   return file;
 }
 

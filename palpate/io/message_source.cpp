@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/io/message_source.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <fstream>
@@ -171,6 +173,14 @@ MessageSource parse_bag(std::string bytes, const std::string& name) {
   std::string known;
   for (const BagFormat& format : bag_formats()) known += (known.empty() ? "" : "; ") + format.about;
   throw Error(bytes.empty() ? "is an empty file" : "does not start as a bag does. These are read: " + known, name);
+}
+
+std::string cut_off_warning(std::size_t file_bytes, std::size_t within, std::optional<std::int64_t> first_ns,
+                            std::optional<std::int64_t> last_ns) {
+  const std::string where = fmt::format("the file is cut off at byte {}, within what begins at byte {}", file_bytes, within);
+  if (!first_ns || !last_ns) return where + ", before its first whole message: there is nothing to be read";
+  return fmt::format("{}; the last whole message is of {:.6f} s, {:.3f} s after the first: what was recorded up to there is read",
+                     where, 1e-9 * static_cast<double>(*last_ns), 1e-9 * static_cast<double>(*last_ns - *first_ns));
 }
 
 std::string ros2_type_name(const std::string& type) {

@@ -30,6 +30,9 @@ Recording read_recording_unchecked(const std::filesystem::path& folder);
 /// travels to the object, loads. Empty = usable.
 std::vector<Problem> check_recording(const Recording& recording);
 
+/// What can be, and is seldom meant: warnings in words that name the place, for whoever reads the recording.
+std::vector<std::string> odd_numbers(const Recording& recording);
+
 /// Writes a recording while it is being made. After every step the folder is a whole recording: files are put in place
 /// first, then the index by renaming, so that a crash loses at most the step in flight. To go on after one, start from what
 /// `read_recording_unchecked` gives.

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "palpate/io/recording.hpp"
+#include "palpate/io/recording_reader.hpp"
 
 namespace palpate::io {
 namespace {
@@ -64,6 +65,7 @@ class Checker {
       }
     }
     for (const Tool& tool : recording_.tools) check_platen(tool);
+    check_numbers(recording_, problems_);
     for (const Push& push : recording_.pushes) check_signs(push);
     check_loads(loaded);
     if (recording_.pushes.empty())
@@ -135,6 +137,10 @@ class Checker {
             fmt::format(
                 "no node lies within {} of the plane of '{}', the nearest is {} away; move the plane or raise 'tolerance_m'",
                 length(support.tolerance_m), support.name, length(distance.minCoeff())));
+      } else if (distance.maxCoeff() <= support.tolerance_m) {
+        add(support.source, fmt::format("every node lies within tolerance_m ({}) of the plane of '{}', so nothing is left to move; is it in "
+                                        "metres?",
+                                        length(support.tolerance_m), support.name));
       }
     } else if (support.select == NodeSelection::box) {
       Eigen::Index inside = 0;
@@ -144,6 +150,9 @@ class Checker {
       }
       if (inside == 0)
         add(support.source, fmt::format("no node lies in the box of '{}'; the object reaches from [{}] to [{}]",
+                                        support.name, point(box_.min), point(box_.max)));
+      else if (inside == nodes_.rows())
+        add(support.source, fmt::format("every node lies in the box of '{}', so nothing is left to move; the object reaches from [{}] to [{}]",
                                         support.name, point(box_.min), point(box_.max)));
     } else if (half_space) {
       const double lowest = ((nodes_.rowwise() - support.plane.point_m.transpose()) * support.plane.normal).minCoeff();

@@ -21,7 +21,11 @@ void read_density(YamlKeys& keys, Recording& recording) {
   if (field->is_map()) {
     YamlKeys inner(*field);
     recording.density_kg_m3 = inner.required("value").positive();
-    recording.density_std_kg_m3 = inner.non_negative_or("std", 0);
+    if (const auto std = inner.optional("std")) {
+      recording.density_std_kg_m3 = std->non_negative();
+      if (recording.density_std_kg_m3 > recording.density_kg_m3)
+        std->fail("is larger than the density itself; it is a standard deviation in kg/m3");
+    }
     inner.finish();
   } else {
     recording.density_kg_m3 = field->positive();
@@ -80,8 +84,8 @@ void read_object(YamlKeys& keys, RecordingContext& context) {
   recording.name = keys.text_or("name", fs::absolute(context.folder.root()).lexically_normal().filename().string());
   recording.description = keys.text_or("description", "");
   recording.accept_size = keys.boolean_or("accept_size", false);
-  recording.force_scale_std = keys.non_negative_or("force_scale_std", 0);
-  recording.time_offset_std_s = keys.non_negative_or("time_offset_std_s", 0);
+  recording.force_scale_std = keys.within_or("force_scale_std", 0, ranges::share_std);
+  recording.time_offset_std_s = keys.within_or("time_offset_std_s", 0, ranges::clock_std);
   read_density(keys, recording);
   read_environment(keys, recording);
   // Keys are asked for in an order that lets each part refer to what it needs, and all before any is missed, so that a
@@ -153,6 +157,7 @@ Recording read_recording(const fs::path& folder) {
     if (problems.size() > 1) what += " (" + std::to_string(problems.size() - 1) + " more: `palpate info` lists them)";
     throw Error(what, problems.front().where);
   }
+  for (std::string& odd : odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
   return recording;
 }
 

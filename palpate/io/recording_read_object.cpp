@@ -43,6 +43,18 @@ void check_indices(const std::vector<Index>& indices, const RecordingContext& co
   }
 }
 
+/// Focal lengths and image centre: in pixels they go with the size of the image.
+void read_pinhole(YamlKeys& keys, Camera& camera) {
+  const auto one = [&](const char* key, int size_px, double middle_px, const PhysicalRange& share) {
+    const YamlField field = keys.required(key);
+    return field.within({middle_px + share.least * size_px, middle_px + share.most * size_px, "px", share.slip});
+  };
+  camera.fx_px = one("fx_px", camera.width_px, 0, ranges::focal_over_width);
+  camera.fy_px = one("fy_px", camera.height_px, 0, ranges::focal_over_width);
+  camera.cx_px = one("cx_px", camera.width_px, 0.5 * camera.width_px, ranges::centre_over_width);
+  camera.cy_px = one("cy_px", camera.height_px, 0.5 * camera.height_px, ranges::centre_over_width);
+}
+
 }  // namespace
 
 Pose pose_from(const Vec3& position_m, const Eigen::Vector4d& q, const std::string& where) {
@@ -104,7 +116,7 @@ ContactLaw read_contact(YamlKeys& keys, bool is_required, double& friction_coeff
                          ? std::optional<YamlField>(keys.required("contact", "choose bonded, frictionless or friction"))
                          : keys.optional("contact");
   const ContactLaw law = field ? field->choice<ContactLaw>(contact_names) : ContactLaw::bonded;
-  if (law == ContactLaw::friction) friction_coefficient = keys.required("friction_coefficient").positive();
+  if (law == ContactLaw::friction) friction_coefficient = keys.required("friction_coefficient").within(ranges::friction);
   return law;
 }
 
@@ -115,8 +127,8 @@ void read_rest(const YamlField& field, RecordingContext& context) {
              observed = keys.optional("observed_triangles");
   const auto scale_field = keys.optional("scale_to_m");
   const double scale = scale_field ? scale_field->positive() : 1.0;
-  rest.surface_std_m = keys.non_negative_or("surface_std_m", rest.surface_std_m);
-  if (const auto length = keys.optional("surface_correlation_m")) rest.surface_correlation_m = length->positive();
+  rest.surface_std_m = keys.within_or("surface_std_m", rest.surface_std_m, ranges::length_std);
+  if (const auto length = keys.optional("surface_correlation_m")) rest.surface_correlation_m = length->within(ranges::length_scale);
   rest.state =
       keys.required("state", "choose stress_free, under_gravity or under_pressure").choice<RestState>(rest_state_names);
   keys.finish();
@@ -197,18 +209,18 @@ void read_supports(const YamlField& field, RecordingContext& context) {
     } else {
       support.select = NodeSelection::plane;
       support.plane = read_plane(keys);
-      if (const auto tolerance = keys.optional("tolerance_m")) support.tolerance_m = tolerance->positive();
+      if (const auto tolerance = keys.optional("tolerance_m")) support.tolerance_m = tolerance->within(ranges::length_sigma);
     }
     const bool half_space = support.kind == SupportKind::table || support.kind == SupportKind::wall;
     support.contact = read_contact(keys, half_space, support.friction_coefficient);
     if (const auto spread = keys.optional("spread_std_m")) {
-      support.spread_std_m = spread->non_negative();
+      support.spread_std_m = spread->within(ranges::length_std);
       if (support.contact != ContactLaw::bonded && support.spread_std_m > 0)
         spread->fail("is for a support that is bonded; one that is not slides by itself");
     }
     if (clamp) {
-      support.pose_std_m = keys.non_negative_or("pose_std_m", 0);
-      support.pose_std_rad = keys.non_negative_or("pose_std_rad", 0);
+      support.pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std);
+      support.pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);
       if (const auto varies = keys.optional("pose_varies"))
         support.pose_varies = varies->choice<PoseVaries>(pose_varies_names);
     }
@@ -219,6 +231,10 @@ void read_supports(const YamlField& field, RecordingContext& context) {
 }
 
 void read_tools(const YamlField& field, RecordingContext& context) {
+  // An object of any size may be pushed with a tool of any size.
+  const auto size = [&](const YamlField& one, const PhysicalRange& range) {
+    return context.recording.accept_size ? one.positive() : one.within(range);
+  };
   for (const YamlField& item : field.items()) {
     YamlKeys keys(item);
     Tool tool;
@@ -231,12 +247,15 @@ void read_tools(const YamlField& field, RecordingContext& context) {
     const bool round = tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc || tool.shape == ToolShape::capsule;
     const bool long_one = tool.shape == ToolShape::capsule || tool.shape == ToolShape::edge;
     if (tool.shape == ToolShape::vertices) tool.vertices = read_index_list(keys, context);
-    if (round) tool.radius_m = keys.required("radius_m").positive();
-    if (tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc)
-      tool.radius_std_m = keys.non_negative_or("radius_std_m", 0);
-    if (tool.shape == ToolShape::edge) tool.radius_m = keys.non_negative_or("radius_m", 0);
+    if (round) tool.radius_m = size(keys.required("radius_m"), ranges::tool_radius);
+    if (tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc) {
+      tool.radius_std_m = keys.within_or("radius_std_m", 0, ranges::length_std);
+      if (tool.radius_std_m > tool.radius_m)
+        keys.required("radius_std_m").fail("is larger than the radius itself; it is a standard deviation in metres");
+    }
+    if (tool.shape == ToolShape::edge) tool.radius_m = keys.within_or("radius_m", 0, ranges::strip_half_width);
     if (long_one) {
-      tool.length_m = keys.required("length_m").positive();
+      tool.length_m = size(keys.required("length_m"), ranges::tool_length);
       tool.axis = keys.required("axis").unit_vector();
     }
     if (tool.shape == ToolShape::platen) tool.plane = read_plane(keys);
@@ -248,8 +267,8 @@ void read_tools(const YamlField& field, RecordingContext& context) {
       });
     }
     tool.contact = read_contact(keys, tool.shape != ToolShape::vertices, tool.friction_coefficient);
-    tool.compliance_m_per_n = keys.non_negative_or("compliance_m_per_n", 0);
-    tool.compliance_std_m_per_n = keys.non_negative_or("compliance_std_m_per_n", 0);
+    tool.compliance_m_per_n = keys.within_or("compliance_m_per_n", 0, ranges::compliance);
+    tool.compliance_std_m_per_n = keys.within_or("compliance_std_m_per_n", 0, ranges::compliance);
     keys.finish();
     context.recording.tools.push_back(std::move(tool));
   }
@@ -259,10 +278,10 @@ DepthNoise read_depth_noise(const YamlField& field) {
   YamlKeys keys(field);
   DepthNoise noise;
   noise.model = keys.required("model").text();
-  if (noise.model == "constant") noise.sigma_m = keys.required("sigma_m").positive();
-  noise.bias_std_m = keys.non_negative_or("bias_std_m", 0);
-  noise.shared_std_m = keys.non_negative_or("shared_std_m", 0);
-  if (keys.optional("lens_scatter_std")) noise.lens_scatter_std = keys.non_negative_or("lens_scatter_std", 0);
+  if (noise.model == "constant") noise.sigma_m = keys.required("sigma_m").within(ranges::length_sigma);
+  noise.bias_std_m = keys.within_or("bias_std_m", 0, ranges::length_std);
+  noise.shared_std_m = keys.within_or("shared_std_m", 0, ranges::length_std);
+  if (const auto scatter = keys.optional("lens_scatter_std")) noise.lens_scatter_std = scatter->within(ranges::share_std);
   keys.finish();
   return noise;
 }
@@ -275,10 +294,7 @@ void read_cameras(const YamlField& field, RecordingContext& context) {
     const YamlField name = keys.required("name");
     camera.width_px = keys.required("width_px").whole(1, 20000);
     camera.height_px = keys.required("height_px").whole(1, 20000);
-    camera.fx_px = keys.required("fx_px").positive();
-    camera.fy_px = keys.required("fy_px").positive();
-    camera.cx_px = keys.required("cx_px").number();
-    camera.cy_px = keys.required("cy_px").number();
+    read_pinhole(keys, camera);
     if (const auto distortion = keys.optional("distortion")) {
       YamlKeys inner(*distortion);
       camera.distortion = inner.required("model").choice<DistortionModel>(distortion_names);
@@ -293,13 +309,13 @@ void read_cameras(const YamlField& field, RecordingContext& context) {
         distortion->fail("has " + std::to_string(given) +
                          " coefficients; plumb_bob has 4 or 5, rational 8, fisheye 4, none 0");
     }
-    entry.depth_unit_m = keys.required("depth_unit_m", "0.001 for most 16-bit images").positive();
+    entry.depth_unit_m = keys.required("depth_unit_m", "0.001 for most 16-bit images").within(ranges::image_unit);
     if (const auto pose = keys.optional("T_base_camera")) {
       entry.frame.T_base_camera = read_pose(*pose);
       entry.has_pose = true;
     }
-    entry.frame.pose_std_m = keys.non_negative_or("pose_std_m", 0);
-    entry.frame.pose_std_rad = keys.non_negative_or("pose_std_rad", 0);
+    entry.frame.pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std);
+    entry.frame.pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);
     entry.frame.noise = read_depth_noise(keys.required("noise", "e.g. {model: constant, sigma_m: 0.002}"));
     keys.finish();
     if (!context.cameras.emplace(name.text(), std::move(entry)).second)
@@ -334,7 +350,7 @@ void read_markers(const YamlField& field, RecordingContext& context) {
   YamlKeys keys(field);
   const auto file = keys.optional("file"), list = keys.optional("rest_m");
   if (static_cast<bool>(file) == static_cast<bool>(list)) field.fail("give either 'file' or 'rest_m'");
-  context.marker_rest_std_m = keys.non_negative_or("rest_std_m", 0);
+  context.marker_rest_std_m = keys.within_or("rest_std_m", 0, ranges::length_std);
   keys.finish();
   MarkerPoints markers;
   if (file) {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include "palpate/io/recording_reader.hpp"
 
 namespace palpate::io {
@@ -38,6 +40,8 @@ void read_loads_and_observations(YamlKeys& keys, const TableRow* row, RecordingC
 
 /// In a push time goes on: a step that stands still in it is there twice.
 void add_step(Step step, Push& push) {
+  if (!(step.time_s >= ranges::time.least && step.time_s <= ranges::time.most))
+    throw Error(fmt::format("is {:g} s, which cannot be; {}", step.time_s, ranges::time.slip), step.source + ": time_s");
   if (!push.steps.empty() && !(step.time_s > push.steps.back().time_s)) {
     const Step& last = push.steps.back();
     const bool same = step.time_s == last.time_s;
@@ -146,13 +150,14 @@ void read_pushes(const YamlField& field, RecordingContext& context) {
       if (other.name == push.name) item.fail("there is a push '" + push.name + "' already; names must differ");
     }
     push.site = keys.text_or("site", "");
-    push.force_tare_std_n = keys.non_negative_or("force_tare_std_n", 0);
-    push.travel_offset_std_m = keys.non_negative_or("travel_offset_std_m", 0);
+    push.force_tare_std_n = keys.within_or("force_tare_std_n", 0, ranges::force_std);
+    push.travel_offset_std_m = keys.within_or("travel_offset_std_m", 0, ranges::length_std);
     std::optional<ForceDrift> drift;
     if (const auto moving = keys.optional("force_drift")) {
       YamlKeys inner(*moving);
-      drift = ForceDrift{inner.required("rate_n_s").vector3(), inner.required("zero_at_s").number()};
+      drift = ForceDrift{inner.required("rate_n_s").vector3(), inner.required("zero_at_s").within(ranges::time)};
       inner.finish();
+      if (drift->rate_n_s.norm() > 1) moving->fail("no sensor's zero moves by more than 1 N a second; is it in millinewtons?");
     }
     const auto steps = keys.optional("steps"), table = keys.optional("table");
     if (static_cast<bool>(steps) == static_cast<bool>(table)) item.fail("give either 'steps' or 'table'");

@@ -68,8 +68,9 @@ MaskImage mask_of(const std::string& file, const std::string& where, const Camer
 
 void read_cloud_observation(YamlKeys& keys, const TableRow* row, const std::string& prefix, bool alone,
                             RecordingContext& context, Step& step) {
-  const double sigma = keys.has("sigma_m") ? keys.required("sigma_m").positive() : nan;
-  const double pose_std_m = keys.non_negative_or("pose_std_m", 0), pose_std_rad = keys.non_negative_or("pose_std_rad", 0);
+  const double sigma = keys.has("sigma_m") ? keys.required("sigma_m").within(ranges::length_sigma) : nan;
+  const double pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std),
+               pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);
   const auto field = keys.optional("file");
   std::optional<std::string> file = field ? std::optional(field->text()) : std::nullopt;
   std::string where = field ? field->where() : keys.map().where();
@@ -97,7 +98,8 @@ void read_marker_observation(YamlKeys& keys, const TableRow* row, RecordingConte
   if (context.marker_names.empty())
     keys.map().fail("markers were observed but the top level has no 'markers' (their positions at rest)");
   Markers markers;
-  markers.sigma_m = keys.required("sigma_m", "the standard deviation of a marker's position, per axis").positive();
+  const YamlField sigma = keys.required("sigma_m", "the standard deviation of a marker's position, per axis");
+  markers.sigma_m = sigma.within(ranges::length_sigma);
   markers.names = context.marker_names;
   markers.rest_m = context.marker_rest_m;
   markers.rest_std_m = context.marker_rest_std_m;
@@ -150,7 +152,7 @@ void read_travel_observation(YamlKeys& keys, const TableRow* row, const std::str
                              const RecordingContext& context, Step& step) {
   ToolTravel travel;
   travel.tool = tool_of(keys, step, context);
-  travel.sigma_m = keys.required("sigma_m", "the standard deviation of the travel").positive();
+  travel.sigma_m = keys.required("sigma_m", "the standard deviation of the travel").within(ranges::length_sigma);
   const auto field = keys.optional("travel_m");
   if (row != nullptr && !field) {
     const std::string column = column_of(*row, prefix, alone, "observed_travel_m");
@@ -199,8 +201,9 @@ void read_wrench_observation(YamlKeys& keys, const TableRow* row, const std::str
                              RecordingContext& context, Step& step) {
   Wrench wrench;
   wrench.tool = tool_of(keys, step, context);
-  wrench.force_sigma_n = keys.required("force_sigma_n", "the standard deviation of the force, per axis").positive();
-  if (const auto sigma = keys.optional("torque_sigma_nm")) wrench.torque_sigma_nm = sigma->positive();
+  const YamlField force_sigma = keys.required("force_sigma_n", "the standard deviation of the force, per axis");
+  wrench.force_sigma_n = force_sigma.within(ranges::force_sigma);
+  if (const auto sigma = keys.optional("torque_sigma_nm")) wrench.torque_sigma_nm = sigma->within(ranges::torque_sigma);
   wrench.time_s = keys.number_or("time_s", step.time_s);
   const auto file = keys.optional("file"), force = keys.optional("force_n"), torque = keys.optional("torque_nm"),
              axis = keys.optional("along");
@@ -294,8 +297,8 @@ DepthFrame read_depth_frame(YamlKeys& keys, const TableRow* row, const std::stri
   if (camera == context.cameras.end()) name.fail("there is no camera '" + name.text() + "' in 'cameras'");
   const CameraEntry& entry = camera->second;
   DepthFrame frame = entry.frame;
-  frame.pose_std_m = keys.non_negative_or("pose_std_m", frame.pose_std_m);
-  frame.pose_std_rad = keys.non_negative_or("pose_std_rad", frame.pose_std_rad);
+  frame.pose_std_m = keys.within_or("pose_std_m", frame.pose_std_m, ranges::length_std);
+  frame.pose_std_rad = keys.within_or("pose_std_rad", frame.pose_std_rad, ranges::angle_std);
   bool has_pose = entry.has_pose;
   if (const auto pose = keys.optional("T_base_camera")) frame.T_base_camera = read_pose(*pose), has_pose = true;
   const auto file = keys.optional("file"), mask = keys.optional("mask");
@@ -374,9 +377,9 @@ Load read_load(const YamlField& field, const TableRow* row, bool alone, const Re
   } else if (tool->shape != ToolShape::vertices && tool->shape != ToolShape::platen) {
     keys.required("contact_m", "where the tool touches the rest surface");
   }
-  load.force_std_n = keys.non_negative_or("force_std_n", 0);
-  load.force_relative_std = keys.non_negative_or("force_relative_std", 0);
-  load.contact_std_m = keys.non_negative_or("contact_std_m", 0);
+  load.force_std_n = keys.within_or("force_std_n", 0, ranges::force_std);
+  load.force_relative_std = keys.within_or("force_relative_std", 0, ranges::share_std);
+  load.contact_std_m = keys.within_or("contact_std_m", 0, ranges::length_std);
   const auto rate = vector("force_rate", "_n_s");
   const auto rate_field = keys.optional("force_rate_n_s");
   if ((rate || rate_field) && !load.force_n) keys.required("force_n", "a rate belongs to a force that is given");

@@ -15,6 +15,11 @@
 
 namespace palpate::io {
 
+struct Problem;
+
+/// The part of check_recording that compares single numbers with what can be: forces, times, poses, places of planes.
+void check_numbers(const Recording& recording, std::vector<Problem>& problems);
+
 /// The files beside the index. Remembers the hash of each.
 class RecordingFolder {
  public:

@@ -242,39 +242,46 @@ json result_json(const Identification& answer) {
 }
 
 Identification parse_result(const std::string& bytes, const std::string& name) {
+  std::string at;  // the last part that was asked for: what is wrong is in it
   try {
     const json object = json::parse(bytes);
-    if (object.at("format") != format_name) {
+    const auto part = [&](const char* key) -> const json& {
+      at = key;
+      return object.at(key);
+    };
+    if (part("format") != format_name) {
       throw Error("its format is not " + std::string(format_name), name + ": format");
     }
     Identification answer;
-    answer.method = object.at("method");
-    answer.material = object.at("material");
-    answer.parameters = all_of(object.at("parameters"), parameter_from);
-    answer.nuisances = all_of(object.at("nuisances"), nuisance_from);
-    answer.covariance = matrix_from(object.at("covariance"));
-    answer.verdicts = all_of(object.at("verdicts"), verdict_from);
-    answer.fit = fit_from(object.at("fit"));
-    answer.prediction = held_out_from(object.at("prediction"));
-    answer.budget = all_of(object.at("budget"), budget_from);
-    answer.per_push = all_of(object.at("per_push"), parameter_from);
-    if (object.contains("per_site")) answer.per_site = all_of(object.at("per_site"), parameter_from);
+    answer.method = part("method");
+    answer.material = part("material");
+    answer.parameters = all_of(part("parameters"), parameter_from);
+    answer.nuisances = all_of(part("nuisances"), nuisance_from);
+    answer.covariance = matrix_from(part("covariance"));
+    answer.verdicts = all_of(part("verdicts"), verdict_from);
+    answer.fit = fit_from(part("fit"));
+    answer.prediction = held_out_from(part("prediction"));
+    answer.budget = all_of(part("budget"), budget_from);
+    answer.per_push = all_of(part("per_push"), parameter_from);
+    if (object.contains("per_site")) answer.per_site = all_of(part("per_site"), parameter_from);
     for (const auto& [word, value] : termination_names) {
-      if (object.at("termination") == word) answer.termination = value;
+      if (part("termination") == word) answer.termination = value;
     }
-    answer.message = object.at("message");
-    answer.provenance = object.at("provenance").get<std::map<std::string, std::string>>();
-    for (const auto& [stage, seconds] : object.at("timing_s").items()) answer.timing_s[stage] = number(seconds);
-    answer.steps = all_of(object.at("steps"), step_from);
-    answer.posterior.young_modulus_pa = vector_from(object.at("posterior").at("young_modulus_pa"));
-    answer.posterior.poisson_ratio = vector_from(object.at("posterior").at("poisson_ratio"));
-    answer.posterior.density = matrix_from(object.at("posterior").at("density"));
-    answer.trace = all_of(object.at("trace"), iteration_from);
+    answer.message = part("message");
+    answer.provenance = part("provenance").get<std::map<std::string, std::string>>();
+    for (const auto& [stage, seconds] : part("timing_s").items()) answer.timing_s[stage] = number(seconds);
+    answer.steps = all_of(part("steps"), step_from);
+    answer.posterior.young_modulus_pa = vector_from(part("posterior").at("young_modulus_pa"));
+    answer.posterior.poisson_ratio = vector_from(part("posterior").at("poisson_ratio"));
+    answer.posterior.density = matrix_from(part("posterior").at("density"));
+    answer.trace = all_of(part("trace"), iteration_from);
     return answer;
   } catch (const json::exception& problem) {
-    throw Error(std::string("is not a whole result of this version (") + problem.what() +
+    const std::string what = problem.what();  // "[json.exception....] and then the words"
+    const std::size_t words = what.find("] ");
+    throw Error("is not a whole result of this version (" + (words == std::string::npos ? what : what.substr(words + 2)) +
                     "); write it again with `palpate estimate`",
-                name);
+                at.empty() ? name : name + ": " + at);
   } catch (const Error& error) {
     throw Error(error.message(), error.where().empty() ? name : error.where());
   }

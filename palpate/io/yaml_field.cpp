@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/io/yaml_field.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -112,6 +114,14 @@ double YamlField::non_negative() const {
   return value;
 }
 
+double YamlField::within(const PhysicalRange& range) const {
+  const double value = range.least > 0 ? positive() : range.least == 0 ? non_negative() : number();
+  if (value >= range.least && value <= range.most) return value;
+  const std::string unit = *range.unit == '\0' ? "" : std::string(" ") + range.unit;
+  fail(fmt::format("is {}{}, which cannot be: {:g} to {:g}{} is possible; {}", shortened(text()), unit, range.least, range.most,
+                   unit, range.slip));
+}
+
 int YamlField::whole(int least, int most) const {
   const double value = number();
   if (value != std::floor(value) || value < least || value > most) {
@@ -214,9 +224,9 @@ double YamlKeys::number_or(const std::string& key, double otherwise) {
   const auto field = optional(key);
   return field ? field->number() : otherwise;
 }
-double YamlKeys::non_negative_or(const std::string& key, double otherwise) {
+double YamlKeys::within_or(const std::string& key, double otherwise, const PhysicalRange& range) {
   const auto field = optional(key);
-  return field ? field->non_negative() : otherwise;
+  return field ? field->within(range) : otherwise;
 }
 std::string YamlKeys::text_or(const std::string& key, const std::string& otherwise) {
   const auto field = optional(key);

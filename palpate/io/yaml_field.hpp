@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "palpate/core/math.hpp"
+#include "palpate/io/physical_range.hpp"
 
 namespace palpate::io {
 
@@ -38,6 +39,7 @@ class YamlField {
   double number() const;  ///< finite
   double positive() const;
   double non_negative() const;
+  double within(const PhysicalRange& range) const;  ///< as that quantity can be; names value, range and likely mistake
   int whole(int least, int most) const;
   bool boolean() const;
   Vec3 vector3() const;
@@ -77,7 +79,7 @@ class YamlKeys {
   const YamlField& map() const { return map_; }
 
   double number_or(const std::string& key, double otherwise);
-  double non_negative_or(const std::string& key, double otherwise);
+  double within_or(const std::string& key, double otherwise, const PhysicalRange& range);
   std::string text_or(const std::string& key, const std::string& otherwise);
   bool boolean_or(const std::string& key, bool otherwise);
 

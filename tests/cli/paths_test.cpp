@@ -99,6 +99,16 @@ TEST_F(Paths, OutputsThatCannotBeWrittenAreRefusedBeforeTheWorkBegins) {
   }
 }
 
+TEST_F(Paths, APlaceWhereNothingCanBeMadeIsToldBeforeTheWork) {
+  EXPECT_THAT(say("estimate /nonexistent -o /proc/nowhere/out"), testing::AnyOf(HasSubstr("cannot be made"), HasSubstr("may not be written")));
+  EXPECT_EQ(code_, 3);
+  say("estimate /nonexistent -o new/deep");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "new")) << "nothing is left of the trial";
+  std::ofstream(folder_ / "taken") << "words";
+  EXPECT_THAT(say("paper --quick -o " + (folder_ / "taken").string()), HasSubstr("is a file"));
+  EXPECT_EQ(code_, 3);
+}
+
 TEST_F(Paths, ErrorsAreJsonForPrograms) {
   say("estimate /nonexistent -o new --json");
   const auto said = nlohmann::json::parse(std::ifstream(folder_ / "out.json"));

@@ -72,6 +72,8 @@ TEST_F(LearnedBlock, IsPressedOnItsSurfaceAndIntoIt) {
       {"--contact 0.03 0.02 0.05 --force 0.1", "away from the object's surface; the nearest place on it is 0.03 0.02 0.03", 3},
       {"--contact 0.03 0.02 0.03 --direction 0 0 1 --force 0.1", "points out of the object", 3},
       {"--contact 0 0.02 0.015 --direction 1 0 0 --force 0.1", "a support holds the object", 3},
+      {"--contact 0.03 0.02 0.03 --force 1e12", "no such object stands that", 3},
+      {"--contact 0.03 0.02 0.03 --travel 40", "further than the object is large", 3},
       {"--contact 0.03 0.02 0.03 --force -5", "must be a number above 0, is -5", 2},
       {"--contact 0.03 0.02 0.03 --force 0", "must be a number above 0", 2},
       {"--contact 0.03 0.02 0.03 --travel nan", "must be a number above 0", 2},

@@ -13,6 +13,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/lab/arm.hpp"
+#include "palpate/suggest.hpp"
 #include "temporary_folder.hpp"
 
 namespace {
@@ -150,6 +151,26 @@ TEST_F(Suggest, APlaceThatNoToolReachesIsAnInputErrorThatSaysWhy) {
   const Answer below = suggest(folder_, "--contact 0.55 0.04 0 --direction 0 0 1");
   EXPECT_EQ(below.exit_code, 3);
   EXPECT_THAT(below.json["error"]["message"].get<std::string>(), testing::HasSubstr("no push is possible"));
+}
+
+TEST_F(Suggest, WhatSupportsLetHappenBesideTheModelIsSaid) {
+  Recording recording = box_on_table();
+  recording.supports[0].kind = SupportKind::table;
+  recording.supports[0].contact = ContactLaw::frictionless;
+  const std::string folder = (files_ / "smooth").string();
+  io::write_recording(recording, folder);
+  const Answer answer = suggest(folder, "");
+  ASSERT_EQ(answer.exit_code, 0);
+  EXPECT_THAT(answer.json["warnings"].dump(), testing::HasSubstr("'table' (frictionless) is taken to hold the object down"));
+  EXPECT_GT(answer.json["not_held"].get<int>(), 0) << "slanted pushes would slide it";
+}
+
+TEST(SuggestAfterAFit, AResultOfATouchThatSlippedIsNotBuiltOn) {
+  Identification answer;
+  answer.verdicts = {{"nu_not_determined", "The Poisson ratio is not determined."}};
+  EXPECT_EQ(why_not_to_build_on(answer), "");
+  answer.verdicts.push_back({"contact_slipped", "The tool seems to have slipped by 4 mm."});
+  EXPECT_EQ(why_not_to_build_on(answer), "contact_slipped: The tool seems to have slipped by 4 mm.");
 }
 
 }  // namespace

@@ -273,6 +273,16 @@ TEST(Tetrahedralise, thin_walls_stay_whole_or_are_refused) {
   EXPECT_THAT(message_of([] { with(shapes::box(Vec3(0.2, 0.2, 0.0005)), 500); }), HasSubstr("too thin for 500 tetrahedra"));
 }
 
+TEST(Tetrahedralise, walls_far_too_thin_are_refused_before_any_work) {
+  int told = 0;
+  const auto count = [&](std::string_view, double) { return ++told > 0; };
+  TetrahedraliseOptions options;
+  options.tetrahedra = 3000;
+  const auto sheet = [&] { tetrahedralise(shapes::box(Vec3(0.2, 0.2, 0.001)), options, count); };
+  EXPECT_THAT(message_of(sheet), HasSubstr("too thin for 3000 tetrahedra; walls of that width and size take some 3e+04"));
+  EXPECT_EQ(told, 0);
+}
+
 TEST(Tetrahedralise, an_inner_shell_that_faces_inward_is_a_cavity_and_all_inside_out_is_turned) {
   TriMesh inner = shapes::sphere(0.03, 3);
   inner.triangles.col(0).swap(inner.triangles.col(1));

@@ -323,6 +323,8 @@ TEST(RecordingWriter, AfterEveryStepTheFolderIsAWholeRecording) {
   EXPECT_EQ(force(read_recording(folder.path() / "copy"), 2), force(ended, 2)) << "taken off once";
   again.begin_push(push);
   EXPECT_THROW(again.end_push({}), Error);
+  RecordingWriter(folder.path() / "fast", whole).end_push({Vec3(0, 0, 2), 2});
+  EXPECT_THROW(read_recording(folder.path() / "fast"), Error) << "2 N a second";
 }
 
 TEST(ReadRecording, EveryExampleOfTheDocumentationIsUnderstood) {

@@ -111,6 +111,18 @@ TEST(Result, BrokenFilesAreRefused) {
   EXPECT_TRUE(refuses(read, replaced(whole, "palpate-result/1", "palpate-result/9")));
 }
 
+TEST(Result, APartThatIsWrongIsNamedInPlainWords) {
+  nlohmann::json damaged = result_json(whole_answer());
+  damaged["posterior"]["poisson_ratio"] = "banana";
+  try {
+    parse_result(damaged.dump(), "file.name");
+    ADD_FAILURE() << "was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where(), "file.name: posterior");
+    EXPECT_EQ(error.message().find("exception"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Model, IsReadyForSimulators) {
   const TemporaryFolder folder("model");
   const MeshData tets = cube();
