@@ -148,6 +148,8 @@ void read_pushes(const YamlField& field, RecordingContext& context) {
     push.site = keys.text_or("site", "");
     push.force_tare_std_n = keys.non_negative_or("force_tare_std_n", 0);
     push.travel_offset_std_m = keys.non_negative_or("travel_offset_std_m", 0);
+    push.torque_tare_std_nm = keys.non_negative_or("torque_tare_std_nm", 0);
+    push.tip_std_m = keys.non_negative_or("tip_std_m", 0);
     const auto steps = keys.optional("steps"), table = keys.optional("table");
     if (static_cast<bool>(steps) == static_cast<bool>(table)) item.fail("give either 'steps' or 'table'");
     if (table) {

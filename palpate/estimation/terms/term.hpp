@@ -75,6 +75,8 @@ class Term {
   /// Unknowns of its own that rows with TermView::surface_slopes have beside the prediction's columns, without the modes of the rest
   /// surface's error.
   virtual std::vector<int> own_unknowns() const { return {}; }
+  /// False for what tells of nuisances alone: by itself it is no observation of the object.
+  virtual bool is_about_object() const { return true; }
   /// Standard deviation that residuals are divided by, a typical one (for the annealing of the robust loss).
   virtual double typical_sigma() const = 0;
 };
