@@ -144,6 +144,9 @@ struct Push {
   std::string site;  ///< e.g. "head"; empty = one site
   double force_tare_std_n = 0;     ///< prior of a constant force error in this push, per axis (0 = none)
   double travel_offset_std_m = 0;  ///< prior of the travel's zero: where contact really began (0 = exactly known)
+  double torque_tare_std_nm = 0;   ///< prior of a constant torque error in this push, per axis (0 = none)
+  /// Prior of where the tip is against the object, across the push: torques are about the tip (0 = exactly known)
+  double tip_std_m = 0;
   std::vector<Step> steps;
 };
 

@@ -125,6 +125,12 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   out.slip = contact_slip(wider, there, factor);
   std::vector<int> moving;
   for (int k : free_unknowns(objective.unknowns())) moving.push_back(at[static_cast<std::size_t>(k)]);
+  // A torque that says nothing of a contact stated as exactly known speaks here, with what it errs by.
+  for (int k = 0; k < unknowns.size(); ++k) {
+    const std::string& name = unknowns[k].name;
+    const bool of_torque = name.rfind("torque_tare[", 0) == 0 || name.rfind("tip_offset[", 0) == 0;
+    if (of_torque && std::find(moving.begin(), moving.end(), k) == moving.end()) moving.push_back(k);
+  }
   const MatrixX information = there.evaluation.information(factor);
   const auto as_fitted = step_of(information, there.evaluation.gradient, moving, 0);
   if (!as_fitted) return out;

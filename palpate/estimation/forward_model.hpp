@@ -63,6 +63,15 @@ struct StepPrediction {
   const MatrixX& d_markers() const { return d_material.size() > 0 ? d_material : d_surface; }
 };
 
+/// A load of known force: what of it acts and where.
+struct ActingForce {
+  Vec3 force_n = Vec3::Zero();  ///< on the object, base frame: the reading without what the sensor errs by
+  /// From where the tip touched to the resultant, across the push: a shifted contact, and a patch that goes around an edge.
+  Vec3 lever_m = Vec3::Zero();
+  std::vector<int> unknowns;  ///< that the two depend on, one a column
+  Eigen::Matrix<double, 3, Eigen::Dynamic> d_force, d_lever;
+};
+
 /// The object as the solver sees it.
 struct SimulatedObject {
   TetMesh mesh;
@@ -139,6 +148,11 @@ class ForwardModel {
   /// The largest square of such a share in the steps' last predictions: how far they are from solutions, relative.
   double reuse_error() const;
 
+  /// True where a load's contact is not exactly known.
+  bool contact_shifts(std::size_t s, std::size_t load) const { return contact_shift_[s][load] >= 0; }
+  /// Force and lever of a step's load; nothing where its motion is imposed or no force acts. Asks for no solution.
+  std::optional<ActingForce> acting_force(std::size_t s, std::size_t load, const VectorX& unknowns) const;
+
   /// How far from Load::contact_m these unknowns put the contact of a step's load, across the push; zero where it cannot shift.
   Vec3 contact_found_m(std::size_t s, std::size_t load, const VectorX& unknowns) const;
 
@@ -201,12 +215,15 @@ class ForwardModel {
   /// Forgets the push's body where it lacks columns of a contact.
   void drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies, const Push& push) const;
   Body& body_of(const Push& push, std::size_t worker);
+  const Body& body_of(std::size_t s) const;  // one that was made
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
   void drop_what_nothing_holds(std::size_t s, const Body& body, const VectorX& unknowns, Coefficients& c) const;
   std::string why_unheld(double sideways_n, double std_n) const;
   void prepare_slide(Body& body) const;
   void add_slide_unknowns(Unknowns& unknowns);
   void slide(std::size_t s, const Body& body, const VectorX& unknowns, const std::vector<int>& columns, bool derivatives, Watched& at) const;
+  struct TrueForce;  // of a load: its reading without what the sensor errs by
+  TrueForce true_force(std::size_t s, std::size_t l, const VectorX& unknowns) const;
   struct LoadPart;  // of one load: columns that work together
   std::vector<LoadPart> load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const;
   RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;

@@ -186,6 +186,10 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
   return *body;
 }
 
+const ForwardModel::Body& ForwardModel::body_of(std::size_t s) const {
+  return *solved_->bodies[linear_ ? 0 : worker_of(s)].at(body_key(push(s)));
+}
+
 RigidOffset ForwardModel::clamp_offset(std::size_t s, const VectorX& unknowns) const {
   RigidOffset offset;
   offset.pivot_m = clamp_pivot_m_;
@@ -219,6 +223,29 @@ std::vector<ForwardModel::LoadPart> ForwardModel::load_parts(std::size_t s, std:
   }
   if (const int radius = patch_radius_[s][l]; radius >= 0) parts.push_back({contact.radius, unknowns(radius), radius});
   return parts;
+}
+
+ForwardModel::TrueForce ForwardModel::true_force(std::size_t s, std::size_t l, const VectorX& unknowns) const {
+  const std::size_t p = steps_[s].push;
+  const Load& load = step(s).loads[l];
+  const int error = force_error_[s][l];
+  Vec3 measured = load.force_n.value_or(Vec3::Zero());
+  if (error >= 0) measured += unknowns.segment<3>(error);
+  if (time_offset_ >= 0) measured += unknowns(time_offset_) * load.force_rate_n_s;
+  const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
+  TrueForce out;
+  out.force_n = scale * measured;
+  for (int k = 0; error >= 0 && k < 3; ++k) out.derivatives.emplace_back(error + k, scale * Vec3::Unit(k));
+  if (force_scale_ >= 0) out.derivatives.emplace_back(force_scale_, measured);
+  if (time_offset_ >= 0) out.derivatives.emplace_back(time_offset_, scale * load.force_rate_n_s);
+  if (tare_[p] < 0) return out;
+  const bool one_axis = tare_axis_[p].norm() > 0;
+  for (int k = 0; k < (one_axis ? 1 : 3); ++k) {
+    const Vec3 axis = one_axis ? tare_axis_[p] : Vec3(Vec3::Unit(k));
+    out.force_n += unknowns(tare_[p] + k) * axis;
+    out.derivatives.emplace_back(tare_[p] + k, axis);
+  }
+  return out;
 }
 
 ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const {
@@ -272,26 +299,12 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     }
     const std::vector<LoadPart> parts = load_parts(s, l, body, unknowns);
     if (parts.empty()) continue;
-    const int error = force_error_[s][l];
-    Vec3 measured = load.force_n.value_or(Vec3::Zero());
-    if (error >= 0) measured += unknowns.segment<3>(error);
-    if (time_offset_ >= 0) measured += unknowns(time_offset_) * load.force_rate_n_s;
-    const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
-    Vec3 tare = Vec3::Zero();
-    if (tare_[p] >= 0) tare = tare_axis_[p].norm() > 0 ? Vec3(unknowns(tare_[p]) * tare_axis_[p]) : unknowns.segment<3>(tare_[p]);
-    const Vec3 force = scale * measured + tare;
+    const auto [force, derivatives] = true_force(s, l, unknowns);
     for (const auto& [first, weight, own_unknown] : parts) {
       add_vector(first, weight * force);
-      const auto add_derivative = [&, first_column = first, factor = weight](int unknown, const Vec3& d) {
+      for (const auto& [unknown, d] : derivatives) {
         const int at = column(unknown);
-        c.d_force.block<3, 1>(first_column, at) += factor * (into_object * d);
-      };
-      for (int k = 0; error >= 0 && k < 3; ++k) add_derivative(error + k, scale * Vec3::Unit(k));
-      if (force_scale_ >= 0) add_derivative(force_scale_, measured);
-      if (time_offset_ >= 0) add_derivative(time_offset_, scale * load.force_rate_n_s);
-      const bool one_axis = tare_axis_[p].norm() > 0;
-      for (int k = 0; tare_[p] >= 0 && k < (one_axis ? 1 : 3); ++k) {
-        add_derivative(tare_[p] + k, one_axis ? tare_axis_[p] : Vec3(Vec3::Unit(k)));
+        c.d_force.block<3, 1>(first, at) += weight * (into_object * d);
       }
       if (own_unknown >= 0) {
         const int at = column(own_unknown);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "palpate/estimation/forward_model.hpp"
@@ -118,6 +119,11 @@ struct ForwardModel::Memory {
   std::shared_ptr<const ContactState> contact;
 
   VectorX change_to(const VectorX& there) const;  // of the columns' unknowns
+};
+
+struct ForwardModel::TrueForce {
+  Vec3 force_n = Vec3::Zero();
+  std::vector<std::pair<int, Vec3>> derivatives;  // an unknown, and what the force changes by with it
 };
 
 /// Where a load acts: its columns, and the derivatives of those to a shift of the contact along two tangents and to the

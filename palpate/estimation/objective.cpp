@@ -20,7 +20,7 @@ Objective::Objective(ForwardModel& model, const std::vector<std::vector<TermInpu
     for (const auto& input : inputs[s]) {
       if (auto term = make_term(input, {model, s, unknowns, shared_})) terms_.back().push_back(std::move(term));
     }
-    terms += terms_.back().size();
+    for (const auto& term : terms_.back()) terms += term->is_about_object();
   }
   if (terms == 0) throw Error("no step has an observation that says anything about the object", "pushes");
 }

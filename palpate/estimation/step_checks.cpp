@@ -20,8 +20,8 @@ std::string in_step(const ForwardModel& model, std::size_t s) {
 
 bool has_rows(const Objective& objective, std::size_t s) { return s < objective.last_rows().size() && !objective.last_rows()[s].empty(); }
 
-/// What one step asks of a few unknowns, its frames' poses free under their priors and all else where the fit put it: the change
-/// and its covariance.
+/// What one step asks of a few unknowns, its frames' poses and the torque's tare free under their priors and all else where
+/// the fit put it: the change and its covariance.
 struct Asked {
   VectorX change;
   MatrixX covariance;
@@ -42,11 +42,13 @@ std::optional<Asked> asked_by(const Objective& objective, const Optimum& optimum
     gradient(k) -= precision * (optimum.unknowns(k) - unknowns[k].prior_mean);
   }
   std::vector<int> frames;
-  const std::string suffix = in_step(objective.model(), s);
+  const std::string suffix = in_step(objective.model(), s), tare = "torque_tare" + in_push(objective.model(), s);
   for (int k : free_unknowns(unknowns)) {
     const std::string& name = unknowns[k].name;
     const bool own = name.size() > suffix.size() && name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0;
-    if (own && name.rfind("frame", 0) == 0) frames.push_back(k);
+    // Without its tare a torque at a light load asks for another contact than at a heavy one.
+    const bool of_torque = name.size() == tare.size() + 2 && name.rfind(tare + "_", 0) == 0;
+    if ((own && name.rfind("frame", 0) == 0) || of_torque) frames.push_back(k);
   }
   MatrixX left = hessian(about, about);
   VectorX slope = gradient(about);

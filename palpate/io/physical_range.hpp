@@ -29,6 +29,7 @@ inline constexpr PhysicalRange share_std{0, 1, "", "is it in percent? 0.01 is 1 
 inline constexpr PhysicalRange force_sigma{1e-9, 1e5, "N", newtons};
 inline constexpr PhysicalRange force_std{0, 1e5, "N", newtons};
 inline constexpr PhysicalRange torque_sigma{1e-12, 1e5, "Nm", "is it in Nmm? It must be in newton metres"};
+inline constexpr PhysicalRange torque_std{0, 1e5, "Nm", "is it in Nmm? It must be in newton metres"};
 inline constexpr PhysicalRange clock_std{0, 10, "s", "is it in milliseconds? It must be in seconds"};
 inline constexpr PhysicalRange time{-1e11, 1e11, "s", "is it in milliseconds or nanoseconds? It must be in seconds"};
 inline constexpr PhysicalRange image_unit{1e-9, 1e3, "m", "0.001 is right for most 16-bit images, 1 for float metres"};

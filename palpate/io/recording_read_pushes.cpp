@@ -152,6 +152,8 @@ void read_pushes(const YamlField& field, RecordingContext& context) {
     push.site = keys.text_or("site", "");
     push.force_tare_std_n = keys.within_or("force_tare_std_n", 0, ranges::force_std);
     push.travel_offset_std_m = keys.within_or("travel_offset_std_m", 0, ranges::length_std);
+    push.torque_tare_std_nm = keys.within_or("torque_tare_std_nm", 0, ranges::torque_std);
+    push.tip_std_m = keys.within_or("tip_std_m", 0, ranges::length_std);
     std::optional<ForceDrift> drift;
     if (const auto moving = keys.optional("force_drift")) {
       YamlKeys inner(*moving);

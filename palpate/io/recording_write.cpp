@@ -371,6 +371,8 @@ void RecordingWriter::Pages::add_step(const Step& step) {
     if (!push.site.empty()) text += fmt::format("    site: {}\n", yaml_word(push.site));
     if (push.force_tare_std_n != 0) text += fmt::format("    force_tare_std_n: {}\n", push.force_tare_std_n);
     if (push.travel_offset_std_m != 0) text += fmt::format("    travel_offset_std_m: {}\n", push.travel_offset_std_m);
+    if (push.torque_tare_std_nm != 0) text += fmt::format("    torque_tare_std_nm: {}\n", push.torque_tare_std_nm);
+    if (push.tip_std_m != 0) text += fmt::format("    tip_std_m: {}\n", push.tip_std_m);
     text += "    steps:\n";
     push_count += 1;
     step_count = 0;

@@ -99,6 +99,28 @@ TermInput single_axis_wrench(const Scene& scene) {
   return one;
 }
 
+TermInput torque(const Scene& scene) {
+  Wrench one = std::get<Wrench>(wrench(scene));
+  one.tool = "disc";
+  one.torque_nm = Vec3(2e-3, -1e-3, 5e-4);
+  one.torque_sigma_nm = 2e-4;
+  one.has_torque = true;
+  return one;
+}
+
+/// What a sensor says is one thing; where its recording says that the sensor errs is another.
+void put(const TermInput& input, Recording& recording) {
+  const auto* reading = std::get_if<Wrench>(&input);
+  if (reading == nullptr) return;
+  Push& push = recording.pushes[reading->has_torque ? 2 : 1];
+  push.steps[0].observations.push_back(*reading);
+  if (!reading->has_torque) return;
+  push.torque_tare_std_nm = 1e-3;
+  push.tip_std_m = 1e-3;
+  push.force_tare_std_n = 0.01;
+  push.steps[0].loads[0].force_std_n = 0.01;
+}
+
 struct Case {
   const char* name;
   TermInput (*make)(const Scene&);
@@ -125,6 +147,7 @@ const std::vector<Case> cases{
     {"travel_tip", travel, 0, true},
     {"wrench_plate", wrench, 2, true},
     {"single_axis_wrench_plate", single_axis_wrench, 2, true},
+    {"torque_disc", torque, 3, true},
     {"cloud_plate_weightless", cloud, 2, true, false},
 };
 
@@ -146,7 +169,7 @@ TEST_P(TermContract, JacobianIsTheDerivativeOfTheResidual) {
     ASSERT_GT((predicted.surface_m - object.surface.rest().vertices_m).cwiseAbs().maxCoeff(), 1e-3);
     input = test.make({predicted.surface_m, object.surface.rest().triangles});
   }
-  if (const auto* reading = std::get_if<Wrench>(&input)) recording.pushes[1].steps[0].observations.push_back(*reading);
+  put(input, recording);
 
   Unknowns unknowns;
   ForwardModel model(recording, object, unknowns, tight());
@@ -203,7 +226,7 @@ TEST_P(TermContract, ItsRowsAsAQuadraticOfTheSurfaceSayTheSame) {
   const Points surface_m = model.predict(test.step, away_from_rest(unknowns)).surface_m;
   const TermInput input = test.make({surface_m, object.surface.rest().triangles});
   const bool sees_surface = std::holds_alternative<RayObservation>(input) || std::holds_alternative<PointCloud>(input);
-  if (const auto* reading = std::get_if<Wrench>(&input)) recording.pushes[1].steps[0].observations.push_back(*reading);
+  put(input, recording);
   std::map<std::string, int> shared;
   const auto term = make_term(input, {model, test.step, unknowns, shared});
   const VectorX at = away_from_rest(unknowns);

@@ -86,6 +86,8 @@ pushes:
     site: head
     force_tare_std_n: 0.1
     travel_offset_std_m: 0.0002
+    torque_tare_std_nm: 0.02
+    tip_std_m: 0.0015
     steps:
       - time_s: 0
         observations:
@@ -174,6 +176,8 @@ TEST(ReadRecording, EveryKindOfKey) {
   EXPECT_EQ(recording.robot->links.at(2).collision.at(0).mesh.vertices_m.maxCoeff(), 0.002);
   EXPECT_EQ(recording.joint_names, (std::vector<std::string>{"elbow", "shoulder"}));
   EXPECT_EQ(recording.pushes.at(0).force_tare_std_n, 0.1);
+  EXPECT_EQ(recording.pushes[0].torque_tare_std_nm, 0.02);
+  EXPECT_EQ(recording.pushes[0].tip_std_m, 0.0015);
 
   const Step& first = recording.pushes[0].steps.at(0);
   const auto& markers = std::get<Markers>(first.observations.at(0));
@@ -239,6 +243,8 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
   ASSERT_EQ(back.pushes.size(), recording.pushes.size());
   for (std::size_t p = 0; p < back.pushes.size(); ++p) {
     EXPECT_EQ(back.pushes[p].force_tare_std_n, recording.pushes[p].force_tare_std_n);
+    EXPECT_EQ(back.pushes[p].torque_tare_std_nm, recording.pushes[p].torque_tare_std_nm);
+    EXPECT_EQ(back.pushes[p].tip_std_m, recording.pushes[p].tip_std_m);
     ASSERT_EQ(back.pushes[p].steps.size(), recording.pushes[p].steps.size());
     for (std::size_t s = 0; s < back.pushes[p].steps.size(); ++s) {
       const Step& a = recording.pushes[p].steps[s];
@@ -270,6 +276,8 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
           EXPECT_EQ(wrench->force_n, std::get<Wrench>(b.observations[i]).force_n);
           EXPECT_EQ(wrench->along, std::get<Wrench>(b.observations[i]).along);
           EXPECT_EQ(wrench->time_s, std::get<Wrench>(b.observations[i]).time_s);
+          EXPECT_EQ(wrench->has_torque, std::get<Wrench>(b.observations[i]).has_torque);
+          EXPECT_EQ(wrench->torque_nm, std::get<Wrench>(b.observations[i]).torque_nm);
         }
       }
     }

@@ -10,6 +10,8 @@ std::unique_ptr<Term> make_ray_term(const RayObservation& rays, const TermContex
 std::unique_ptr<Term> make_marker_term(const Markers& markers, const TermContext& context);
 std::unique_ptr<Term> make_travel_term(const ToolTravel& travel, const TermContext& context);
 std::unique_ptr<Term> make_wrench_term(const Wrench& wrench, const TermContext& context);
+/// @param load  of the step, whose force is known
+std::unique_ptr<Term> make_torque_term(const Wrench& wrench, std::size_t load, const TermContext& context);
 
 /// Index of the step's load that an observation of `tool` belongs to. @throws Error when it is not clear.
 std::size_t load_of(const TermContext& context, const std::string& tool, const std::string& what);

@@ -77,6 +77,8 @@ class Term {
   virtual std::vector<int> own_unknowns() const { return {}; }
   /// False: rows hang on the prediction's readings alone (forces, travel).
   virtual bool looks_at_surface() const { return true; }
+  /// False for what tells of nuisances alone: by itself it is no observation of the object.
+  virtual bool is_about_object() const { return true; }
   /// Standard deviation that residuals are divided by, a typical one (for the annealing of the robust loss).
   virtual double typical_sigma() const = 0;
 };

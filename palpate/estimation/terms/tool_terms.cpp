@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tool itself measures: its travel and, where the motion is imposed, its force.
+// What the tool itself measures: its travel and, where the motion is imposed, its force. The torque of a known force is a term
+// of its own.
 #include <cmath>
 
 #include "palpate/core/error.hpp"
@@ -103,7 +104,8 @@ std::unique_ptr<Term> make_wrench_term(const Wrench& wrench, const TermContext& 
   const auto& loads = context.model.step(context.step).loads;
   if (loads.empty()) return nullptr;
   const std::size_t load = load_of(context, wrench.tool, "wrench");
-  if (!loads[load].travel_m) return nullptr;  // the force is imposed: the reading is the load itself
+  // An imposed force's reading is the load itself; its torque says where it acts.
+  if (!loads[load].travel_m) return make_torque_term(wrench, load, context);
   if (!(wrench.force_sigma_n > 0)) {
     throw Error("the wrench needs its standard deviation (force_sigma_n > 0)",
                 context.model.step(context.step).source + " wrench");
