@@ -243,7 +243,7 @@ TEST_P(TermContract, ItsRowsAsAQuadraticOfTheSurfaceSayTheSame) {
     return out;
   };
   const SurfacePattern pattern(object.surface.rest());
-  const SurfaceQuadratic quadratic(pattern, rows, loss, predicted, at);
+  SurfaceQuadratic quadratic(pattern, rows, loss, predicted, at);
   const auto quadratic_at = [&](const VectorX& place) {
     const StepPrediction there = model.predict(test.step, place);
     std::vector<int> places = there.columns;
