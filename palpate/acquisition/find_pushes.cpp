@@ -58,11 +58,13 @@ struct FreeAir {
 };
 
 /// From the free air before a push to that between it and the next one, which begins with sample `next`.
-ForceDrift drift_after(const Track& track, const ForceSums& sums, const ContactSpan& span, double tared_at_s, std::size_t next, double tare_s) {
+ForceDrift drift_after(const Track& track, const ForceSums& sums, const ContactSpan& span, double tared_at_s, std::size_t next,
+                       double tare_s) {
   constexpr double clear_m = 0.002, turned_cos = 0.9994;  // two degrees
   const auto& samples = track.samples;
   const auto is_clear = [&](std::size_t i) {
-    return (samples[i].tip_m - span.contact_m).dot(span.direction) < -clear_m && track.direction[i].dot(span.direction) > turned_cos;
+    return (samples[i].tip_m - span.contact_m).dot(span.direction) < -clear_m &&
+           track.direction[i].dot(span.direction) > turned_cos;
   };
   const double latest_s = next < samples.size() ? samples[next].time_s - guard_s : samples.back().time_s;
   std::size_t begin = span.end;

@@ -277,8 +277,8 @@ class Assembly {
       push.steps.push_back(std::move(step));
     }
     if (drifted_n > 0.05 * highest_n && highest_n > 0)
-      out_.notes.push_back(push.name + ": the zero of the force moved by " + newtons(drifted_n) + " during the push (" + newtons(highest_n) +
-                           " at most); taken off evenly over its time. Let the sensor warm up, and keep cables from pulling");
+      out_.notes.push_back(push.name + ": the zero of the force moved by " + newtons(drifted_n) + " during the push (" +
+                           newtons(highest_n) + " at most); taken off evenly over its time. Let the sensor warm up, and keep cables from pulling");
     if (plan.travel_sigma_m.size() > 1 && plan.travel_sigma_m.size() != loaded_steps)
       out_.notes.push_back(push.name + ": travel_sigma_m holds " + std::to_string(plan.travel_sigma_m.size()) + " numbers for " +
                            std::to_string(loaded_steps) + " loaded steps; the last one stands for those that follow");

@@ -35,17 +35,19 @@ struct Excess {
 
 /// Small strains, which are asked what a mesh does, have said less than half of it where strains were large
 /// (docs/uncertainty.md, "Do the intervals hold the truth?"): a body that is not linear is fitted on a finer mesh sooner.
-double heed(const SimulatedObject& object) { return fem::material_law(object.material).is_linear() ? 1 : 0.35; }
+double share_borne(const SimulatedObject& object) {
+  return fem::material_law(object.material).is_linear() ? 1 : 0.35;
+}
 
 /// Of what a mesh does to E, in the region that bears it least.
-/// @param tolerance  what is borne of E
-/// @param heed       what is borne in place of what would be where the change is exact
-Excess most_excess(const MeshDoubt& found, const AnswerShift& by_mesh, double tolerance, double heed) {
+/// @param tolerance  what is borne of E where the change is told right
+/// @param borne      share of that which is borne
+Excess most_excess(const MeshDoubt& found, const AnswerShift& by_mesh, double tolerance, double borne) {
   constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
   Excess most;
   for (std::size_t r = 0; r < found.young_std.size(); ++r) {
     const double young = std::abs(by_mesh.of_region(static_cast<Index>(r)).log_young);
-    const double share = young / (heed * std::max(tolerance, hardly * found.young_std[r]));
+    const double share = young / (borne * std::max(tolerance, hardly * found.young_std[r]));
     if (share > most.share) most = {young, share};
   }
   return most;
@@ -67,13 +69,13 @@ std::optional<BetterMesh> better_mesh(const Recording& at, const SimulatedObject
     if (!there) return std::nullopt;
     elsewhere = found.shift.plus(there->times(-1));
     // Too much would be left after refining under the tools, and the mesh that showed the error is at hand.
-    if (most_excess(found, elsewhere, tolerance, heed(on)).share > 0.8 && shows.object.mesh.nodes_m.rows() <= most_nodes) {
+    if (most_excess(found, elsewhere, tolerance, share_borne(on)).share > 0.8 && shows.object.mesh.nodes_m.rows() <= most_nodes) {
       auto finer = finer_under_tools(shows.recording, shows.object);
       if (finer) finer->elsewhere = elsewhere.times(shows.left());
       return BetterMesh{shows, std::move(finer)};
     }
   }
-  auto better = refined_within(at, on, heed(on) * tolerance, fill_anew);
+  auto better = refined_within(at, on, share_borne(on) * tolerance, fill_anew);
   if (!better) return std::nullopt;
   // A mesh that is filled anew would lose what was refined under the tools.
   auto finer = better->everywhere || !fill_anew ? finer_model(better->recording, better->object, fill_anew)
@@ -105,8 +107,8 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
     std::list<Taken> taken;
     bool too_coarse = false;
     fit_options.take_finer = [&](const MeshDoubt& found) -> const FinerMesh* {
-      const Excess excess = most_excess(found, found.shift, mesh_tolerance, heed(object));
-      too_coarse = heed(object) * excess.share > 1;
+      const Excess excess = most_excess(found, found.shift, mesh_tolerance, share_borne(object));
+      too_coarse = share_borne(object) * excess.share > 1;
       if (excess.share <= 1 || refinements == most_refinements) return nullptr;
       const FinerModel& shows = taken.empty() ? *finer : *taken.back().finer;
       const Recording& at = taken.empty() ? recording : taken.back().mesh.recording;
