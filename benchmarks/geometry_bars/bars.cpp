@@ -28,19 +28,31 @@ CameraView depth_view(const geometry::TriangleTree& tree, const Vec3& from, doub
   const TriMesh& m = tree.mesh();
   std::vector<Vec3> points, normals;
   std::vector<double> cosines;
+  CameraView out;
+  // (x, y) right-handed about the line of sight: the picture's columns run along v
+  out.image.camera.width_px = height_px, out.image.camera.height_px = width_px;
+  out.image.camera.fx_px = out.image.camera.fy_px = focal_px;
+  out.image.camera.cx_px = height_px / 2.0, out.image.camera.cy_px = width_px / 2.0;
+  out.image.T_base_camera.linear() << v, u, -back;
+  out.image.T_base_camera.translation() = eye;
+  out.image.depth_m = DepthImage::Zero(width_px, height_px);
+  out.image.noise.sigma_m = sigma_m;
   for (int y = 0; y < height_px; y += stride)
     for (int x = 0; x < width_px; x += stride) {
       const Vec3 d = (-back + (x - width_px / 2.0) / focal_px * u + (y - height_px / 2.0) / focal_px * v).normalized();
       const auto hit = tree.cast(eye, d);
-      if (!hit) continue;
+      if (!hit) {
+        out.image.depth_m(x, y) = float(wall_m);
+        continue;
+      }
       const auto corner = [&](int k) { return Vec3(m.vertices_m.row(m.triangles(hit->triangle, k)).transpose()); };
       const Vec3 n = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
       if (-n.dot(d) < 0.2) continue;  // sensors see nothing at grazing angles
       points.push_back(eye + (hit->range_m + sigma_m * g(rng)) * d);
+      out.image.depth_m(x, y) = float((points.back() - eye).dot(-back));
       normals.push_back(n);
       cosines.push_back(-n.dot(d));
     }
-  CameraView out;
   const auto count = static_cast<Index>(points.size());
   out.cloud.points_m.resize(count, 3);
   out.cloud.normals.resize(count, 3);

@@ -35,7 +35,10 @@ TriMesh scaled(TriMesh mesh, double size_m);
 struct CameraView {
   PointCloud cloud;  ///< in the object's frame; normals are those of the triangles hit
   VectorX cosine;    ///< between ray and normal: noise along the ray counts that much along the normal
+  DepthFrame image;  ///< the same, before a wall `wall_m` away
 };
+
+constexpr double wall_m = 2;
 
 /// What a depth camera sees at a distance in a direction, with noise along the ray; every `stride`-th row and column.
 CameraView depth_view(const geometry::TriangleTree& tree, const Vec3& from, double distance_m, int width_px, int height_px,

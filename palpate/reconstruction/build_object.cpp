@@ -207,6 +207,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   if (options.fine_surface) {
     const geometry::TriangleTree boundary(out.model.surface);
     SurfaceOptions fine;
+    fine.free = fuse.free;
     if (floating > 0)
       fine.belongs = [&](const Vec3& p) { return boundary.within(p, std::pow(2 * fused.cell_m, 2)); };
     out.fine_surface = fused_surface(fused, fine);

@@ -110,11 +110,11 @@ FusedViews fuse_views(const std::vector<PointCloud>& clouds, const FuseOptions& 
   if (points < 50) throw Error("only " + std::to_string(points) + " points; a surface needs at least 50", "clouds");
   const double diagonal = (high - low).norm();
   FusedViews out;
-  out.cell_m = options.cell_m > 0 ? options.cell_m : std::max(3 * sigma, diagonal / 120);
+  out.cell_m = options.cell_m > 0 ? options.cell_m : std::max(2.2 * sigma, diagonal / 150);
 
   Grid grid(clouds, out.cell_m);
   if (options.cell_m == 0)  // sparse points need wider cells
-    while (double(points) < 6.0 * double(grid.bins().size()) && out.cell_m < 0.1 * diagonal)
+    while (double(points) < 4.0 * double(grid.bins().size()) && out.cell_m < 0.1 * diagonal)
       grid = Grid(clouds, out.cell_m *= 1.3);
   std::vector<Facet> facets;
   for (const auto& bin : grid.bins()) {

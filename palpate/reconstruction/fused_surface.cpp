@@ -25,13 +25,26 @@ PointCloud middles_of(const TriMesh& facets) {
   return out;
 }
 
-/// Signed distance from the fused surface, negative inside; good near it, only a sign far off.
+/// Signed distance from the fused surface, negative inside; good near it, only a sign far off and where it was cut by sight.
 class Field {
  public:
-  Field(const FusedViews& fused, double reach)
-      : winding_(fused.facets), reach_(reach), grid_({middles_of(fused.facets)}, reach) {}
+  Field(const FusedViews& fused, double reach, const std::function<bool(const Vec3&)>& free)
+      : winding_(fused.facets), reach_(reach), grid_({middles_of(fused.facets)}, reach), free_(free) {}
 
   double operator()(const Vec3& x) {
+    const double d = by_facets(x);
+    return d < 0 && looked_through(x) ? reach_ : d;
+  }
+
+  /// Did a sensor look through a place that no facet says anything about?
+  bool looked_through(const Vec3& x) {
+    if (!free_) return false;
+    bool near = false;
+    grid_.around(x, 1, [&](Index i) { near = near || (grid_.point(i) - x).squaredNorm() < 0.15 * reach_ * reach_; });
+    return !near && free_(x);
+  }
+
+  double by_facets(const Vec3& x) {
     near_.clear();
     Index nearest = -1;
     double least = reach_ * reach_;
@@ -75,6 +88,7 @@ class Field {
   geometry::WindingNumber winding_;
   double reach_;
   Grid grid_;
+  const std::function<bool(const Vec3&)>& free_;
   std::vector<Near> near_;
 };
 
@@ -158,7 +172,16 @@ class March {
     const auto [it, fresh] = vertex_of_.try_emplace((Key(in) << 32) | Key(out), static_cast<Index>(vertices_.size()));
     if (fresh) {
       const Corner &a = corners_[in], &b = corners_[out];
-      const double share = std::clamp(a.value / (a.value - b.value), 0.02, 0.98);  // no triangle without area
+      double share = a.value / (a.value - b.value);
+      if (field_.looked_through(b.at)) {  // halved down to where sight ends
+        double hidden = 0, seen = 1;
+        for (int k = 0; k < 5; ++k) {
+          const double middle = 0.5 * (hidden + seen);
+          (field_.looked_through(a.at + middle * (b.at - a.at)) ? seen : hidden) = middle;
+        }
+        share = field_.by_facets(b.at) < 0 ? seen : std::min(share, seen);
+      }
+      share = std::clamp(share, 0.02, 0.98);  // no triangle without area
       vertices_.push_back(a.at + share * (b.at - a.at));
     }
     return it->second;
@@ -245,8 +268,8 @@ TriMesh fused_surface(const FusedViews& fused, const SurfaceOptions& options) {
   if (!(options.cell_m >= 0) || !std::isfinite(options.cell_m))
     throw Error("must be a length, or 0", "SurfaceOptions: cell_m");
   if (fused.facets.triangles.rows() == 0) throw Error("there is no facet to lay a surface through", "FusedViews: facets");
-  const double cell = options.cell_m > 0 ? options.cell_m : fused.cell_m;
-  Field field(fused, 1.25 * fused.cell_m);
+  const double cell = options.cell_m > 0 ? options.cell_m : 1.1 * fused.cell_m;
+  Field field(fused, 1.25 * fused.cell_m, options.free);
   const Vec3 low = fused.facets.vertices_m.colwise().minCoeff().transpose();
   March march(field, low - Vec3(0.31, 0.37, 0.43) * cell, cell);
   for (Index i = 0; i < fused.facets.triangles.rows(); ++i)

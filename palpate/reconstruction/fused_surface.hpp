@@ -7,8 +7,9 @@
 namespace palpate::reconstruction {
 
 struct SurfaceOptions {
-  double cell_m = 0;  ///< of the lattice; triangles have edges of half of it to all of it. 0 = FusedViews::cell_m
-  std::function<bool(const Vec3&)> belongs;  ///< parts with no such vertex are left out; empty: all are kept
+  double cell_m = 0;  ///< of the lattice; triangles have edges of half of it to all of it. 0 = 1.1 times FusedViews::cell_m
+  std::function<bool(const Vec3&)> free = {};  ///< says of a place that a sensor looked through it: it is outside where no facet is near
+  std::function<bool(const Vec3&)> belongs = {};  ///< parts with no such vertex are left out; empty: all are kept
 };
 
 /// Where facets are near, the surface is where the mean of their distances vanishes, each measured along the mean of its own

@@ -3,13 +3,35 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/camera.hpp"
 #include "palpate/sensing/depth_noise.hpp"
 
 namespace palpate::sensing {
+namespace {
+
+/// The least of the values above 0 in a square of `reach` pixels to every side; 0 stays 0.
+DepthImage least_around(const DepthImage& image, Eigen::Index reach) {
+  constexpr float nothing = std::numeric_limits<float>::infinity();
+  const DepthImage own = (image.array() > 0).select(image, DepthImage::Constant(image.rows(), image.cols(), nothing));
+  DepthImage along = own, out = own;
+  for (Eigen::Index r = 0; r < own.rows(); ++r)
+    for (Eigen::Index c = 0; c < own.cols(); ++c) {
+      const Eigen::Index first = std::max<Eigen::Index>(0, c - reach), last = std::min(own.cols() - 1, c + reach);
+      along(r, c) = own.row(r).segment(first, last - first + 1).minCoeff();
+    }
+  for (Eigen::Index r = 0; r < own.rows(); ++r) {
+    const Eigen::Index first = std::max<Eigen::Index>(0, r - reach), last = std::min(own.rows() - 1, r + reach);
+    out.row(r) = along.middleRows(first, last - first + 1).colwise().minCoeff();
+  }
+  return (image.array() > 0).select(out, image);
+}
+
+}  // namespace
 
 FreeSpace::FreeSpace(const std::vector<DepthFrame>& frames, const FreeSpaceOptions& options) {
   if (!(options.sigmas >= 0)) throw Error("must not be negative", "FreeSpaceOptions.sigmas");
@@ -29,15 +51,16 @@ FreeSpace::FreeSpace(const std::vector<DepthFrame>& frames, const FreeSpaceOptio
         const double pose = std::hypot(frame.pose_std_m, z * frame.pose_std_rad);
         view.free_m(r, c) = static_cast<float>(std::max(0.0, z - options.margin_m - options.sigmas * std::hypot(sigma, pose)));
       }
-    // the nearest of the neighbours counts, and one without data is asked for none
-    const DepthImage own = view.free_m;
-    for (Eigen::Index r = 0; r < rows; ++r)
-      for (Eigen::Index c = 0; c < columns; ++c) {
-        if (!(own(r, c) > 0)) continue;
-        for (Eigen::Index a = std::max<Eigen::Index>(0, r - 1); a <= std::min(rows - 1, r + 1); ++a)
-          for (Eigen::Index b = std::max<Eigen::Index>(0, c - 1); b <= std::min(columns - 1, c + 1); ++b)
-            if (own(a, b) > 0) view.free_m(r, c) = std::min(view.free_m(r, c), own(a, b));
-      }
+    // The nearest of the neighbours counts, as far aside as the picture may be off, and one without data is asked for none.
+    std::vector<float> depths;
+    for (Eigen::Index k = 0; k < view.free_m.size(); ++k)
+      if (view.free_m.data()[k] > 0) depths.push_back(view.free_m.data()[k]);
+    if (depths.empty()) continue;
+    const auto near = depths.begin() + std::ptrdiff_t(depths.size() / 100);  // a stray pixel before the camera does not count
+    std::nth_element(depths.begin(), near, depths.end());
+    const double aside_rad = options.sigmas * std::hypot(frame.pose_std_m / double(*near), frame.pose_std_rad);
+    const double aside_px = std::max(1.0, std::ceil(std::max(frame.camera.fx_px, frame.camera.fy_px) * aside_rad));
+    view.free_m = least_around(view.free_m, static_cast<Eigen::Index>(std::min(aside_px, double(std::max(rows, columns)))));
     views_.push_back(std::move(view));
   }
 }

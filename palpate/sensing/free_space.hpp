@@ -8,7 +8,7 @@
 namespace palpate::sensing {
 
 struct FreeSpaceOptions {
-  double sigmas = 4;       ///< so many standard deviations of depth and pose before what was seen are not called free
+  double sigmas = 4;       ///< so many standard deviations of depth and pose before and beside what was seen are not called free
   double margin_m = 0.003; ///< nor is this
 };
 

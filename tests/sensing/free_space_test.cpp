@@ -51,8 +51,14 @@ TEST(FreeSpace, AnotherViewFindsOutAndAnUncertainPoseKnowsLess) {
   EXPECT_TRUE(FreeSpace({scene(), side})(behind_the_box));
   DepthFrame unsure = scene();
   unsure.pose_std_m = 0.03;
-  EXPECT_FALSE(FreeSpace({unsure})(at(10, 30, 0.9)));
-  EXPECT_TRUE(FreeSpace({unsure})(at(10, 30, 0.8)));
+  EXPECT_FALSE(FreeSpace({unsure})(at(4, 40, 0.9)));
+  EXPECT_TRUE(FreeSpace({unsure})(at(4, 40, 0.8)));
+  // nor does a picture that may be 30 mm aside know what is free a few pixels beside the box
+  EXPECT_TRUE(FreeSpace({scene()})(at(45, 24, 0.6)));
+  EXPECT_FALSE(FreeSpace({unsure})(at(45, 24, 0.6)));
+  unsure.pose_std_m = 0, unsure.pose_std_rad = 0.03;
+  EXPECT_FALSE(FreeSpace({unsure})(at(43, 24, 0.6)));
+  EXPECT_TRUE(FreeSpace({unsure})(at(52, 24, 0.6)));
 }
 
 TEST(FreeSpace, SaysWhatIsWrong) {
