@@ -401,7 +401,7 @@ estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share)
     Recording recording = given;
     try {
       auto object = build_simulated_object(recording, {}, completion);
-      doubt.shapes.push_back({std::move(recording), std::move(object)});
+      doubt.shapes.push_back({std::move(recording), std::move(object), completion == reconstruction::Completion::planar});
     } catch (const Error&) {  // such a shape falls apart or encloses nothing: it is none that may stand there
     }
   }
@@ -409,22 +409,31 @@ estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share)
 }
 
 Identified identify(const Recording& given, const IdentifyOptions& options, const OnProgress& progress) {
-  Recording recording = with_overrides(given, options);
-  if (options.method == "paper") recording.regions.clear();  // the paper fits one stiffness
+  Recording as_given = with_overrides(given, options);
+  if (options.method == "paper") as_given.regions.clear();  // the paper fits one stiffness
   std::vector<Points> masked_m;
-  estimation::Inputs observed = observe(recording, &masked_m);  // sec. IV-B: point clouds, robot masked
-  const Recording as_given = recording;
-  std::vector<char> seen;
-  estimation::SimulatedObject object =
-      build_simulated_object(recording, progress, reconstruction::Completion::mirrored, &seen);  // sec. IV-C: tetrahedral model
-  std::optional<estimation::ShapeDoubt> doubt;
-  const double unseen = drop_unseen_side(recording, seen, observed);
-  if (unseen > 0 && options.method != "paper") doubt = other_shapes(as_given, unseen);
+  const estimation::Inputs all_observed = observe(as_given, &masked_m);  // sec. IV-B: point clouds, robot masked
   Identified out;
-  out.answer = options.method == "paper"                                           // sec. VI: error function and its minimum
-                   ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
-                   : estimation::fit_on_fine_mesh(recording, object, observed, options.fit, options.mesh_tolerance,
-                                                  doubt ? &*doubt : nullptr, progress, fill_anew(as_given, recording));
+  Recording recording;
+  estimation::SimulatedObject object;
+  std::optional<estimation::ShapeDoubt> doubt;
+  const auto fit = [&](reconstruction::Completion completion) {
+    recording = as_given;
+    estimation::Inputs observed = all_observed;
+    std::vector<char> seen;
+    object = build_simulated_object(recording, progress, completion, &seen);  // sec. IV-C: tetrahedral model
+    const double unseen = drop_unseen_side(recording, seen, observed);
+    if (unseen > 0 && options.method != "paper" && !doubt) doubt = other_shapes(as_given, unseen);
+    out.answer = options.method == "paper"  // sec. VI: error function and its minimum
+                     ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
+                     : estimation::fit_on_fine_mesh(recording, object, observed, options.fit, options.mesh_tolerance,
+                                                    doubt ? &*doubt : nullptr, progress, fill_anew(as_given, recording));
+  };
+  fit(reconstruction::Completion::mirrored);
+  if (doubt && doubt->effect && doubt->effect->better) {
+    doubt->effect->better.reset();
+    fit(reconstruction::Completion::planar);  // the only alternative that is as likely
+  }
   for (std::size_t s = 0; s < out.answer.steps.size() && s < masked_m.size(); ++s) {
     out.answer.steps[s].masked_m = std::move(masked_m[s]);
   }

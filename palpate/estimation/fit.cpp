@@ -260,6 +260,12 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   };
   look_around();
 
+  // Before any finer mesh, so that all shapes have meshes alike.
+  if (doubt != nullptr && !doubt->effect && optimum.termination == Termination::converged) {
+    doubt->effect = shape_effect(*doubt, recording, inputs, objective, optimum, loss, options, optimiser, progress);
+    if (doubt->effect && doubt->effect->better) return as_far_as_known();
+  }
+
   // What the mesh does to the answer, and finer ones until that is little.
   const FinerModel* meshed = nullptr;  // the mesh that corrects the model; nullptr: its own
   std::unique_ptr<MeshCorrection> correction;
@@ -302,8 +308,6 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   add_bands(answer.steps, objective, covariance, moving);
   answer.budget = error_budget(unknowns, hessian, moving);
 
-  if (doubt != nullptr && !doubt->effect && optimum.termination == Termination::converged)
-    doubt->effect = shape_effect(*doubt, recording, inputs, objective, optimum, loss, options, optimiser, progress);
   const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;

@@ -13,10 +13,11 @@ namespace {
 
 constexpr int across = 24;  // samples along the edge of a triangle near the tool
 
-/// Smallest gap between the tool, its tip on the line through `on_line_m`, and the surface near it.
+/// The tool and the surface near it, along the push.
 class GapAlong {
  public:
-  GapAlong(const TetMesh& mesh, const fem::RigidShape& shape, const Pose& pose) : shape_(shape), pose_(pose) {
+  GapAlong(const TetMesh& mesh, const fem::RigidShape& shape, const Pose& pose) : shape_(shape) {
+    const Pose T_tool_base = pose.inverse();
     const Triangles triangles = fem::boundary_triangles(mesh);
     const Vec3 centre = pose * shape.bounding_centre_m();
     for (Index t = 0; t < triangles.rows(); ++t) {
@@ -27,26 +28,22 @@ class GapAlong {
       cell_m_ = std::max(cell_m_, size / across);
       for (int i = 0; i <= across; ++i)
         for (int j = 0; i + j <= across; ++j)
-          points_.push_back(a + (b - a) * i / double(across) + (c - a) * j / double(across));
+          points_.push_back(T_tool_base * (a + (b - a) * i / double(across) + (c - a) * j / double(across)));
     }
   }
   bool misses() const { return points_.empty(); }
-  double at(double travel_m) const {
-    Pose pose = pose_;
-    pose.translation() += travel_m * pose.linear().col(2);
-    const Pose T_tool_base = pose.inverse();
-    double gap = std::numeric_limits<double>::infinity();
+  /// Does the tool reach into the object, moved so far along the push?
+  bool reaches_in(double travel_m) const {
     fem::ShapePoint point;
-    for (const Vec3& x : points_)
-      if (shape_.at(T_tool_base * x, cell_m_, point)) gap = std::min(gap, point.gap_m);
-    return gap;
+    for (const Vec3& y : points_)
+      if (shape_.at(y - Vec3(0, 0, travel_m), cell_m_, point) && point.gap_m < 0) return true;
+    return false;
   }
 
  private:
   const fem::RigidShape& shape_;
-  Pose pose_;
   double cell_m_ = 0;
-  std::vector<Vec3> points_;
+  std::vector<Vec3> points_;  ///< in the tool's frame
 };
 
 }  // namespace
@@ -77,7 +74,7 @@ fem::RigidContact rigid_tool(const TetMesh& mesh, const Tool& tool, const Load& 
   const double reach_m = 2 * contact.shape->bounding_radius_m();
   const double stride_m = reach_m / 100;
   double outside = -reach_m, inside = outside;
-  while (gap.at(inside) >= 0) {
+  while (!gap.reaches_in(inside)) {
     outside = inside;
     inside += stride_m;
     if (inside > reach_m)
@@ -85,7 +82,7 @@ fem::RigidContact rigid_tool(const TetMesh& mesh, const Tool& tool, const Load& 
   }
   for (int k = 0; k < 40; ++k) {
     const double middle = 0.5 * (outside + inside);
-    (gap.at(middle) < 0 ? inside : outside) = middle;
+    (gap.reaches_in(middle) ? inside : outside) = middle;
   }
   contact.T_base_tool.translation() += outside * direction;
   return contact;

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double deviations = 2;     // that an alternative lies away
 constexpr Index rays_a_frame = 1500;  // the same few for every shape: only how the answers differ counts
+constexpr double strange_pull = 3;    // of what a push's instruments are off by
+constexpr double clearly_better = 10;  // in half of chi-square
 
 Inputs thinned(const Inputs& all, double& share) {
   Inputs few = all;
@@ -34,8 +36,17 @@ Inputs thinned(const Inputs& all, double& share) {
   return few;
 }
 
-/// log E of the first region, nu, log E of the others over the first.
-std::optional<VectorX> answer_of(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const Objective& objective, const Optimum& optimum,
+struct Answer {
+  VectorX parameters;  ///< log E of the first region, nu, log E of the others over the first
+  double cost = 0;
+  bool strange = false;  ///< wants an instrument to be off by more than it is
+};
+
+bool about_instruments(const std::string& name) {
+  return name.starts_with("travel_zero") || name.starts_with("travel_offset") || name.starts_with("force_tare") || name.starts_with("force_scale");
+}
+
+std::optional<Answer> answer_of(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const Objective& objective, const Optimum& optimum,
                                  const Loss& loss, const FitOptions& options, const OptimiseOptions& optimiser,
                                  const OnProgress& progress) {
   Unknowns unknowns;
@@ -54,7 +65,11 @@ std::optional<VectorX> answer_of(const Recording& recording, const SimulatedObje
   quiet.on_accepted = {};
   const Optimum found = optimise(other, start, loss, quiet, progress);
   if (found.termination != Termination::converged || !found.evaluation.usable) return std::nullopt;
-  return found.unknowns.head(unknowns.parameter_count());
+  Answer answer{found.unknowns.head(unknowns.parameter_count()), found.evaluation.cost};
+  for (int k = 0; k < unknowns.size(); ++k)
+    answer.strange = answer.strange || (about_instruments(unknowns[k].name) &&
+                                        std::abs(found.unknowns(k) - unknowns[k].prior_mean) > strange_pull * unknowns[k].prior_std);
+  return answer;
 }
 
 }  // namespace
@@ -69,24 +84,35 @@ std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording
   weighed.surface_weight = std::min(1.0, loss.surface_weight / share);
   const auto fitted = answer_of(recording, objective.model().object(), few, objective, optimum, weighed, options, optimiser, progress);
   if (!fitted) return std::nullopt;
-  const VectorX here = *fitted;
+  std::vector<std::optional<Answer>> alternatives(doubt.shapes.size());
+  for (std::size_t s = 0; s < doubt.shapes.size(); ++s) {
+    if (progress && !progress("unseen side", static_cast<double>(s) / static_cast<double>(doubt.shapes.size()))) return std::nullopt;
+    try {
+      alternatives[s] = answer_of(doubt.shapes[s].recording, doubt.shapes[s].object, few, objective, optimum, weighed, options, optimiser, {});
+    } catch (const Error&) {  // it is not held, or a tool does not reach it: no such shape was pushed
+    }
+  }
+  Answer best = *fitted;
+  std::optional<std::size_t> better;
+  for (std::size_t s = 0; s < alternatives.size(); ++s) {
+    if (!doubt.shapes[s].as_likely || !alternatives[s] || alternatives[s]->strange) continue;
+    if (best.strange || alternatives[s]->cost < best.cost - clearly_better) best = *alternatives[s], better = s;
+  }
+  const VectorX here = best.parameters;
   std::optional<ShapeEffect> out;
   double softest = here(log_young), stiffest = softest;
   VectorX most = VectorX::Zero(here.size());
-  for (std::size_t s = 0; s < doubt.shapes.size(); ++s) {
-    if (progress && !progress("unseen side", static_cast<double>(s) / static_cast<double>(doubt.shapes.size()))) return std::nullopt;
-    std::optional<VectorX> there;
-    try {
-      there = answer_of(doubt.shapes[s].recording, doubt.shapes[s].object, few, objective, optimum, weighed, options, optimiser, {});
-    } catch (const Error&) {  // it is not held, or a tool does not reach it: no such shape was pushed
-    }
+  if (better) alternatives.push_back(fitted);
+  for (const auto& there : alternatives) {
     if (!there) continue;
-    const VectorX moved = *there - here;
-    softest = std::min(softest, (*there)(log_young)), stiffest = std::max(stiffest, (*there)(log_young));
-    if (!out || std::abs(moved(log_young)) > std::abs(most(log_young))) most = moved;
-    out.emplace();
+    if (!out) out.emplace();
+    if (there->strange && !best.strange) continue;
+    const VectorX moved = there->parameters - here;
+    softest = std::min(softest, there->parameters(log_young)), stiffest = std::max(stiffest, there->parameters(log_young));
+    if (std::abs(moved(log_young)) > std::abs(most(log_young))) most = moved;
   }
   if (!out) return out;
+  out->better = better;
   most /= deviations;
   out->shift.log_young = most(log_young);
   out->shift.poisson = most(poisson);

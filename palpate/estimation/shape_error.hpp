@@ -15,11 +15,13 @@ namespace palpate::estimation {
 struct AlternativeShape {
   Recording recording;  ///< as the fit uses it: volume, surface, supports
   SimulatedObject object;
+  bool as_likely = false;  ///< beforehand, as the one that is fitted: the pushes choose between them
 };
 
 struct ShapeEffect {
-  AnswerShift shift;                        ///< one standard deviation
-  double softest_pa = 0, stiffest_pa = 0;  ///< E over all shapes
+  AnswerShift shift;                       ///< one standard deviation
+  double softest_pa = 0, stiffest_pa = 0;  ///< E over all shapes that the pushes do not rule out
+  std::optional<std::size_t> better;       ///< alternative that agrees better with the pushes; `shift` is about it
 };
 
 struct ShapeDoubt {
@@ -28,8 +30,10 @@ struct ShapeDoubt {
   std::optional<ShapeEffect> effect;     ///< filled by the first fit; later ones, on finer meshes, take it as it is
 };
 
-/// Fits all shapes to the same few of the points, from the optimum on. Half of what moves log E most is one standard deviation of an error along that
-/// direction; nu moves with it. Alternatives whose fit does not end are left out.
+/// Fits all shapes to the same few of the points, from the optimum on. An alternative that is as likely and fits better takes the place of the one
+/// that was fitted. A shape that wants force or travel of a push to be off by more than three of their standard deviations is ruled out, unless
+/// that one wants it too. Half of what moves log E most among the others is one standard deviation of an error along that direction; nu moves
+/// with it. Alternatives whose fit does not end are left out.
 /// @returns nothing where none ended, or the caller asked to stop.
 std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording& recording, const Inputs& inputs,
                                         const Objective& objective, const Optimum& optimum, const Loss& loss, const FitOptions& options,

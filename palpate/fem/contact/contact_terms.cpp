@@ -43,15 +43,20 @@ Vec3 ContactTerms::position(const VectorX& u, Index face, int point) const {
   return x;
 }
 
-// visit(face, point, x, outward normal of the deformed surface) for points near enough to be touched.
+// visit(face, point, x, outward) for points near enough to be touched; outward() is the normal of the deformed surface.
 template <typename Visit>
 void ContactTerms::for_each_candidate(const TouchingBody& body, const VectorX& u, Visit&& visit) const {
-  const int nodes = points_.nodes_per_face();
+  if (points_.nodes_per_face() == 6) for_each_candidate_of<6>(body, u, visit);
+  else for_each_candidate_of<3>(body, u, visit);
+}
+
+template <int nodes, typename Visit>
+void ContactTerms::for_each_candidate_of(const TouchingBody& body, const VectorX& u, Visit&& visit) const {
   const double reach = body.shape->bounding_radius_m();
   const Vec3 centre = body.T_base_tool * body.shape->bounding_centre_m();
   const Pose to_tool = body.T_base_tool.inverse();
   ShapePoint corner;
-  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> x(3, nodes);
+  Eigen::Matrix<double, 3, nodes> x;
   for (Index f = 0; f < points_.face_count(); ++f) {
     double nearest2 = kInfinity;
     for (int a = 0; a < nodes; ++a) {
@@ -70,8 +75,13 @@ void ContactTerms::for_each_candidate(const TouchingBody& body, const VectorX& u
       if (gap > std::sqrt(size2)) continue;
     }
     for (int p = 0; p < points_.per_face(); ++p) {
-      const Eigen::Matrix<double, 3, 2> t = x * points_.d_shape(p);
-      visit(f, p, Vec3(x * points_.shape(p)), Vec3(t.col(0).cross(t.col(1))));
+      const auto outward = [&] {
+        const Eigen::Matrix<double, nodes, 2> along = points_.d_shape(p);
+        const Eigen::Matrix<double, 3, 2> t = x * along;
+        return Vec3(t.col(0).cross(t.col(1)));
+      };
+      const Eigen::Matrix<double, nodes, 1> share = points_.shape(p);
+      visit(f, p, Vec3(x * share), outward);
     }
   }
 }
@@ -86,14 +96,15 @@ std::vector<double> ContactTerms::seats(const TouchingBody& body, double reach_m
   std::vector<double> seat(static_cast<std::size_t>(points_.point_count()), 0);
   const VectorX rest = VectorX::Zero(3 * static_cast<Index>(rest_m_.rows()));
   ShapePoint shape;
-  for_each_candidate(body, rest, [&](Index f, int p, const Vec3& x, const Vec3&) {
+  for_each_candidate(body, rest, [&](Index f, int p, const Vec3& x, const auto&) {
     if (!body.shape->at(body.T_base_tool.inverse() * x, points_.cell_m(f), shape) || shape.gap_m > reach_m) return;
     seat[static_cast<std::size_t>(f) * points_.per_face() + p] = shape.gap_m;
   });
   return seat;
 }
 
-bool ContactTerms::sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Vec3& outward,
+template <typename Outward>
+bool ContactTerms::sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Outward& outward_of,
                           bool with_hessian, Sample& out) const {
   const double k = layer_pa_m(body, face);
   const std::size_t index = static_cast<std::size_t>(face) * points_.per_face() + point;
@@ -111,6 +122,7 @@ bool ContactTerms::sample(const TouchingBody& body, Index face, int point, const
   if (!shape_at(body, face, point, y, shape)) return false;
   if (!(shape.gap_m < 0) || !(shape.coverage > 0)) return false;
   // The far side of a thin object also lies inside a tool that was put deep; it faces away from what could touch it.
+  const Vec3 outward = outward_of();
   if (outward.dot(body.T_base_tool.linear() * shape.normal) > 0.5 * outward.norm() * shape.normal.norm()) return false;
   const double g = shape.gap_m, chi = shape.coverage;
   const Vec3& n = shape.normal;
@@ -146,13 +158,13 @@ bool ContactTerms::sample(const TouchingBody& body, Index face, int point, const
 }
 
 template <typename Visit>
-void ContactTerms::for_each_touching(const TouchingBody& body, const VectorX& u, Visit&& visit) const {
+void ContactTerms::for_each_touching(const TouchingBody& body, const VectorX& u, Visit&& visit, bool with_hessian) const {
   const Mat3 back = body.T_base_tool.linear().transpose();
   const Vec3 tip = body.T_base_tool.translation();
   Sample s;
-  for_each_candidate(body, u, [&](Index f, int p, const Vec3& x, const Vec3& outward) {
+  for_each_candidate(body, u, [&](Index f, int p, const Vec3& x, const auto& outward) {
     const Vec3 y = back * (x - tip);
-    if (sample(body, f, p, y, outward, true, s)) visit(f, p, x, outward, y, s);
+    if (sample(body, f, p, y, outward, with_hessian, s)) visit(f, p, x, outward, y, s);
   });
 }
 
@@ -163,7 +175,7 @@ double ContactTerms::energy_and_forces(const TouchingBody& body, const VectorX& 
   constexpr double place = 3 * std::numeric_limits<double>::epsilon();
   const double tip_m = body.T_base_tool.translation().norm();
   double energy = 0;
-  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3&, const Sample& s) {
+  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const auto&, const Vec3&, const Sample& s) {
     const double weight = points_.weight_m2(f, p);
     const Vec3 force = weight * (r * s.gradient);
     energy += weight * s.energy;
@@ -185,7 +197,7 @@ void ContactTerms::tangent(const TouchingBody& body, const VectorX& u, bool conv
   const int nodes = points_.nodes_per_face();
   tool = {};
   tool.coupling.setZero(u.size(), 6);
-  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3&, const Sample& s) {
+  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const auto&, const Vec3&, const Sample& s) {
     const double weight = points_.weight_m2(f, p);
     const Vec3 force = weight * (r * s.gradient), arm = x - body.T_base_tool.translation();
     Mat3 h = weight * (r * s.hessian * r.transpose());
@@ -208,12 +220,12 @@ void ContactTerms::tangent(const TouchingBody& body, const VectorX& u, bool conv
     // d(arm x f) = -dtip x f + arm x df
     tool.hessian.bottomRows<3>() -= arm_cross * to_twist;
     tool.hessian.bottomLeftCorner<3, 3>() -= force_cross;
-  });
+  }, true);
 }
 
 void ContactTerms::forces_by_region(const TouchingBody& body, const VectorX& u, MatrixX& forces, MatrixX& gradients) const {
   const Mat3& r = body.T_base_tool.linear();
-  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3&, const Sample& s) {
+  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const auto&, const Vec3&, const Sample& s) {
     const Index region = region_[static_cast<std::size_t>(f)];
     const Vec3 force = points_.weight_m2(f, p) * (r * s.gradient);
     for (int a = 0; a < points_.nodes_per_face(); ++a)
@@ -226,7 +238,7 @@ void ContactTerms::forces_by_region(const TouchingBody& body, const VectorX& u, 
 void ContactTerms::d_radius(const TouchingBody& body, const VectorX& u, VectorX& forces, Vec6& gradient) const {
   const Mat3& r = body.T_base_tool.linear();
   ShapePoint shape;
-  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3& y, const Sample&) {
+  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const auto&, const Vec3& y, const Sample&) {
     if (body.law == Touch::bonded || !shape_at(body, f, p, y, shape)) return;
     const RadiusDerivative d = body.shape->d_radius(y, points_.cell_m(f));
     const double k = points_.weight_m2(f, p) * layer_pa_m(body, f), g = shape.gap_m;
@@ -244,7 +256,7 @@ std::vector<ContactTerms::Held> ContactTerms::held(const TouchingBody& body, con
   std::vector<Held> out;
   if (body.law == Touch::frictionless) return out;
   ShapePoint shape;
-  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3&, const Vec3& y, const Sample& s) {
+  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const auto&, const Vec3& y, const Sample& s) {
     Held h;
     h.face = f;
     h.point = p;
@@ -295,7 +307,7 @@ TouchMemory ContactTerms::bond(const TouchingBody& body, const VectorX& u, doubl
   memory.normal.assign(points_.point_count(), Vec3::Zero());
   memory.touching.assign(points_.point_count(), 0);
   ShapePoint shape;
-  for_each_candidate(body, u, [&](Index f, int p, const Vec3& x, const Vec3&) {
+  for_each_candidate(body, u, [&](Index f, int p, const Vec3& x, const auto&) {
     const Vec3 y = body.T_base_tool.inverse() * x;
     if (!body.shape->at(y, points_.cell_m(f), shape) || std::abs(shape.gap_m) > reach_m || shape.coverage < 0.5) return;
     const std::size_t index = static_cast<std::size_t>(f) * points_.per_face() + p;
@@ -328,7 +340,7 @@ void ContactTerms::begin_increment(const TouchingBody& body, const VectorX& u, T
 double ContactTerms::update_limits(const TouchingBody& body, const VectorX& u, double friction, TouchMemory& memory) const {
   if (body.law == Touch::frictionless || body.law == Touch::bonded) return 0;
   std::vector<double> limit(memory.limit_pa.size(), 0);
-  for_each_touching(body, u, [&](Index f, int p, const Vec3&, const Vec3&, const Vec3&, const Sample& s) {
+  for_each_touching(body, u, [&](Index f, int p, const Vec3&, const auto&, const Vec3&, const Sample& s) {
     limit[static_cast<std::size_t>(f) * points_.per_face() + p] =
         body.law == Touch::sticking ? kInfinity : friction * s.pressure;
   });
@@ -346,7 +358,7 @@ double ContactTerms::update_limits(const TouchingBody& body, const VectorX& u, d
 void ContactTerms::end_increment(const TouchingBody& body, const VectorX& u, TouchMemory& memory) const {
   if (body.law == Touch::frictionless || body.law == Touch::bonded) return;
   std::fill(memory.touching.begin(), memory.touching.end(), 0);
-  for_each_touching(body, u, [&](Index f, int p, const Vec3&, const Vec3&, const Vec3& y, const Sample& sample) {
+  for_each_touching(body, u, [&](Index f, int p, const Vec3&, const auto&, const Vec3& y, const Sample& sample) {
     const std::size_t index = static_cast<std::size_t>(f) * points_.per_face() + p;
     memory.touching[index] = sample.slips ? 2 : 1;
     ShapePoint shape;
@@ -365,10 +377,10 @@ ContactTerms::Patch ContactTerms::patch(const TouchingBody& body, const VectorX&
   std::vector<Vec3> where;
   std::vector<double> pressure, area;
   Patch out;
-  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const Vec3& outward, const Vec3&, const Sample& s) {
+  for_each_touching(body, u, [&](Index f, int p, const Vec3& x, const auto& outward, const Vec3&, const Sample& s) {
     where.push_back(x);
     pressure.push_back(s.pressure);
-    area.push_back(0.5 * outward.norm() / points_.per_face());
+    area.push_back(0.5 * outward().norm() / points_.per_face());
     out.layer_energy_j -= 0.5 * points_.weight_m2(f, p) * s.pressure * s.gap;
     out.penetration_m = std::max(out.penetration_m, -s.gap);
     if (body.memory && !body.memory->touching.empty())

@@ -121,13 +121,16 @@ class ContactTerms {
   double layer_pa_m(const TouchingBody& body, Index face) const {
     return body.stiffness_pa * (harder_.empty() ? 1 : harder_[static_cast<std::size_t>(face)]) / points_.face_size_m(face);
   }
-  bool sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Vec3& outward, bool with_hessian,
+  template <typename Outward>
+  bool sample(const TouchingBody& body, Index face, int point, const Vec3& y, const Outward& outward_of, bool with_hessian,
               Sample& out) const;
   bool shape_at(const TouchingBody& body, Index face, int point, const Vec3& y, ShapePoint& out) const;
   template <typename Visit>
   void for_each_candidate(const TouchingBody& body, const VectorX& u, Visit&& visit) const;
+  template <int nodes, typename Visit>
+  void for_each_candidate_of(const TouchingBody& body, const VectorX& u, Visit&& visit) const;
   template <typename Visit>
-  void for_each_touching(const TouchingBody& body, const VectorX& u, Visit&& visit) const;
+  void for_each_touching(const TouchingBody& body, const VectorX& u, Visit&& visit, bool with_hessian = false) const;
 
   Points rest_m_;
   SurfacePoints points_;

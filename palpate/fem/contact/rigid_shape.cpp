@@ -71,9 +71,11 @@ class DiscShape final : public RigidShape {
  public:
   explicit DiscShape(double radius) : radius_(radius) {}
   bool at(const Vec3& y, double cell, ShapePoint& out) const override {
-    const double rho = std::hypot(y.x(), y.y());
+    const double rho2 = y.head<2>().squaredNorm();
+    if (rho2 >= radius_ * radius_ || y.z() < -2 * radius_) return false;  // asked of every point of the skin, so quickly
+    const double rho = std::sqrt(rho2);
     const Step step = covered(rho - radius_, std::min(cell, 0.5 * radius_));
-    if (step.value <= 0 || y.z() < -2 * radius_) return false;
+    if (step.value <= 0) return false;
     out = {};
     out.gap_m = y.z();
     out.normal = Vec3::UnitZ();
@@ -89,7 +91,7 @@ class DiscShape final : public RigidShape {
   }
   bool has_radius() const override { return true; }
   RadiusDerivative d_radius(const Vec3& y, double cell) const override {
-    const double rho = std::hypot(y.x(), y.y());
+    const double rho = y.head<2>().norm();
     const Step step = covered(rho - radius_, std::min(cell, 0.5 * radius_));
     RadiusDerivative d;
     d.coverage = -step.slope;

@@ -1,0 +1,116 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// Two blocks that look alike from above, one thinner than the other: which one was bent is for the pushes to say, what the other would
+// have done to E is in the interval, and a shape that only fits if the tool never travelled was not pushed.
+#include "palpate/estimation/shape_error.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// The block, as deep as its underside is said to be.
+SimulatedObject block_from(double underside_m) {
+  TetMesh mesh = kuhn_block(4, 3, 2, block_size_m);
+  const double depth = 1 - underside_m / block_size_m.z();
+  mesh.nodes_m.col(2) = (underside_m + depth * mesh.nodes_m.col(2).array()).matrix();
+  return simulated(fem::to_quadratic(mesh), "linear");
+}
+
+/// Bent by its end, seen from above.
+struct Seen {
+  Recording recording = pushed_block_recording();
+  Inputs inputs;
+};
+
+Seen seen(Recording recording = pushed_block_recording()) {
+  Seen out{std::move(recording), {}};
+  out.recording.model.poisson_fixed = 0.3;
+  PushedBlock truth;
+  truth.material = "linear";
+  truth.points = 4000;
+  truth.sigma_m = 2e-4;
+  out.inputs = clouds_of(truth, out.recording);
+  for (auto& step : out.inputs) {
+    auto& cloud = std::get<PointCloud>(step[0]);
+    Index kept = 0;
+    for (Index i = 0; i < cloud.points_m.rows(); ++i)
+      if (cloud.points_m(i, 2) > 0.8 * block_size_m.z()) cloud.points_m.row(kept++) = cloud.points_m.row(i).eval();
+    cloud.points_m.conservativeResize(kept, 3);
+  }
+  return out;
+}
+
+/// Driven so far, from a contact that is known to 20 um; the force only says how stiff it is.
+Seen driven() {
+  Recording recording = pushed_block_recording();
+  recording.pushes[0].travel_offset_std_m = 2e-5;
+  double travel_m = 0;
+  for (Step& step : recording.pushes[0].steps) {
+    step.loads[0].force_n.reset();
+    step.loads[0].travel_m = travel_m += 0.002;
+  }
+  Seen out = seen(recording);
+  for (std::size_t s = 0; s < out.inputs.size(); ++s) {
+    Wrench wrench;
+    wrench.force_n = Vec3(0, 0, -0.09 * double(s + 1));
+    wrench.force_sigma_n = 0.001;
+    out.inputs[s].push_back(wrench);
+  }
+  return out;
+}
+
+Identification fit_beside(ShapeDoubt& doubt, const Seen& data, double underside_m) {
+  FitOptions options;
+  options.cross_checks = options.stresses = false;
+  return fit(data.recording, block_from(underside_m), data.inputs, options, {}, nullptr, nullptr, &doubt);
+}
+
+ShapeDoubt doubt_of(const Seen& seen, double underside_m, bool as_likely) {
+  ShapeDoubt doubt;
+  doubt.unseen_share = 0.5;
+  doubt.shapes.push_back({seen.recording, block_from(underside_m), as_likely});
+  return doubt;
+}
+
+TEST(ShapeError, ThePushesChooseBetweenShapesThatWereAsLikely) {
+  const Seen data = seen();
+  for (const double fitted_m : {0.0, 0.01}) {
+    ShapeDoubt doubt = doubt_of(data, 0.01 - fitted_m, true);
+    const auto answer = fit_beside(doubt, data, fitted_m);
+    ASSERT_TRUE(doubt.effect);
+    EXPECT_EQ(doubt.effect->better.has_value(), fitted_m > 0);
+    EXPECT_NEAR(doubt.effect->softest_pa, 2e4, 1e3);  // of the block as it is
+    EXPECT_GT(doubt.effect->stiffest_pa, 5e4);        // of the thin one
+    EXPECT_NEAR(doubt.effect->shift.log_young, 0.5 * std::log(doubt.effect->stiffest_pa / doubt.effect->softest_pa), 0.01);
+    if (fitted_m == 0) {
+      EXPECT_GT(parameter(answer, "young_modulus").upper_95, 5e4);
+    }
+  }
+  ShapeDoubt less_likely = doubt_of(data, 0, false);
+  fit_beside(less_likely, data, 0.01);
+  ASSERT_TRUE(less_likely.effect);
+  EXPECT_FALSE(less_likely.effect->better);
+  EXPECT_LT(less_likely.effect->shift.log_young, -0.4);
+}
+
+TEST(ShapeError, AShapeThatContradictsTheTravelIsRuledOut) {
+  const Seen data = driven();
+  ShapeDoubt doubt = doubt_of(data, 0.01, false);
+  fit_beside(doubt, data, 0);
+  ASSERT_TRUE(doubt.effect);
+  EXPECT_EQ(doubt.effect->shift.log_young, 0);
+  EXPECT_EQ(doubt.effect->softest_pa, doubt.effect->stiffest_pa);
+  // unless the fitted one does too
+  ShapeDoubt other = doubt_of(data, 0.02, false);
+  fit_beside(other, data, 0.01);
+  ASSERT_TRUE(other.effect);
+  EXPECT_GT(other.effect->shift.log_young, 0.1);
+}
+
+}  // namespace
+}  // namespace palpate::estimation
