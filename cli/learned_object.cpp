@@ -6,6 +6,7 @@
 #include "cli/paths.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/materials.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
 
@@ -22,6 +23,11 @@ LearnedObject load_learned_object(const fs::path& given) {
     out = out.parent_path();  // OUT/model
   LearnedObject learned;
   learned.answer = io::read_result(out);
+  try {
+    fem::material_law(learned.answer.material);
+  } catch (const Error& unknown) {
+    throw Error(unknown.message(), (out / "result.json").string() + ": material " + learned.answer.material);
+  }
   if (!fs::exists(out / "model" / "recording.yaml", code))
     throw Error("holds no model/recording.yaml; run `palpate estimate` again", out.string());
   learned.object = io::read_recording_unchecked(out / "model");

@@ -11,7 +11,7 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr double deviations = 2;     // that an alternative lies away
+constexpr double deviations = 1.5;   // that the farthest alternative lies away: errors of 18 labs were 0.6 of its change, rms
 constexpr Index rays_a_frame = 1500;  // the same few for every shape: only how the answers differ counts
 constexpr double strange_pull = 3;    // of what a push's instruments are off by
 constexpr double clearly_better = 10;  // in half of chi-square
@@ -96,7 +96,7 @@ std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording
   std::optional<std::size_t> better;
   for (std::size_t s = 0; s < alternatives.size(); ++s) {
     if (!doubt.shapes[s].as_likely || !alternatives[s] || alternatives[s]->strange) continue;
-    if (best.strange || alternatives[s]->cost < best.cost - clearly_better) best = *alternatives[s], better = s;
+    if (alternatives[s]->cost < best.cost - clearly_better) best = *alternatives[s], better = s;
   }
   const VectorX here = best.parameters;
   std::optional<ShapeEffect> out;

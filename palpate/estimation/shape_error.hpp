@@ -25,14 +25,14 @@ struct ShapeEffect {
 };
 
 struct ShapeDoubt {
-  std::vector<AlternativeShape> shapes;  ///< about as far from the one that is fitted as the truth may be: two deviations
+  std::vector<AlternativeShape> shapes;  ///< the farthest is about one and a half standard deviations from the one that is fitted
   double unseen_share = 0;               ///< of the object's surface, its foot left out
   std::optional<ShapeEffect> effect;     ///< filled by the first fit; later ones, on finer meshes, take it as it is
 };
 
 /// Fits all shapes to the same few of the points, from the optimum on. An alternative that is as likely and fits better takes the place of the one
 /// that was fitted. A shape that wants force or travel of a push to be off by more than three of their standard deviations is ruled out, unless
-/// that one wants it too. Half of what moves log E most among the others is one standard deviation of an error along that direction; nu moves
+/// that one wants it too. Two thirds of what moves log E most among the others is one standard deviation of an error along that direction; nu moves
 /// with it. Alternatives whose fit does not end are left out.
 /// @returns nothing where none ended, or the caller asked to stop.
 std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording& recording, const Inputs& inputs,

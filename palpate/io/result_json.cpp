@@ -258,6 +258,8 @@ Identification parse_result(const std::string& bytes, const std::string& name) {
     answer.parameters = all_of(part("parameters"), parameter_from);
     answer.nuisances = all_of(part("nuisances"), nuisance_from);
     answer.covariance = matrix_from(part("covariance"));
+    if (answer.covariance.rows() != answer.covariance.cols())
+      throw Error("must have as many columns as rows; write the result again with `palpate estimate`", name + ": covariance");
     answer.verdicts = all_of(part("verdicts"), verdict_from);
     answer.fit = fit_from(part("fit"));
     answer.prediction = held_out_from(part("prediction"));

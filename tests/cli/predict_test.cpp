@@ -99,5 +99,19 @@ TEST_F(LearnedBlock, ThatHasSaggedAlreadyIsExportedWithoutGravity) {
   EXPECT_THAT(io::read_file(files_ / "asked's" / "object.inp"), HasSubstr("GRAV"));
 }
 
+TEST_F(LearnedBlock, WhoseLawNobodyKnowsIsNotExported) {
+  const auto file = files_ / "result" / "result.json";
+  std::string bytes = io::read_file(file);
+  const std::string law = "\"material\":\"linear\"", spaced = "\"material\": \"linear\"";
+  const auto at = bytes.find(law) != std::string::npos ? bytes.find(law) : bytes.find(spaced);
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(bytes.find("linear", at), 6, "jelly");
+  io::write_file(file, bytes);
+  const Outcome outcome = run("export " + (files_ / "result").string() + " --to calculix -o " + (files_ / "out").string());
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.text, HasSubstr("result.json: material jelly: no material is called 'jelly'; choose one of linear"));
+  EXPECT_FALSE(std::filesystem::exists(files_ / "out"));
+}
+
 }  // namespace
 }  // namespace palpate

@@ -123,6 +123,17 @@ TEST(Result, APartThatIsWrongIsNamedInPlainWords) {
   }
 }
 
+TEST(Result, ACovarianceThatIsNoSquareIsRefused) {
+  nlohmann::json damaged = result_json(whole_answer());
+  damaged["covariance"].erase(0);
+  try {
+    parse_result(damaged.dump(), "file.name");
+    ADD_FAILURE() << "was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where(), "file.name: covariance");
+  }
+}
+
 TEST(Model, IsReadyForSimulators) {
   const TemporaryFolder folder("model");
   const MeshData tets = cube();
