@@ -73,7 +73,9 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
   const bool first = order == PushOrder::next_best;
   ExploreHooks hooks;
   hooks.plan = [&](const estimation::PushCandidate& at) { return robot.plan_at(at.contact_m, at.direction); };
+  std::string pushing;
   hooks.on_push_begin = [&](const Push& push) {
+    pushing = push.name;
     if (writer != nullptr) writer->begin_push(push);
   };
   hooks.on_step = [&](const Push& push, const Step& step) {
@@ -84,7 +86,10 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
                             step.loads.empty() ? 0.0 : step.loads[0].force_n->norm(), step.unloading ? ", going back" : ""));
   };
   hooks.on_push_end = [&](const acquisition::PushReport& report) {
-    if (writer != nullptr && report.drift) writer->end_push(*report.drift);
+    if (writer == nullptr) return;
+    if (report.drift) writer->end_push(*report.drift);
+    for (const std::string& warning : push_warnings(pushing, report)) session.warn(warning);
+    if (report.stop == acquisition::StopReason::slip) session.warn(fmt::format("{}: {}", pushing, report.message));
   };
   hooks.on_push = [&](const ExploredPush& push) {
     const Vec3 &at = push.plan.candidate.contact_m, &along = push.plan.candidate.direction;

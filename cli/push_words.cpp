@@ -32,6 +32,21 @@ std::string push_words(const estimation::RatedPush& push, const PushScene& scene
   return words;
 }
 
+std::vector<std::string> push_warnings(const std::string& name, const acquisition::PushReport& report) {
+  std::vector<std::string> out;
+  if (report.drift && report.steps > 0 && report.drift_n > 0.05 * report.highest_force_n)
+    out.push_back(fmt::format("{}: the zero of the force moved by {:.3g} N during the push ({:.1f} N at most); taken off evenly over "
+                              "its time. Let the sensor warm up, and keep cables from pulling",
+                              name, report.drift_n, report.highest_force_n));
+  for (const int step : report.unsettled)
+    out.push_back(fmt::format("step {} of {} had not settled when it was recorded", step, name));
+  if (!report.came_back)
+    out.push_back(fmt::format("{}: after the push {:.2f} % of the picture are not as before: the object has moved or did not come "
+                              "back; hold it better, or push less",
+                              name, 100 * report.changed_share));
+  return out;
+}
+
 nlohmann::json spread_json(const estimation::ExpectedSpread& spread) {
   return {{"log_young_std", number(spread.log_young_std)},
           {"young_modulus_within_95", number(std::exp(quantile_975 * spread.log_young_std) - 1)},

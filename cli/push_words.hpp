@@ -4,7 +4,9 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
+#include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/suggest.hpp"
 
 namespace palpate::cli {
@@ -16,6 +18,9 @@ std::string plain_95(double std);
 
 /// "push at (0.6000 0.0100 0.1500) along (+0.00 +0.00 -1.00) up to 8.20 N (about 9.10 mm), seen by camera 2"
 std::string push_words(const estimation::RatedPush& push, const PushScene& scene);
+
+/// What went wrong with a push that was made: its force drifted or crept, the object did not come back.
+std::vector<std::string> push_warnings(const std::string& name, const acquisition::PushReport& report);
 
 /// Standard deviations and half widths of 95 %; null where nothing is known.
 nlohmann::json spread_json(const estimation::ExpectedSpread& spread);

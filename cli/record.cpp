@@ -15,6 +15,7 @@
 #include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
 #include "cli/push_robot.hpp"
+#include "cli/push_words.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
@@ -111,19 +112,8 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
                                   step.unloading ? ", going back" : ""));
         },
         [] { return !Session::interrupted(); }, so_far);
-    if (report.drift && report.steps > 0) {
-      writer.end_push(*report.drift);
-      if (report.drift_n > 0.05 * report.highest_force_n)
-        session.warn(fmt::format("{}: the zero of the force moved by {:.3g} N during the push ({:.1f} N at most); taken off evenly over "
-                                 "its time. Let the sensor warm up, and keep cables from pulling",
-                                 plan.name, report.drift_n, report.highest_force_n));
-    }
-    for (const int step : report.unsettled)
-      session.warn(fmt::format("step {} of {} had not settled when it was recorded", step, plan.name));
-    if (!report.came_back)
-      session.warn(fmt::format("{}: after the push {:.2f} % of the picture are not as before: the object has moved or did not come "
-                               "back; hold it better, or push less",
-                               plan.name, 100 * report.changed_share));
+    if (report.drift && report.steps > 0) writer.end_push(*report.drift);
+    for (const std::string& warning : push_warnings(plan.name, report)) session.warn(warning);
     session.say(fmt::format("{} stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps", plan.name, acquisition::to_words(report.stop),
                             report.message, report.highest_force_n, 1000 * report.deepest_m, report.steps));
     told.push_back({{"push", plan.name},
