@@ -76,7 +76,8 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 ///                   answer then widens the intervals (mesh_error.hpp)
 /// @param memory     used and filled; nullptr: nothing is kept
 /// @param doubt      other shapes that the object may have where nobody saw it, nullptr where there is no such part: what they
-///                   do to the answer then widens the intervals too (shape_error.hpp)
+///                   do to the answer then widens the intervals too (shape_error.hpp). Where one agrees better with the pushes
+///                   (`doubt->effect->better`) the answer ends at that finding, without intervals: fit that one
 /// @throws Error when no answer can exist (no observation, supports that hold nothing, ...). Numbers that did not work out
 ///         are said in `termination`, `message` and `verdicts`.
 Identification fit(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,

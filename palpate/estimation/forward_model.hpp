@@ -129,8 +129,8 @@ class ForwardModel {
   /// Elements whose volume is gone at these unknowns; solves the step in full where the prediction cannot rule them out.
   int inverted_elements(std::size_t s, const VectorX& unknowns);
 
-  /// Von Mises stress at the surface's vertices, Pa; empty without an equilibrium. Solves the step unless it was last solved
-  /// at these very unknowns.
+  /// Von Mises stress at the surface's vertices, Pa; empty without an equilibrium. Solves the step unless its last
+  /// solution's derivatives lead there: what moves by less than a tenth.
   VectorX von_mises_pa(std::size_t s, const VectorX& unknowns);
 
   /// Several workers may predict at the same time, each on its own contiguous range of steps: first step of worker w (w ==

@@ -11,9 +11,9 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr double deviations = 1.5;   // that the farthest alternative lies away: errors of 18 labs were 0.6 of its change, rms
-constexpr Index rays_a_frame = 1500;  // the same few for every shape: only how the answers differ counts
-constexpr double strange_pull = 3;    // of what a push's instruments are off by
+constexpr double deviations = 1.5;     // that the farthest alternative lies away: errors of 18 labs were 0.6 of its change, rms
+constexpr Index rays_a_frame = 1500;   // the same few for every shape: only how the answers differ counts
+constexpr double strange_pull = 3;     // of what a push's instruments are off by
 constexpr double clearly_better = 10;  // in half of chi-square
 
 Inputs thinned(const Inputs& all, double& share) {

@@ -44,6 +44,7 @@ class Field {
     return !near && free_(x);
   }
 
+  /// The same as if nobody had looked through anything.
   double by_facets(const Vec3& x) {
     near_.clear();
     Index nearest = -1;
