@@ -9,6 +9,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/geometry/winding_number.hpp"
 #include "palpate/reconstruction/facets.hpp"
+#include "palpate/reconstruction/mirrors.hpp"
 
 namespace palpate::reconstruction {
 namespace {
@@ -19,22 +20,7 @@ constexpr double unchanged = 0.02;          // of the volume: the planar complet
 constexpr double close_cubes = 8;           // to a seen facet, in cubes: ...
 constexpr double anchor_cubes = 2.5;        // ... right behind it, the object was seen
 constexpr double touch_margin = 1.3;        // of a tool's radius
-constexpr double price_of_misfit = 1;
-constexpr int turns = 1;                    // of 15 degrees, away from the line of sight, that a mirror may have
-constexpr double price_of_turn = 0.05;
-constexpr int looked_at = 800;              // facets that the mirror is judged by
-constexpr double price_of_depth = 0.05;     // prefers the nearer of two mirrors that are as good
-constexpr double most_free = 0.1;           // of the mirrored facets that may stand in free space
-
-Vec3 corner_mean(const TriMesh& m, Index t) {
-  return (m.vertices_m.row(m.triangles(t, 0)) + m.vertices_m.row(m.triangles(t, 1)) + m.vertices_m.row(m.triangles(t, 2)))
-             .transpose() / 3;
-}
-
-Vec3 area_of(const TriMesh& m, Index t) {
-  const Vec3 a = m.vertices_m.row(m.triangles(t, 0)), b = m.vertices_m.row(m.triangles(t, 1)), c = m.vertices_m.row(m.triangles(t, 2));
-  return 0.5 * (b - a).cross(c - a);
-}
+constexpr double from_behind = 0.3;         // cosine between a push and the way to the sensors
 
 /// Cubes along the support's plane.
 struct Cubes {
@@ -62,12 +48,6 @@ struct Cubes {
 };
 
 constexpr std::array<std::array<int, 3>, 6> sides{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
-
-struct Mirror {
-  Vec3 normal = Vec3::Zero();
-  double offset_m = 0;
-  Vec3 of(const Vec3& p) const { return p - 2 * (normal.dot(p) - offset_m) * normal; }
-};
 
 class Completer {
  public:
@@ -102,23 +82,40 @@ class Completer {
       planar[k] = inside && hidden[k];
       before += inside;
     });
-    std::vector<char> out = planar;
-    const auto value = [&](const std::vector<char>& cubes, std::ptrdiff_t k) { return k >= 0 && cubes[std::size_t(k)] != 0; };
-    std::optional<Mirror> mirror;
-    if (options_.completion == Completion::mirrored) mirror = find_mirror();
-    if (options_.completion == Completion::tapered) mirror = upside_down();
-    if (options_.completion == Completion::hidden) out = hidden;
-    if (mirror) {
+    std::vector<char> out = options_.completion == Completion::hidden ? hidden : planar;
+    std::vector<char> open(cubes_.count());
+    for (std::size_t k = 0; k < open.size(); ++k) open[k] = hidden[k] && !anchored[k];
+    const auto value = [&](const std::vector<char>& cubes, const Vec3& p) {
+      const auto k = cubes_.of(p);
+      return k >= 0 && cubes[std::size_t(k)] != 0;
+    };
+    if (options_.completion == Completion::tapered) {
+      const Mirror mirror = upside_down();
       cubes_.each([&](int x, int y, int z) {
         const std::size_t k = cubes_.at(x, y, z);
-        if (!hidden[k] || anchored[k]) return;
-        // what is known of the image counts, and where nothing is, the planar completion
-        const auto image = cubes_.of(mirror->of(cubes_.middle(x, y, z)));
-        if (options_.completion == Completion::tapered) out[k] = planar[k] && value(planar, image);
-        else if (value(planar, image)) out[k] = 1;
-        else if (image >= 0 && !value(hidden, image)) out[k] = 0;
+        if (open[k]) out[k] = planar[k] && value(planar, mirror.of(cubes_.middle(x, y, z)));
       });
     }
+    // What one mirror says is handed to the next. What is known of the image counts: that it is free, or solid not only as
+    // the rim of what was hidden; where nothing is, what was there before.
+    for (const Mirror& mirror : mirrors()) {
+      std::vector<char> next = out, still_open = open;
+      cubes_.each([&](int x, int y, int z) {
+        const std::size_t k = cubes_.at(x, y, z);
+        if (!open[k]) return;
+        const Vec3 p = cubes_.middle(x, y, z), image = mirror.of(p);
+        if (value(out, image)) {
+          const bool within = std::all_of(sides.begin(), sides.end(), [&](const auto& s) {
+            return z + s[2] < 0 || value(out, mirror.of(p + cubes_.h * cubes_.axes * Vec3(s[0], s[1], s[2])));
+          });
+          if (within || value(anchored, image)) next[k] = 1, still_open[k] = 0;
+        } else if (cubes_.of(image) >= 0 && !value(hidden, image)) {
+          next[k] = still_open[k] = 0;
+        }
+      });
+      out.swap(next), open.swap(still_open);
+    }
+    if (options_.completion == Completion::mirrored) close_grooves(hidden, open, out);
     for (const Touch& touch : options_.touched) reach_to(touch, anchored, out);
     out = connected(out, planar);
     std::size_t changed = before - static_cast<std::size_t>(std::count(planar.begin(), planar.end(), 1));
@@ -174,7 +171,7 @@ class Completer {
     cubes_.axes << u, v, up_;
     Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
     for (Index t = 0; t < fused.seen; ++t) {
-      const Vec3 p = cubes_.axes.transpose() * corner_mean(seen_, t);
+      const Vec3 p = cubes_.axes.transpose() * middle_of(seen_, t);
       low = low.cwiseMin(p), high = high.cwiseMax(p);
     }
     cubes_.h = std::max(0.5 * fused.cell_m, (high - low).norm() / most_cubes_across);
@@ -206,52 +203,50 @@ class Completer {
     });
   }
 
+  /// A cube of which nothing is known belongs to the object where it stands, with no free space before them, between two parts
+  /// of it on most level lines: no mirror says what lies in its own plane.
+  void close_grooves(const std::vector<char>& hidden, const std::vector<char>& open, std::vector<char>& solid) const {
+    const Vec3 u = cubes_.axes.col(0), v = cubes_.axes.col(1);
+    const std::array<Vec3, 4> lines{u, v, (u + v).normalized(), (u - v).normalized()};
+    constexpr int most = 3;
+    const std::vector<char> before = solid;
+    const auto ends_in_solid = [&](Vec3 p, const Vec3& step) {
+      for (p += step;; p += step) {
+        const auto k = cubes_.of(p);
+        if (k < 0) return false;
+        if (before[std::size_t(k)]) return true;
+        if (!hidden[std::size_t(k)]) return false;
+      }
+    };
+    cubes_.each([&](int x, int y, int z) {
+      const std::size_t k = cubes_.at(x, y, z);
+      if (before[k] || !open[k]) return;
+      const Vec3 p = cubes_.middle(x, y, z);
+      const auto stands_between = [&](const Vec3& d) {
+        return ends_in_solid(p, cubes_.h * d) && ends_in_solid(p, -cubes_.h * d);
+      };
+      if (std::count_if(lines.begin(), lines.end(), stands_between) >= most) solid[k] = 1;
+    });
+  }
+
+  /// The surest first: a symmetry of what was seen, then the one that says how far back the object reaches.
+  std::vector<Mirror> mirrors() const {
+    std::vector<Mirror> out;
+    if (options_.completion != Completion::mirrored) return out;
+    const MirrorSearch search(seen_, up_, cubes_.h, options_.free);
+    if (const auto symmetry = search.symmetry()) out.push_back(*symmetry);
+    std::vector<Vec3> touched_m;
+    for (const Touch& touch : options_.touched)
+      if (touch.inward.dot(toward_) > from_behind) touched_m.push_back(touch.point_m);
+    if (const auto back = search.half_way_back(toward_, behind_m_, touched_m)) out.push_back(*back);
+    return out;
+  }
+
   /// Through half the height.
   Mirror upside_down() const {
     double top = -1e300;
-    for (Index t = 0; t < seen_.triangles.rows(); ++t) top = std::max(top, up_.dot(corner_mean(seen_, t)));
+    for (Index t = 0; t < seen_.triangles.rows(); ++t) top = std::max(top, up_.dot(middle_of(seen_, t)));
     return {up_, 0.5 * (top + cubes_.low.z())};
-  }
-
-  std::optional<Mirror> find_mirror() const {
-    if (toward_.isZero()) return std::nullopt;
-    const geometry::TriangleTree tree(seen_);
-    const double near = 2 * cubes_.h;
-    const auto stride = std::max<Index>(1, static_cast<Index>(seen_.triangles.rows()) / looked_at);
-    std::vector<std::pair<Vec3, Vec3>> facets;
-    for (Index t = 0; t < seen_.triangles.rows(); t += stride) facets.emplace_back(corner_mean(seen_, t), area_of(seen_, t).normalized());
-    std::optional<Mirror> best;
-    double most = -1e300;
-    for (int step = -turns; step <= turns; ++step) {
-      Mirror mirror;
-      mirror.normal = Eigen::AngleAxisd(step * M_PI / 12, up_) * toward_;
-      double front = -1e300;
-      for (const auto& [p, n] : facets) front = std::max(front, mirror.normal.dot(p));
-      for (double depth = 0.5 * cubes_.h; depth < behind_m_; depth += 0.5 * cubes_.h) {
-        mirror.offset_m = front - depth;
-        double good = 0, bad = 0, slope = 0, curvature = 0;
-        for (const auto& [p, n] : facets) {
-          const Vec3 image = mirror.of(p);
-          const auto c = tree.closest(image);
-          const Vec3 turned = n - 2 * mirror.normal.dot(n) * mirror.normal;
-          if (c.squared_distance_m2 < near * near) {
-            const Vec3 normal = area_of(seen_, c.triangle).normalized();
-            if (turned.dot(normal) < 0.7) continue;
-            const double across = 2 * normal.dot(mirror.normal);
-            ++good, slope += across * normal.dot(image - c.point_m), curvature += across * across;
-          } else {
-            bad += options_.free(image - cubes_.h * turned);  // within a solid, not on its rim
-          }
-        }
-        const double all = double(facets.size());
-        if (bad > most_free * all) continue;
-        // where images and facets say that the mirror belongs, by least squares
-        const double off_m = curvature > 0.01 * good ? std::abs(slope) / curvature : 0;
-        const double score = (good - 2 * bad) / all - price_of_misfit * off_m / near - price_of_depth * depth / behind_m_ - price_of_turn * std::abs(step);
-        if (score > most) most = score, best = mirror;
-      }
-    }
-    return best;
   }
 
   /// Of `from`, what hangs together with `core`.

@@ -75,4 +75,14 @@ TriMesh triangles_of(const std::vector<Facet>& facets) {
   return out;
 }
 
+Vec3 middle_of(const TriMesh& facets, Index t) {
+  const auto corner = [&](int k) { return facets.vertices_m.row(facets.triangles(t, k)); };
+  return (corner(0) + corner(1) + corner(2)).transpose() / 3;
+}
+
+Vec3 area_of(const TriMesh& facets, Index t) {
+  const auto corner = [&](int k) { return Vec3(facets.vertices_m.row(facets.triangles(t, k))); };
+  return 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0));
+}
+
 }  // namespace palpate::reconstruction

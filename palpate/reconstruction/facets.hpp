@@ -83,4 +83,8 @@ void share_out_area(std::vector<Facet>& facets, double cell);
 /// One equilateral triangle a facet, as large as it.
 TriMesh triangles_of(const std::vector<Facet>& facets);
 
+/// Of such a triangle.
+Vec3 middle_of(const TriMesh& facets, Index triangle);
+Vec3 area_of(const TriMesh& facets, Index triangle);
+
 }  // namespace palpate::reconstruction

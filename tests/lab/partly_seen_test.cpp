@@ -12,7 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "geometry/overlap.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/lab/random.hpp"
 #include "palpate/lab/robot.hpp"
@@ -33,6 +35,17 @@ Push push_at(LabRobot& robot, std::size_t site) {
   return acquisition::whole_push(robot, robot.plan(site), protocol);
 }
 
+/// From one side, drawn about that of the camera that watches the pushes.
+struct Sight {
+  double around_rad = 0, above_rad = 0;
+};
+
+Sight sight_of(int seed) {
+  Random random(std::uint64_t(seed), 77);
+  const double around = -2.0 + random.uniform(-M_PI / 4, M_PI / 4);
+  return {around, random.uniform(M_PI / 9, M_PI / 3)};
+}
+
 class PartlySeen : public testing::TestWithParam<const char*> {};
 
 TEST_P(PartlySeen, IntervalHoldsTheTruthAllTheSame) {
@@ -50,8 +63,7 @@ TEST_P(PartlySeen, IntervalHoldsTheTruthAllTheSame) {
     full.pushes.push_back(push_at(robot, std::size_t(seed) % robot.object().sites.size()));
     Recording part = full;
     part.rest.surface.reset();
-    Random random(std::uint64_t(seed), 77);
-    const double around = -2.0 + random.uniform(-M_PI / 4, M_PI / 4), above = random.uniform(M_PI / 9, M_PI / 3);
+    const auto [around, above] = sight_of(seed);
     part.rest.views = robot.look_from({{around, above}});
 
     IdentifyOptions identification;
@@ -85,6 +97,35 @@ TEST_P(PartlySeen, IntervalHoldsTheTruthAllTheSame) {
   if (labs >= 5) {
     EXPECT_LE(half_widths[std::size_t(labs / 2)], 0.3);
   }
+}
+
+// The same views alone, without a push: what the completed shape shares with the true one.
+TEST_P(PartlySeen, CompletedShapeIsNearTheTrueOne) {
+  const int labs = std::max(3, from_environment("PALPATE_LABS", 8)), first = from_environment("PALPATE_FIRST_SEED", 1);
+  double shared = 0, squares = 0;
+  for (int seed = first; seed < first + labs; ++seed) {
+    ObjectOptions truth;
+    truth.seed = std::uint64_t(seed);
+    LabOptions options;
+    options.seed = std::uint64_t(seed);
+    LabRobot robot(options, make_object(GetParam(), truth));
+    Recording recording = robot.scene();
+    const geometry::Solid whole(*recording.rest.surface);
+    const double volume_m3 = *geometry::check_surface(*recording.rest.surface).volume_m3;
+    recording.rest.surface.reset();
+    const auto [around, above] = sight_of(seed);
+    recording.rest.views = robot.look_from({{around, above}});
+    build_simulated_object(recording, {});
+    const double both = geometry::overlap(whole, geometry::Solid(*recording.rest.surface));
+    const double ratio = geometry::check_volume(*recording.rest.volume).volume_m3 / volume_m3;
+    std::printf("%s seed %d, seen from %+.0f, %.0f degrees: shares %.2f of the volume of both, volume / true %.2f\n", GetParam(), seed,
+                around * 180 / M_PI, above * 180 / M_PI, both, ratio);
+    shared += both / labs, squares += std::pow(std::log(ratio), 2) / labs;
+  }
+  std::printf("%s: shares %.2f, volume off by %.1f %% rms\n", GetParam(), shared, 100 * std::sqrt(squares));
+  const bool box = std::string(GetParam()) == "cube";
+  EXPECT_GT(shared, box ? 0.9 : 0.7);
+  EXPECT_LT(std::sqrt(squares), box ? 0.1 : 0.15);
 }
 
 INSTANTIATE_TEST_SUITE_P(Objects, PartlySeen, testing::Values("cube", "bear"), [](const auto& scene) { return std::string(scene.param); });

@@ -7,8 +7,9 @@
 
 #include <random>
 
+#include "geometry/overlap.hpp"
 #include "geometry/shapes.hpp"
-#include "palpate/geometry/solid.hpp"
+#include "palpate/lab/object.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 
 namespace palpate::reconstruction {
@@ -51,20 +52,6 @@ Seen look(const std::shared_ptr<const geometry::TriangleTree>& tree, const Vec3&
   return out;
 }
 
-/// Shared volume over that of both together.
-double overlap(const geometry::Solid& a, const geometry::Solid& b) {
-  const Vec3 low = a.min_m().cwiseMin(b.min_m()), extent = a.max_m().cwiseMax(b.max_m()) - low;
-  std::mt19937 rng(9);
-  std::uniform_real_distribution<double> u;
-  int both = 0, any = 0;
-  for (int i = 0; i < 8000; ++i) {
-    const Vec3 p = low + extent.cwiseProduct(Vec3(u(rng), u(rng), u(rng)));
-    const bool in_a = a.inside(p), in_b = b.inside(p);
-    both += in_a && in_b, any += in_a || in_b;
-  }
-  return double(both) / any;
-}
-
 BuiltObject complete_as(Completion completion, Seen seen) {
   seen.fuse.completion = completion;
   BuildOptions options;
@@ -81,13 +68,66 @@ TEST(Completion, MirrorFindsTheBackOfABallAndOfABox) {
     const double volume = *geometry::check_surface(truth).volume_m3;
     const auto mirrored = complete_as(Completion::mirrored, seen), planar = complete_as(Completion::planar, seen),
                hidden = complete_as(Completion::hidden, seen), tapered = complete_as(Completion::tapered, seen);
-    EXPECT_GT(overlap(solid, geometry::Solid(mirrored.model.surface)), 0.88) << ball;
+    EXPECT_GT(geometry::overlap(solid, geometry::Solid(mirrored.model.surface)), 0.88) << ball;
     EXPECT_NEAR(mirrored.check.volume_m3 / volume, 1, 0.1) << ball;
-    EXPECT_GE(overlap(solid, geometry::Solid(mirrored.model.surface)), overlap(solid, geometry::Solid(planar.model.surface)) - 0.02) << ball;
+    EXPECT_GE(geometry::overlap(solid, geometry::Solid(mirrored.model.surface)), geometry::overlap(solid, geometry::Solid(planar.model.surface)) - 0.02) << ball;
     EXPECT_GT(hidden.check.volume_m3, 1.3 * volume) << ball;
     EXPECT_LE(tapered.check.volume_m3, 1.02 * planar.check.volume_m3) << ball;
     EXPECT_EQ(mirrored.check.inverted, 0);
     EXPECT_EQ(hidden.check.inverted, 0);
+  }
+}
+
+/// The lab's bear over the origin, facing -y.
+TriMesh bear() {
+  TriMesh surface = lab::make_object("bear").surface;
+  const Vec3 middle = 0.5 * (surface.vertices_m.colwise().minCoeff() + surface.vertices_m.colwise().maxCoeff()).transpose();
+  surface.vertices_m.rowwise() -= Vec3(middle.x(), middle.y(), 0).transpose();
+  return surface;
+}
+
+Seen look_from(const std::shared_ptr<const geometry::TriangleTree>& tree, double around_degrees, double above_degrees) {
+  const double around = around_degrees * M_PI / 180, above = above_degrees * M_PI / 180;
+  const Vec3 middle(0, 0, 0.1), away(std::cos(above) * std::cos(around), std::cos(above) * std::sin(around), std::sin(above));
+  return look(tree, middle + 0.6 * away, middle, 0.0008);
+}
+
+// It sits askew: its own symmetry is none of the planes across the line of sight, and says where the other arm and leg are.
+TEST(Completion, OwnSymmetryShowsTheOtherSide) {
+  const TriMesh truth = bear();
+  const auto tree = std::make_shared<const geometry::TriangleTree>(truth);
+  const geometry::Solid solid(truth);
+  const double volume = *geometry::check_surface(truth).volume_m3;
+  for (const double degrees : {-138.0, -150.0, -30.0}) {
+    const Seen seen = look_from(tree, degrees, 34);
+    const auto mirrored = complete_as(Completion::mirrored, seen), planar = complete_as(Completion::planar, seen);
+    const double whole = geometry::overlap(solid, geometry::Solid(mirrored.model.surface));
+    EXPECT_GT(whole, 0.72) << degrees;
+    EXPECT_GT(whole, geometry::overlap(solid, geometry::Solid(planar.model.surface)) + 0.03) << degrees;
+    EXPECT_NEAR(mirrored.check.volume_m3 / volume, 1, 0.15) << degrees;
+  }
+}
+
+// Of what is seen from its front alone only the bend of its rim shows how deep it is, and rims are seen badly.
+TEST(Completion, ATouchBehindSaysHowFarBackTheObjectReaches) {
+  for (const double depth : {0.5, 0.75}) {
+    TriMesh egg = shapes::sphere(0.06, 5, Vec3(0, 0, 0.058));
+    egg.vertices_m.col(0) *= depth;
+    const auto tree = std::make_shared<const geometry::TriangleTree>(egg);
+    const geometry::Solid solid(egg);
+    Seen seen = look(tree, Vec3(-0.5, 0, 0.12), Vec3(0, 0, 0.05), 0.0008);
+    const auto shared = [&] {
+      return geometry::overlap(solid, geometry::Solid(complete_as(Completion::mirrored, seen).model.surface));
+    };
+    const double without = shared();
+    const Vec3 inward = -Vec3(0.9, 0.1, 0.3).normalized(), from = Vec3(0, 0, 0.058) - 0.3 * inward;
+    seen.fuse.touched = {{from + tree->cast(from, inward)->range_m * inward, inward, 0.012}};
+    const double with = shared();
+    EXPECT_GT(with, 0.9) << depth;
+    EXPECT_GT(with, without - 0.05) << depth;
+    if (depth == 0.75) {
+      EXPECT_GT(with, without + 0.1);
+    }
   }
 }
 
