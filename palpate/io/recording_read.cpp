@@ -126,6 +126,11 @@ Recording read_recording_unchecked(const fs::path& given) {
   const fs::path root = is_index ? given.parent_path() : given;
   const fs::path index = is_index ? given : given / index_name;
   if (!is_index && !fs::is_directory(given, code)) throw Error("there is no such folder; a recording is a folder with recording.yaml in it (docs/recording-format.md)", given.string());
+  if (is_index && index.extension() != ".yaml" && index.extension() != ".yml") {
+    throw Error("is no recording: that is a folder with recording.yaml in it, that file, or a bag (.mcap, .db3, .bag); "
+                "the shape of an object alone is for `palpate model` (docs/recording-format.md)",
+                given.string());
+  }
   if (!fs::exists(index, code)) {
     throw Error("holds no recording.yaml; a recording is a folder with that file in it (docs/recording-format.md)",
                 given.string());

@@ -61,6 +61,17 @@ TEST_F(BrokenRecording, AFileThatIsNone) {
   expect_refused("recording.yaml:", "keys and values are expected here");
 }
 
+TEST_F(BrokenRecording, AFileOfAnotherKind) {
+  folder.put("cow.obj", "v 0 0 0\n");
+  try {
+    read_recording(folder.path() / "cow.obj");
+    ADD_FAILURE() << "a mesh was taken for a recording";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("cow.obj: is no recording"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("palpate model"));
+  }
+}
+
 TEST_F(BrokenRecording, MissingFile) {
   std::filesystem::remove(folder.path() / "clouds/b.xyz");
   expect_refused("frames.csv:3: cloud", "there is no file 'clouds/b.xyz'");
