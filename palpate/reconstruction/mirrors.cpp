@@ -14,7 +14,7 @@ constexpr double same_direction = 0.7;  // cosine between an image and the facet
 constexpr double price_of_free = 2;
 constexpr double radian = M_PI / 180;
 
-// A symmetry is looked for all around with few facets, and once more about the best plane.
+// Of a symmetry: looked for all around with few facets, and once more about the best plane.
 constexpr int directions = 18;
 constexpr Index few = 150, many = 800;
 constexpr double promising = 0.2, believed = 0.5;  // scores
@@ -22,12 +22,13 @@ constexpr double finer_rad = 2 * radian;
 constexpr int finer_turns = 3, finer_steps = 6;
 constexpr double margin = 0.2;  // of the seen part's width that lies beyond a plane of symmetry at least
 
+// Of the way back.
 constexpr int turns = 2;
 constexpr double turn_rad = 15 * radian;
 constexpr double price_of_turn = 0.2;
 constexpr double price_of_depth = 0.05;  // prefers the nearer of two that are as good
-constexpr double few_known = 0.3;        // images of which anything is known, as a share: below, little is said
-constexpr double far_off = 5;            // more than so many near_m() count as that
+constexpr double few_known = 0.3;        // share of images that fall on what is known: with fewer the score shrinks
+constexpr double far_off = 5;            // a touch that is missed by more than so many near_m() counts as that
 constexpr double most_free = 0.2;        // of the images
 
 }  // namespace

@@ -1,8 +1,8 @@
 // label: statistics
 // SPDX-License-Identifier: Apache-2.0
 // An object that one camera saw from one side: E with the shape completed, beside E with the whole shape given. Every lab has a
-// truth, sensors and a direction of sight of its own, about the one of the camera that watches the pushes. PALPATE_LABS says how many (one each by default), PALPATE_FIRST_SEED where
-// to begin.
+// truth, sensors and a direction of sight of its own, about the one of the camera that watches the pushes. PALPATE_LABS says how
+// many (by default one each, and eight each of shapes alone), PALPATE_FIRST_SEED where to begin.
 #include <gtest/gtest.h>
 
 #include <algorithm>
