@@ -71,6 +71,7 @@ export class Viewer {
       } catch {
         this.holder.classList.add("without");
         this.holder.append(el("p", {}, "This browser offers no WebGL, so the 3D view is missing. All figures below are complete."));
+        for (const part of [this.legend, this.modes, this.toggles, this.notes]) part.remove();
       }
       this.update();
     });

@@ -90,6 +90,8 @@ const checks = {
       await page.getByText("no WebGL").waitFor();
       await numbersAgree(page);
       assert.ok((await page.locator("figure svg").count()) >= 5, "figures are missing");
+      for (const part of [".legend", ".choices", ".toggles"])
+        assert.equal(await page.locator(`#object ${part}`).count(), 0, `${part} belongs to the picture that is missing`);
       const scripted = complaints.filter((text) => !/WebGL/i.test(text));
       assert.deepEqual(scripted, []);
     });
