@@ -10,6 +10,7 @@
 #include "palpate/estimation/posterior.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
+#include "palpate/lab/box_surface.hpp"
 #include "palpate/lab/implicit_surface.hpp"
 #include "palpate/lab/random.hpp"
 
@@ -129,6 +130,95 @@ TEST(RayChoice, TheSameRaysCountForEveryPoissonRatio) {
   EXPECT_EQ(apart(ball.loss), 0) << "a ray that counts came or went";
   // The choice leaves out what grazes, not what faces the camera.
   EXPECT_GT(ball.finite_rows(nu, ball.loss), 0.9 * ball.finite_rows(nu, all));
+}
+
+/// Beyond a sharp edge there is no facet that a ray grazes before it misses: rays that count come and go at full weight.
+TEST(RayChoice, ARayThatComesToMissASharpEdgeGoesOnAsTheEdge) {
+  Recording recording;
+  recording.rest.surface = lab::box_surface({-0.05, -0.05, 0}, {0.05, 0.05, 0.1}, 8);
+  recording.model.material = "linear";
+  recording.model.element = "tet4";
+  Support table;
+  table.name = "table";
+  table.kind = SupportKind::plane;
+  table.select = NodeSelection::plane;
+  recording.supports = {table};
+  Tool pad;
+  pad.name = "pad";
+  pad.shape = ToolShape::disc;
+  pad.radius_m = 0.02;
+  recording.tools = {pad};
+  Load load;
+  load.tool = "pad";
+  load.direction = -Vec3::UnitZ();
+  load.contact_m = Vec3(0, 0, 0.1);
+  load.force_n = force_n * load.direction;
+  Push push;
+  push.name = "push";
+  push.steps.resize(1);
+  push.steps[0].loads = {load};
+  recording.pushes = {push};
+  Unknowns unknowns;
+  ForwardModel model(recording, build_simulated_object(recording), unknowns);
+  VectorX stiff = unknowns.prior_mean();
+  stiff(log_young) = std::log(5 * young_pa);
+  stiff(poisson) = true_nu;
+
+  // Rays that end on the top beside its far edge, which sinks as the cube gets softer.
+  TriMesh surface = model.object().surface.rest();
+  surface.vertices_m = model.predict(0, stiff).surface_m;
+  const geometry::TriangleTree tree(surface);
+  const Vec3 eye(0.1, -0.5, 0.25);
+  std::vector<std::pair<Vec3, double>> seen;
+  for (double x = -0.045; x < 0.045; x += 0.005) {
+    for (double inside = 1e-4; inside < 2e-2; inside *= 1.1) {
+      const Vec3 direction = (Vec3(x, 0.05 - inside, 0.1) - eye).normalized();
+      if (const auto hit = tree.cast(eye, direction)) seen.emplace_back(direction, hit->range_m);
+    }
+  }
+  RayObservation observation;
+  RayCloud& rays = observation.rays;
+  const Index count = static_cast<Index>(seen.size());
+  rays.origins_m = eye.transpose().replicate(count, 1);
+  rays.directions.resize(count, 3);
+  rays.range_m.resize(count);
+  rays.sigma_m = VectorX::Constant(count, sigma_m);
+  for (Index i = 0; i < count; ++i) {
+    rays.directions.row(i) = seen[static_cast<std::size_t>(i)].first;
+    rays.range_m(i) = seen[static_cast<std::size_t>(i)].second + 1e-3;
+  }
+  Objective objective(model, {{observation}}, unknowns);
+  Loss loss;
+  objective.evaluate(stiff, loss);
+  const Loss chosen = objective.with_chosen_rays(loss);
+
+  Index missed = 0, off = 0;
+  double steepest = 0;
+  double before = objective.evaluate(stiff, chosen).cost;
+  for (double softer = 0.002; softer < 0.4; softer += 0.002) {
+    VectorX at = stiff;
+    at(log_young) -= softer;
+    const Evaluation here = objective.evaluate(at, chosen);
+    const TermRows& rows = objective.last_rows()[0][0];
+    const VectorX residual = rows.residual;
+    const MatrixX slopes = rows.jacobian;
+    const VectorX facing = rows.facing;
+    EXPECT_NEAR(here.cost, before, 0.5) << "a ray that counts jumped at " << softer;
+    before = here.cost;
+    VectorX beside = at;
+    beside(log_young) -= 1e-6;
+    objective.evaluate(beside, chosen);
+    const TermRows& moved = objective.last_rows()[0][0];
+    for (Index i = 0; i < count; ++i) {
+      if (!std::isfinite(residual(i)) || facing(i) > 0 || moved.facing(i) > 0) continue;
+      ++missed;
+      off += std::abs((residual(i) - moved.residual(i)) / 1e-6 - slopes(i, 0)) > 0.01;
+      steepest = std::max(steepest, std::abs(slopes(i, 0)));
+    }
+  }
+  EXPECT_GT(steepest, 0.05) << "nothing to compare";
+  EXPECT_LT(off, 0.03 * double(missed)) << "of " << missed << ": more than those whose nearest point jumps from edge to edge";
+  EXPECT_GT(missed, 100) << "no ray came to miss";
 }
 
 TEST(RayChoice, IsMadeFromOneCast) {

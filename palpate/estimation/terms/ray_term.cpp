@@ -88,7 +88,9 @@ class RayTerm : public Term {
         continue;
       }
       if (view.along_rays) {
-        if (const auto hit = tree.cast(frame.apply(camera.apply(rays_.origins_m.row(i))), direction, endless, hint)) {
+        const Vec3 origin_m = frame.apply(camera.apply(rays_.origins_m.row(i)));
+        double range_m = 0;  // at which the ray meets the surface
+        if (const auto hit = tree.cast(origin_m, direction, endless, hint)) {
           hint = hit->triangle;
           const Vec3 normal = face_normal(predicted.surface_m, hit->triangle);
           const double cosine = normal.dot(direction);
@@ -97,12 +99,22 @@ class RayTerm : public Term {
             triangle = hit->triangle;
             barycentric = hit->barycentric;
             gradient = normal / std::copysign(std::max(std::abs(cosine), steepest_cosine), cosine);
-            residual_m = rays_.range_m(i) - bias_m - hit->range_m;
-            lever = measured - residual_m * Vec3(rays_.directions.row(i));
-            if (scatter_ >= 0) {
-              scattered = scatter(predicted, triangle, rays_.directions.row(i), hit->range_m);
-              residual_m -= share * scattered->error.m;
-            }
+            range_m = hit->range_m;
+          }
+        } else if (chosen) {
+          if (const auto beside = beside_outline(tree, origin_m, direction, observed, rays_.sigma_m(i))) {
+            triangle = beside->triangle;
+            barycentric = beside->barycentric;
+            gradient = across_edge(predicted.surface_m, *beside, direction);
+            range_m = direction.dot(beside->point_m - origin_m);
+          }
+        }
+        if (triangle >= 0) {
+          residual_m = rays_.range_m(i) - bias_m - range_m;
+          lever = measured - residual_m * Vec3(rays_.directions.row(i));
+          if (scatter_ >= 0) {
+            scattered = scatter(predicted, triangle, rays_.directions.row(i), range_m);
+            residual_m -= share * scattered->error.m;
           }
         }
       } else {
@@ -179,6 +191,37 @@ class RayTerm : public Term {
     if (!tree_) tree_.emplace(*rest_tree_);
     tree_->refit(surface_m);
     return *tree_;
+  }
+  /// Where the surface comes nearest to a ray that counts and just misses it: its depth goes on as that of the outline. As an outlier
+  /// it would hold the fit where the outline stood when the rays were chosen, at a sharp edge above all.
+  /// @param observed_m  on the ray, near the surface
+  /// @returns nothing further off than noise reaches
+  static std::optional<geometry::ClosestPoint> beside_outline(geometry::TriangleTree& tree, const Vec3& origin_m, const Vec3& direction,
+                                                              const Vec3& observed_m, double sigma_m) {
+    constexpr double near_std = 5;
+    constexpr int rounds = 8;
+    Vec3 on_ray = observed_m;
+    geometry::ClosestPoint nearest = tree.closest(on_ray);
+    for (int round = 0; round < rounds; ++round) {
+      const Vec3 across = origin_m + direction.dot(nearest.point_m - origin_m) * direction;
+      const bool there = (across - on_ray).norm() < 1e-3 * sigma_m;
+      on_ray = across;
+      if (there) break;
+      nearest = tree.closest(on_ray);
+    }
+    if ((nearest.point_m - on_ray).norm() > near_std * sigma_m) return std::nullopt;
+    return nearest;
+  }
+  /// By how much the range of the point that is nearest to a ray changes with the surface there: on an edge that point slides along it.
+  Vec3 across_edge(const Points& surface_m, const geometry::ClosestPoint& at, const Vec3& direction) const {
+    constexpr double on_edge = 1e-9;
+    if ((at.barycentric.array() < on_edge).count() != 1) return direction;
+    Index opposite = 0;
+    at.barycentric.minCoeff(&opposite);
+    const auto corner = [&](Index k) { return Vec3(surface_m.row(rest_.triangles(at.triangle, k % 3))); };
+    const Vec3 edge = (corner(opposite + 2) - corner(opposite + 1)).normalized();
+    const Vec3 across = direction - direction.dot(edge) * edge;
+    return across / std::max(across.dot(direction), steepest_cosine * steepest_cosine);
   }
   /// What scattered light adds to a range that ends on a triangle of the surface.
   struct Scattered {
