@@ -131,7 +131,8 @@ TEST_F(SeenByOneCamera, ItsCommonPoseIsAnUnknownOfAllSteps) {
   };
   EXPECT_EQ(cameras(now), 6);
   EXPECT_EQ(cameras(whole), 6);
-  EXPECT_NEAR(now.parameters.at(0).std / whole.parameters.at(0).std, 1, 0.05);
+  // Rays that come to miss the block's edges speak in the whole fit alone.
+  EXPECT_NEAR(now.parameters.at(0).std / whole.parameters.at(0).std, 1, 0.1);
   EXPECT_NEAR(now.parameters.at(0).value, whole.parameters.at(0).value, 0.2 * whole.parameters.at(0).std);
 }
 

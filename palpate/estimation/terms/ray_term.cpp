@@ -101,7 +101,7 @@ class RayTerm : public Term {
             gradient = normal / std::copysign(std::max(std::abs(cosine), steepest_cosine), cosine);
             range_m = hit->range_m;
           }
-        } else if (chosen) {
+        } else if (chosen && !view.surface_slopes) {  // nearest points jump from edge to edge: no quadratic form holds them
           if (const auto beside = beside_outline(tree, origin_m, direction, observed, rays_.sigma_m(i))) {
             triangle = beside->triangle;
             barycentric = beside->barycentric;
