@@ -5,7 +5,7 @@
 
 #include "benchmarks/cube.hpp"
 #include "palpate/fem/boundary.hpp"
-#include "palpate/fem/response.hpp"
+#include "palpate/fem/response_nuisances.hpp"
 
 namespace palpate::fem {
 namespace {
@@ -45,7 +45,7 @@ void set_up(benchmark::State& state, const char* material, bool quadratic) {
   double error = 0;
   for (auto _ : state) {
     const Response response(contact.mesh, material, contact.boundary, contact.watched, contact.options);
-    const ResponseState first = response.at(benchmark_cube::kYoung, 0.3, 0.4 * contact.load, VectorX(0));
+    const ResponseState first = response.at({benchmark_cube::kYoung, 0.3, 0.4 * contact.load, VectorX(0)});
     if (!first.converged) return state.SkipWithError(first.reason.c_str());
     solves = response.solves();
     error = first.error;
@@ -58,10 +58,10 @@ void evaluate(benchmark::State& state, const char* material, bool quadratic) {
   const Contact contact(state, quadratic);
   const Response response(contact.mesh, material, contact.boundary, contact.watched, contact.options);
   double nu = 0.1;
-  response.at(benchmark_cube::kYoung, nu, 0.4 * contact.load, VectorX(0));  // makes the polynomial
+  response.at({benchmark_cube::kYoung, nu, 0.4 * contact.load, VectorX(0)});  // makes the polynomial
   for (auto _ : state) {
     nu = nu > 0.4 ? 0.1 : nu + 1e-4;  // never the same twice
-    benchmark::DoNotOptimize(response.at(benchmark_cube::kYoung, nu, 0.4 * contact.load, VectorX(0)));
+    benchmark::DoNotOptimize(response.at({benchmark_cube::kYoung, nu, 0.4 * contact.load, VectorX(0)}));
   }
   state.counters["rows"] = static_cast<double>(contact.watched.rows());
 }

@@ -12,7 +12,7 @@
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/fem/statics.hpp"
+#include "palpate/fem/response.hpp"
 #include "palpate/io/exporters.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/prediction/predict.hpp"
@@ -68,10 +68,14 @@ VectorX solved_here(const io::ExportModel& model, int threads) {
   for (const auto& [node, force] : model.forces_n)
     for (int d = 0; d < 3; ++d) boundary.forces.coeffRef(3 * node + d, 0) += force(d);
   boundary.motions.resize(size, 0);
-  fem::StaticsOptions options;
-  options.threads = threads;
-  const fem::Statics statics(model.mesh, "linear", std::move(boundary), options);
-  return statics.solve(model.young_modulus_pa, model.poisson_ratio, VectorX::Ones(1), VectorX(0)).displacement_m;
+  fem::Response::Options options;
+  options.statics.threads = threads;
+  const fem::Response response(model.mesh, "linear", std::move(boundary), Eigen::SparseMatrix<double>(0, size), options);
+  fem::ResponseQuery query{model.young_modulus_pa, model.poisson_ratio, VectorX::Ones(1), VectorX(0)};
+  query.derivatives = false;
+  const fem::ResponseState at = response.solve(query);
+  if (!at.converged) throw Error("finds no equilibrium under the test load: " + at.reason, "--verify");
+  return at.solution->displacement_m;
 }
 
 /// One word for the shell.

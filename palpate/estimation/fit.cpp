@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/estimation/fit.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -348,11 +350,13 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   if (options.stresses && !add_stresses(answer.steps, solved_on, optimum.unknowns, progress)) return stopped();
   CrossChecks checks;
   Doubts doubts;
+  std::optional<fem::Certificate> certificate;
   if (options.cross_checks && optimum.termination == Termination::converged) {
     checks = cross_check(objective, optimum, loss, factor, progress);
     if (checks.cancelled) return stopped();
     doubts = look_for_doubts(recording, objective, optimum, inputs, options, factor, std::max(1.0, summary.chi2_per_dof),
                              progress);
+    certificate = model.certify(optimum.unknowns);
     answer.prediction = checks.held_out;
     if (regions.size() == 1) {  // of one region each, else
       answer.per_push = young_of_parts(checks.pushes);
@@ -361,9 +365,12 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   }
   answer.fit.solves = model.solves() + (correction ? correction->model().solves() : 0);
   answer.fit.load_cases = model.load_cases() + load_cases_of_meshes;
-  answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts});
+  answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts, certificate});
   if (doubt != nullptr) answer.verdicts.push_back(partly_seen(*doubt));
   answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);
+  if (certificate)
+    answer.provenance["full solve of the hardest step"] =
+        certificate->converged ? fmt::format("{:.1e} of its motion away from the answer", certificate->difference) : certificate->reason;
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   return answer;
 }

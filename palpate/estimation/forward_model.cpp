@@ -237,7 +237,7 @@ int ForwardModel::unit_load_cases() const {
   int sum = 0;
   for (const auto& bodies : solved_->bodies)
     for (const auto& [tools, body] : bodies)
-      if (body->response) sum += body->response->load_cases();
+      sum += body->response->load_cases();
   return sum;
 }
 
@@ -262,7 +262,7 @@ void ForwardModel::forget() {
   for (auto& memory : memory_) memory = Memory{};
   for (auto& bodies : solved_->bodies) {
     for (auto& [tools, body] : bodies) {
-      if (body->contact) body->contact->forget();
+      body->response->forget();
       body->lying = nullptr;
     }
   }

@@ -15,8 +15,7 @@
 #include "palpate/estimation/simulated_surface.hpp"
 #include "palpate/estimation/surface_field.hpp"
 #include "palpate/estimation/unknowns.hpp"
-#include "palpate/fem/contact_statics.hpp"
-#include "palpate/fem/response_span.hpp"
+#include "palpate/fem/response.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
@@ -129,6 +128,10 @@ class ForwardModel {
   /// Elements whose volume is gone at these unknowns; solves the step in full where the prediction cannot rule them out.
   int inverted_elements(std::size_t s, const VectorX& unknowns);
 
+  /// The step that presses hardest, solved in full from rest, and with its loads stepped up: how far the model's own answer is from
+  /// that, and whether another equilibrium exists. Nothing for an object in rigid contact.
+  std::optional<fem::Certificate> certify(const VectorX& unknowns);
+
   /// Von Mises stress at the surface's vertices, Pa; empty without an equilibrium. Solves the step unless its last
   /// solution's derivatives lead there: what moves by less than a tenth.
   VectorX von_mises_pa(std::size_t s, const VectorX& unknowns);
@@ -179,12 +182,11 @@ class ForwardModel {
   int load_cases() const;
 
  private:
-  struct Body;          // one Statics: a set of platens and its columns of loads
+  struct Body;          // one Response: a set of platens and its columns of loads
   struct Coefficients;  // of a step: a, b and their derivatives
+  struct SolvedAt;      // an answer, and the unknowns that it is at
   struct Memory;        // of a step: where it was last solved
-  struct Watched;       // what is seen of the body in one step, in the object's frame
-  struct ContactState;
-  using ContactStatePtr = std::shared_ptr<const ContactState>;
+  using SolvedAtPtr = std::shared_ptr<const SolvedAt>;
 
   enum class Wanted { surface, derivatives, in_span };
   StepPrediction unchanged(std::size_t s, const VectorX& unknowns, Wanted wanted);
@@ -192,24 +194,23 @@ class ForwardModel {
   int unit_load_cases() const;
   /// False: no equilibrium, and `out` says why.
   bool solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
-                  Watched& watched, StepPrediction& out);
+                  fem::ResponseState& seen);
   bool solve_contact_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
-                          Watched& watched, StepPrediction& out);
-  ContactStatePtr contact_state(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);
-  ContactStatePtr solve_contact(Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
-                                const ContactStatePtr& start, const ContactStatePtr& before, const ContactStatePtr& known,
-                                std::size_t worker);
-  ContactStatePtr lying(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);
-  void add_contacts(Body& body, const Push& push, fem::Boundary boundary, std::vector<fem::RigidContact> supports);
+                          fem::ResponseState& seen);
+  SolvedAtPtr contact_state(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);
+  SolvedAtPtr solve_contact(Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives, const SolvedAtPtr& start,
+                            const SolvedAtPtr& before, const SolvedAtPtr& known, std::size_t worker);
+  SolvedAtPtr lying(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);
+  void add_contacts(Body& body, const Push& push, std::vector<fem::RigidContact> supports, fem::Response::Options& options);
   void add_path_columns(std::size_t s, const Body& body, const VectorX& unknowns, Coefficients& c) const;
   std::size_t first_step_of_push(std::size_t s) const { return s - steps_[s].step; }
   /// False: too far from where the step was last solved.
-  bool follow(std::size_t s, const VectorX& unknowns, Watched& watched, StepPrediction& out);
-  Watched superpose(const Body& body, const Coefficients& c, const VectorX& unknowns, const fem::UnitResponses& unit,
-                    StepPrediction& out) const;
+  bool follow(std::size_t s, const VectorX& unknowns, fem::ResponseState& seen);
+  /// What acts in a step, as the body is asked.
+  fem::ResponseQuery query(const Coefficients& c, const VectorX& unknowns, bool derivatives) const;
 
   std::size_t worker_of(std::size_t s) const;
-  void set_ratios(Body& body, const VectorX& unknowns) const;
+  VectorX region_stiffness(const VectorX& unknowns) const;
   std::vector<int> parameter_columns() const;
   void place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const;
   /// Forgets the push's body where it lacks columns of a contact.
@@ -221,7 +222,8 @@ class ForwardModel {
   std::string why_unheld(double sideways_n, double std_n) const;
   void prepare_slide(Body& body) const;
   void add_slide_unknowns(Unknowns& unknowns);
-  void slide(std::size_t s, const Body& body, const VectorX& unknowns, const std::vector<int>& columns, bool derivatives, Watched& at) const;
+  void slide(std::size_t s, const Body& body, const VectorX& unknowns, const std::vector<int>& columns, bool derivatives,
+             fem::ResponseState& at) const;
   struct TrueForce;  // of a load: its reading without what the sensor errs by
   TrueForce true_force(std::size_t s, std::size_t l, const VectorX& unknowns) const;
   struct LoadPart;  // of one load: columns that work together

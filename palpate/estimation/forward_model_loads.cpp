@@ -166,23 +166,14 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
   prepare_slide(*body);
   body->spreads = static_cast<int>(spread_.size());
   body->node_motions = static_cast<int>(platens.size()) + body->spreads;
-  if (contact_) {
-    add_contacts(*body, push, std::move(boundary), std::move(tables));
-    return *body;
-  }
-  body->statics = std::make_unique<fem::Statics>(object_.mesh, object_.material, std::move(boundary), options_);
-  if (linear_) {
-    Eigen::SparseMatrix<double, Eigen::RowMajor> watched =
-        object_.surface.rows(static_cast<Index>(object_.mesh.nodes_m.rows()));
-    const Index vertices = static_cast<Index>(watched.rows());
-    watched.conservativeResize(vertices + body->forces.cols(), watched.cols());
-    watched.bottomRows(body->forces.cols()) = Eigen::SparseMatrix<double, Eigen::RowMajor>(body->forces.transpose());
-    fem::LinearResponse::Options options;
-    options.poisson_lower = poisson_lower_;
-    options.poisson_upper = poisson_upper_;
-    options.tolerance = solved_->response_tolerance;
-    body->response = std::make_unique<fem::LinearResponse>(*body->statics, watched, options);
-  }
+  fem::Response::Options options;
+  options.statics = options_;
+  options.poisson_lower = poisson_lower_;
+  options.poisson_upper = poisson_upper_;
+  options.superposed_tolerance = solved_->response_tolerance;
+  if (contact_) add_contacts(*body, push, std::move(tables), options);
+  body->response = std::make_unique<fem::Response>(object_.mesh, object_.material, std::move(boundary),
+                                                   object_.surface.rows(static_cast<Index>(object_.mesh.nodes_m.rows())), options);
   return *body;
 }
 
@@ -251,7 +242,7 @@ ForwardModel::TrueForce ForwardModel::true_force(std::size_t s, std::size_t l, c
 ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const {
   Coefficients c;
   c.force = VectorX::Zero(body.forces.cols());
-  c.motion = VectorX::Zero(body.motion_count());
+  c.motion = VectorX::Zero(body.response->motion_count());
   c.d_force.resize(c.force.size(), 0);
   c.d_motion.resize(c.motion.size(), 0);
   std::map<int, int> column_of;

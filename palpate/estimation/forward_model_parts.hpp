@@ -10,8 +10,6 @@
 #include <vector>
 
 #include "palpate/estimation/forward_model.hpp"
-#include "palpate/fem/contact_statics.hpp"
-#include "palpate/fem/linear_response.hpp"
 
 namespace palpate::estimation {
 
@@ -35,16 +33,17 @@ bool depends_on_path(const Recording& recording);
 /// True where the object touches something that only pushes.
 bool has_contacts(const Recording& recording);
 
-/// State of a body in contact at one set of unknowns.
-struct ForwardModel::ContactState {
-  fem::ContactEquilibrium at;
+/// An answer of a body, and the unknowns that it is at.
+struct ForwardModel::SolvedAt {
   VectorX unknowns;
-  bool differentiated = false;
-  Index parameters = first_ratio;   // log E, nu and the regions' ratios
-  std::vector<int> columns;         // unknowns beside the parameters, in the order of d's columns
-  fem::ContactPathSensitivity d;
+  std::vector<int> columns;  // unknowns that the state's derivatives are to: the parameters, then others
+  fem::ResponseState state;
 
-  fem::ContactEquilibrium moved_to(const VectorX& there) const;
+  bool differentiated() const { return state.solution && state.solution->derivative.cols() > 0; }
+  VectorX change_to(const VectorX& there) const;  // of the columns' unknowns
+  /// The displacement moved along its derivatives; as it is where they would move it by more than a fifth: a straight line is no
+  /// guess for a far step.
+  VectorX displacement_at(const VectorX& there) const;
 };
 
 /// True for a load that acts by columns of force.
@@ -64,19 +63,10 @@ struct ForwardModel::Body {
   MatrixX slide, slide_conjugate;  // surface and loads of a slide along them (3v x f, columns x f); empty: none
   MatrixX slide_mean;              // the surface's mean motion along them, f x 3v
   Eigen::SparseMatrix<double> forces;
-  std::unique_ptr<fem::Statics> statics;                // none where there are contacts
-  std::unique_ptr<fem::ContactStatics> contact;
-  struct Driven {
-    std::size_t contact;
-    Vec3 direction;
-    int motion_column;
-  };
-  std::vector<Driven> driven;  // rigid tools with an imposed motion, after the platens' columns
-  int node_motions = 0;        // columns of platens whose nodes are moved, and of supports that spread
-  int spreads = 0;             // of them, the last ones
-  Index motion_count() const { return node_motions + static_cast<Index>(driven.size()); }
-  std::shared_ptr<const ContactState> lying;      // under its weight alone, where it was last asked for
-  std::unique_ptr<fem::LinearResponse> response;  // linear materials only: surface rows, then the forces' own (3 a load)
+  int node_motions = 0;  // columns of platens whose nodes are moved, and of supports that spread; those of rigid tools come after
+  int spreads = 0;       // of them, the last ones
+  SolvedAtPtr lying;     // under its weight alone, where it was last asked for
+  std::unique_ptr<fem::Response> response;  // the surface is watched
 };
 
 struct ForwardModel::Solved {
@@ -101,24 +91,9 @@ struct ForwardModel::Coefficients {
   MatrixX d_force, d_motion;  // coefficients x columns
 };
 
-/// Surface displacements, mean motions under the forces' columns (work-conjugate) and platens' reactions, with derivatives
-/// to log E, nu and the unknowns of Coefficients.
-struct ForwardModel::Watched {
-  VectorX moved_m, conjugate_m, reaction_n;
-  MatrixX d_moved, d_conjugate, d_reaction;
-};
-
 struct ForwardModel::Memory {
-  bool valid = false;
-  VectorX unknowns;
-  VectorX displacement_m;
-  std::vector<int> columns;
-  MatrixX derivative;  // 3n x columns, object frame
-  Watched watched;     // with derivatives where there are columns
-  int inverted_elements = 0;
-  std::shared_ptr<const ContactState> contact;
-
-  VectorX change_to(const VectorX& there) const;  // of the columns' unknowns
+  std::shared_ptr<const SolvedAt> seen;     // nothing: not solved yet; of what lies at rest: without what its weight does
+  std::shared_ptr<const SolvedAt> contact;  // as the solver has it
 };
 
 struct ForwardModel::TrueForce {

@@ -49,27 +49,29 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   const std::size_t worker = worker_of(s);
   Body& body = body_of(push(s), worker);
   Coefficients c = coefficients(s, body, unknowns);
-  if (body.contact && path_) add_path_columns(s, body, unknowns, c);
+  if (path_) add_path_columns(s, body, unknowns, c);
 
   StepPrediction out;
-  Watched at;
+  fem::ResponseState at;
   if (linear_) {
     if (wanted == Wanted::in_span) out.in_span = place_in_span(s, body, c, unknowns);
     if (out.in_span) {
-      const Index surface_rows = 3 * object_.surface.vertex_count();
-      at = superpose(body, c, unknowns, body.response->rows_from(surface_rows, unknowns(poisson)), out);
-      at.moved_m = out.in_span->moved_m();
+      at = body.response->readings(query(c, unknowns, derivatives));
+      at.watched_m = out.in_span->moved_m();
     } else {
-      at = superpose(body, c, unknowns, *body.response->at(unknowns(poisson)), out);
+      at = body.response->at(query(c, unknowns, derivatives));
     }
     ++solves_[worker];
-  } else if (!(reuse_ > 0 && derivatives && follow(s, unknowns, at, out)) &&
-             !solve_step(s, body, c, unknowns, derivatives, at, out)) {
-    return out;
+  } else if (!(reuse_ > 0 && derivatives && follow(s, unknowns, at))) {
+    solve_step(s, body, c, unknowns, derivatives, at);
   }
+  out.converged = at.converged;
+  out.reason = at.reason;
+  out.inverted_elements = at.inverted_elements;
+  if (!at.converged) return out;
 
   slide(s, body, unknowns, c.columns, derivatives, at);
-  place_surface(s, unknowns, at.moved_m, out);
+  place_surface(s, unknowns, at.watched_m, out);
   if (!derivatives) return out;
 
   out.columns = parameter_columns();
@@ -78,7 +80,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
 
   const RigidOffset clamp = clamp_offset(s, unknowns);
   const Mat3 rotation = clamp.rotation();
-  out.d_surface = std::move(at.d_moved);
+  out.d_surface = std::move(at.d_watched);
   if (clamp_[s] >= 0) {
     for (Index v = 0; v < out.surface_m.rows(); ++v) {
       out.d_surface.middleRows<3>(3 * v) = (rotation * out.d_surface.middleRows<3>(3 * v)).eval();

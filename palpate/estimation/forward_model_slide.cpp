@@ -46,19 +46,19 @@ void ForwardModel::add_slide_unknowns(Unknowns& unknowns) {
 /// The solution is pinned where nothing holds it. In place of that: no slide is no mean motion of the surface that way. To first
 /// order in turns, which are small: what pinned nodes turn a body by at large strains is a hundredth.
 void ForwardModel::slide(std::size_t s, const Body& body, const VectorX& unknowns, const std::vector<int>& columns, bool derivatives,
-                         Watched& at) const {
+                         fem::ResponseState& at) const {
   if (slide_[s] < 0) return;
   const Index count = body.slide.cols();
-  const VectorX way = unknowns.segment(slide_[s], count) - body.slide_mean * at.moved_m;
-  at.moved_m += body.slide * way;
+  const VectorX way = unknowns.segment(slide_[s], count) - body.slide_mean * at.watched_m;
+  at.watched_m += body.slide * way;
   at.conjugate_m += body.slide_conjugate * way;
   if (!derivatives) return;
-  MatrixX d_way = -body.slide_mean * at.d_moved;
+  MatrixX d_way = -body.slide_mean * at.d_watched;
   for (Index k = 0; k < count; ++k) {
     const auto own = std::find(columns.begin(), columns.end(), slide_[s] + static_cast<int>(k));
     d_way(k, parameters_ + (own - columns.begin())) += 1;
   }
-  at.d_moved += body.slide * d_way;
+  at.d_watched += body.slide * d_way;
   at.d_conjugate += body.slide_conjugate * d_way;
 }
 

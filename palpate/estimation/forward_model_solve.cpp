@@ -7,34 +7,23 @@
 
 namespace palpate::estimation {
 
-ForwardModel::Watched ForwardModel::superpose(const Body& body, const Coefficients& c, const VectorX& unknowns,
-                                              const fem::UnitResponses& unit, StepPrediction& out) const {
-  const double young_pa = std::exp(unknowns(log_young));
-  const Index others = static_cast<Index>(c.columns.size()), rows = static_cast<Index>(unit.force.rows());
-  const Index seen = rows - static_cast<Index>(body.forces.cols());
-  const VectorX loaded = unit.force * (c.force / young_pa);
-  const VectorX all = loaded + unit.motion * c.motion;
-  MatrixX d(rows, 2 + others);
-  d.col(0) = -loaded;
-  d.col(1) = unit.force_d_poisson * (c.force / young_pa) + unit.motion_d_poisson * c.motion;
-  d.rightCols(others) = unit.force * (c.d_force / young_pa) + unit.motion * c.d_motion;
-  Watched watched;
-  watched.moved_m = all.head(seen);
-  watched.conjugate_m = all.tail(rows - seen);
-  watched.d_moved = d.topRows(seen);
-  watched.d_conjugate = d.bottomRows(rows - seen);
-  watched.reaction_n = unit.reaction_force * c.force + young_pa * (unit.reaction_motion * c.motion);
-  watched.d_reaction.resize(c.motion.size(), 2 + others);
-  watched.d_reaction.col(0) = young_pa * (unit.reaction_motion * c.motion);
-  watched.d_reaction.col(1) =
-      unit.reaction_force_d_poisson * c.force + young_pa * (unit.reaction_motion_d_poisson * c.motion);
-  watched.d_reaction.rightCols(others) = unit.reaction_force * c.d_force + young_pa * (unit.reaction_motion * c.d_motion);
-  // Gradients add up at most; the polynomial knows them at its nodes only, hence the margin.
-  const double gradient = c.force.cwiseAbs().dot(unit.largest_gradient_force) / young_pa +
-                          c.motion.cwiseAbs().dot(unit.largest_gradient_motion);
-  out.converged = true;
-  out.inverted_elements = gradient < 0.7 ? 0 : -1;
-  return watched;
+VectorX ForwardModel::region_stiffness(const VectorX& unknowns) const {
+  if (parameters_ == first_ratio) return {};
+  VectorX stiffness = VectorX::Ones(1 + parameters_ - first_ratio);
+  stiffness.tail(stiffness.size() - 1) = unknowns.segment(first_ratio, parameters_ - first_ratio).array().exp();
+  return stiffness;
+}
+
+fem::ResponseQuery ForwardModel::query(const Coefficients& c, const VectorX& unknowns, bool derivatives) const {
+  fem::ResponseQuery q;
+  q.young_modulus_pa = std::exp(unknowns(log_young));
+  q.poisson_ratio = unknowns(poisson);
+  q.force = c.force;
+  q.motion = c.motion;
+  q.derivatives = derivatives;
+  q.along = fem::LoadDirections{c.d_force, c.d_motion};
+  q.stiffness = region_stiffness(unknowns);
+  return q;
 }
 
 double ForwardModel::reuse_error() const {
@@ -42,106 +31,87 @@ double ForwardModel::reuse_error() const {
   return furthest * furthest;
 }
 
-VectorX ForwardModel::Memory::change_to(const VectorX& there) const {
+VectorX ForwardModel::SolvedAt::change_to(const VectorX& there) const {
   VectorX change(static_cast<Index>(columns.size()));
   for (std::size_t k = 0; k < columns.size(); ++k) change(static_cast<Index>(k)) = there(columns[k]) - unknowns(columns[k]);
   return change;
 }
 
-bool ForwardModel::follow(std::size_t s, const VectorX& unknowns, Watched& watched, StepPrediction& out) {
-  const Memory& anchor = memory_[s];
-  if (!anchor.valid || anchor.columns.empty()) return false;
-  const VectorX change = anchor.change_to(unknowns);
-  watched = anchor.watched;
-  watched.moved_m += watched.d_moved * change;
-  watched.reaction_n += watched.d_reaction * change;  // imposed motions do not move with E, but their reactions do
+VectorX ForwardModel::SolvedAt::displacement_at(const VectorX& there) const {
+  const VectorX& here_m = state.solution->displacement_m;
+  if (!differentiated()) return here_m;
+  const VectorX moved_m = state.solution->derivative * change_to(there);
+  if (moved_m.lpNorm<Eigen::Infinity>() > 0.2 * here_m.lpNorm<Eigen::Infinity>()) return here_m;
+  return here_m + moved_m;
+}
+
+bool ForwardModel::follow(std::size_t s, const VectorX& unknowns, fem::ResponseState& seen) {
+  const SolvedAtPtr& anchor = memory_[s].seen;
+  if (!anchor || anchor->columns.empty()) return false;
+  const VectorX change = anchor->change_to(unknowns);
+  const fem::ResponseState& before = anchor->state;
+  seen = before;
+  seen.watched_m += before.d_watched * change;
+  seen.reaction_n += before.d_reaction * change;  // imposed motions do not move with E, but their reactions do
   double share = 0;
-  const auto within = [&](const VectorX& now, const VectorX& before) {
+  const auto within = [&](const VectorX& now, const VectorX& was) {
     if (now.size() == 0) return true;
-    const double moved = (now - before).lpNorm<Eigen::Infinity>(), size = before.lpNorm<Eigen::Infinity>();
+    const double moved = (now - was).lpNorm<Eigen::Infinity>(), size = was.lpNorm<Eigen::Infinity>();
     if (moved > reuse_ * size) return false;
     if (moved > 0) share = std::max(share, moved / size);
     return true;
   };
-  if (!within(watched.moved_m, anchor.watched.moved_m) || !within(watched.reaction_n, anchor.watched.reaction_n)) return false;
+  if (!within(seen.watched_m, before.watched_m) || !within(seen.reaction_n, before.reaction_n)) return false;
   followed_[s] = share;
-  watched.conjugate_m += watched.d_conjugate * change;
-  out.converged = true;
-  out.inverted_elements = anchor.inverted_elements;
+  seen.conjugate_m += before.d_conjugate * change;
   return true;
-}
-
-void ForwardModel::set_ratios(Body& body, const VectorX& unknowns) const {
-  if (parameters_ == first_ratio) return;
-  VectorX stiffness = VectorX::Ones(1 + parameters_ - first_ratio);
-  stiffness.tail(stiffness.size() - 1) = unknowns.segment(first_ratio, parameters_ - first_ratio).array().exp();
-  if (body.contact) {
-    body.contact->set_region_stiffness(stiffness);
-  } else {
-    body.statics->set_region_stiffness(stiffness);
-  }
 }
 
 int ForwardModel::inverted_elements(std::size_t s, const VectorX& unknowns) {
   Body& body = body_of(push(s), worker_of(s));
-  if (body.contact) return predict(s, unknowns, false).inverted_elements;
-  set_ratios(body, unknowns);
-  const Coefficients c = coefficients(s, body, unknowns);
-  const auto at = body.statics->solve(std::exp(unknowns(log_young)), unknowns(poisson), c.force, c.motion);
-  return at.inverted_elements;
+  if (contact_) return predict(s, unknowns, false).inverted_elements;
+  return body.response->solve(query(coefficients(s, body, unknowns), unknowns, false)).inverted_elements;
+}
+
+std::optional<fem::Certificate> ForwardModel::certify(const VectorX& unknowns) {
+  if (contact_) return std::nullopt;
+  const std::size_t s = static_cast<std::size_t>(std::max_element(effort_.begin(), effort_.end()) - effort_.begin());
+  const Body& body = body_of(push(s), worker_of(s));
+  const fem::ResponseQuery here = query(coefficients(s, body, unknowns), unknowns, false);
+  const SolvedAtPtr& known = memory_[s].seen;
+  if (known && known->unknowns.size() == unknowns.size() && known->unknowns == unknowns)
+    return body.response->certify(known->state, here);
+  fem::ResponseStart start;
+  if (known) start.displacement_m = &known->state.solution->displacement_m;
+  return body.response->certify(linear_ ? body.response->at(here) : body.response->solve(here, start), here);
 }
 
 bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
-                              Watched& watched, StepPrediction& out) {
+                              fem::ResponseState& seen) {
   const std::size_t worker = worker_of(s);
   followed_[s] = 0;
-  if (body.contact) return solve_contact_step(s, body, c, unknowns, derivatives, watched, out);
+  if (contact_) return solve_contact_step(s, body, c, unknowns, derivatives, seen);
   // Start from the last solution of this step, or else of the step before, moved along its derivatives.
-  Memory& memory = memory_[s];
-  const Memory* from = memory.valid ? &memory : nullptr;
-  VectorX start;
-  if (from != nullptr) {
-    start = from->displacement_m;
-    start += from->derivative * from->change_to(unknowns);
-    // A straight line is no good guess for a far step.
-    const double moved_m = (start - from->displacement_m).lpNorm<Eigen::Infinity>();
-    if (moved_m > 0.2 * from->displacement_m.lpNorm<Eigen::Infinity>()) start = from->displacement_m;
-  } else if (s > first_step_of(worker) && steps_[s - 1].push == steps_[s].push && memory_[s - 1].valid) {
+  VectorX guess_m;
+  if (memory_[s].seen) {
+    guess_m = memory_[s].seen->displacement_at(unknowns);
+  } else if (s > first_step_of(worker) && steps_[s - 1].push == steps_[s].push && memory_[s - 1].seen) {
     // Little of the load is left after a retreat: nearer to rest than to the step before.
     const Coefficients before = coefficients(s - 1, body, unknowns);
     if (!(c.force.norm() <= 0.25 * before.force.norm() && c.motion.norm() <= 0.25 * before.motion.norm()))
-      start = memory_[s - 1].displacement_m;
+      guess_m = memory_[s - 1].seen->state.solution->displacement_m;
   }
-
-  set_ratios(body, unknowns);
-  const double young_pa = std::exp(unknowns(log_young));
-  const fem::Equilibrium at =
-      body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion, start.size() > 0 ? &start : nullptr);
+  fem::ResponseStart start;
+  if (guess_m.size() > 0) start.displacement_m = &guess_m;
+  seen = body.response->solve(query(c, unknowns, derivatives), start);
   ++solves_[worker];
-  out.converged = at.converged;
-  out.reason = at.reason;
-  out.inverted_elements = at.inverted_elements;
-  if (!at.converged) return false;
-
-  watched.moved_m = object_.surface.restrict(at.displacement_m);
-  if (!derivatives) {
-    memory = {true, unknowns, at.displacement_m, {}, MatrixX(at.displacement_m.size(), 0), {}, at.inverted_elements, {}};
-    return true;
+  if (!seen.converged) return false;
+  auto solved = std::make_shared<SolvedAt>(SolvedAt{unknowns, {}, seen});
+  if (derivatives) {
+    solved->columns = parameter_columns();
+    solved->columns.insert(solved->columns.end(), c.columns.begin(), c.columns.end());
   }
-  const fem::SensitivityAlong d = body.statics->sensitivity_along(at, c.d_force, c.d_motion);
-  const Index others = static_cast<Index>(c.columns.size());
-  const Index ratios = parameters_ - first_ratio;  // of the further regions: the first one's stiffness is E itself
-  MatrixX field(at.displacement_m.size(), parameters_ + others);
-  field << d.d_log_young, d.d_poisson, d.d_log_stiffness.rightCols(ratios), d.d_along;
-  watched.d_moved = object_.surface.restrict(field);
-  watched.conjugate_m = body.forces.transpose() * at.displacement_m;
-  watched.d_conjugate = body.forces.transpose() * field;
-  watched.reaction_n = at.motion_reaction;
-  watched.d_reaction.resize(c.motion.size(), parameters_ + others);
-  watched.d_reaction << d.reaction_d_log_young, d.reaction_d_poisson, d.reaction_d_log_stiffness.rightCols(ratios),
-      d.reaction_d_along;
-  memory = {true, unknowns, at.displacement_m, parameter_columns(), std::move(field), watched, at.inverted_elements, {}};
-  memory.columns.insert(memory.columns.end(), c.columns.begin(), c.columns.end());
+  memory_[s].seen = std::move(solved);
   return true;
 }
 

@@ -22,7 +22,7 @@ std::optional<SpanPlace> ForwardModel::place_in_span(std::size_t s, const Body& 
                                                      const VectorX& unknowns) const {
   if (clamp_[s] >= 0 || slide_[s] >= 0) return std::nullopt;
   SpanPlace out;
-  out.span = body.response->span(3 * object_.surface.vertex_count(), unknowns(poisson));
+  out.span = body.response->span(unknowns(poisson));
   if (!out.span) return std::nullopt;
   const Index forces = static_cast<Index>(c.force.size()), motions = static_cast<Index>(c.motion.size());
   Index size = 0;

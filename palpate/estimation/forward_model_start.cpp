@@ -15,12 +15,16 @@ void ForwardModel::start_from(const ForwardModel& other) {
     between = SimulatedSurface::embedded(other.object_.mesh, {object_.mesh.nodes_m, Triangles(0, 3)},
                                          geometry::embed(object_.mesh.nodes_m, other.object_.mesh));
   for (std::size_t s = 0; s < memory_.size(); ++s) {
-    const Memory& from = other.memory_[s];
     memory_[s] = Memory{};
-    memory_[s].valid = from.valid;
-    if (!from.valid) continue;
-    memory_[s].displacement_m = between ? VectorX(between->restrict(from.displacement_m)) : from.displacement_m;
-    memory_[s].derivative.resize(memory_[s].displacement_m.size(), 0);
+    const SolvedAtPtr& from = other.memory_[s].seen;
+    if (!from) continue;
+    const VectorX& there_m = from->state.solution->displacement_m;
+    auto solution = std::make_shared<fem::ResponseSolution>();
+    solution->displacement_m = between ? VectorX(between->restrict(there_m)) : there_m;
+    solution->derivative.resize(solution->displacement_m.size(), 0);
+    auto here = std::make_shared<SolvedAt>();
+    here->state.solution = std::move(solution);
+    memory_[s].seen = std::move(here);
   }
 }
 

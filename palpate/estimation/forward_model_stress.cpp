@@ -8,29 +8,33 @@ namespace palpate::estimation {
 
 VectorX ForwardModel::von_mises_pa(std::size_t s, const VectorX& unknowns) {
   const double young_pa = std::exp(unknowns(log_young));
-  const Memory& memory = memory_[s];
+  const SolvedAtPtr known = memory_[s].seen;
   VectorX displacement_m;
-  if (memory.valid && memory.unknowns == unknowns) {
-    displacement_m = memory.displacement_m;
-  } else if (Body& body = body_of(push(s), worker_of(s)); body.contact) {
+  if (known && known->unknowns.size() == unknowns.size() && known->unknowns == unknowns) {
+    displacement_m = known->state.solution->displacement_m;
+  } else if (contact_) {
     if (!predict(s, unknowns, false).converged) return {};
-    displacement_m = memory.displacement_m;
+    displacement_m = memory_[s].seen->state.solution->displacement_m;
   } else {
-    const Coefficients c = coefficients(s, body, unknowns);
-    set_ratios(body, unknowns);
-    VectorX start;
-    if (memory.valid) start = memory.displacement_m + memory.derivative * memory.change_to(unknowns);
+    VectorX guess_m;
+    if (known) {
+      guess_m = known->state.solution->displacement_m;
+      if (known->differentiated()) guess_m += known->state.solution->derivative * known->change_to(unknowns);
+    }
     // Along the derivatives the square of the share is lost: a hundredth of the motion at most, which no picture shows.
     constexpr double far = 0.1;
-    const bool near = memory.valid && !memory.columns.empty() &&
-                      (start - memory.displacement_m).lpNorm<Eigen::Infinity>() <= far * start.lpNorm<Eigen::Infinity>();
+    const bool near = known && known->differentiated() &&
+                      (guess_m - known->state.solution->displacement_m).lpNorm<Eigen::Infinity>() <=
+                          far * guess_m.lpNorm<Eigen::Infinity>();
     if (near) {
-      displacement_m = start;
+      displacement_m = guess_m;
     } else {
-      const auto at =
-          body.statics->solve(young_pa, unknowns(poisson), c.force, c.motion, memory.valid ? &start : nullptr);
+      const Body& body = body_of(push(s), worker_of(s));
+      fem::ResponseStart start;
+      if (known) start.displacement_m = &guess_m;
+      const fem::ResponseState at = body.response->solve(query(coefficients(s, body, unknowns), unknowns, false), start);
       if (!at.converged) return {};
-      displacement_m = at.displacement_m;
+      displacement_m = at.solution->displacement_m;
     }
   }
   VectorX stiffness;

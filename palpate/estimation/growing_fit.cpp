@@ -174,7 +174,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   answer.covariance = covariance_of(regions);
   objective.set_reuse(reuse);
   objective.evaluate(optimum.unknowns, optimum.loss);  // verdicts look at the optimum's rows
-  answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}, Doubts{}});
+  answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}, Doubts{}, std::nullopt});
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   kept_ = objective.take_kept();
   remember();

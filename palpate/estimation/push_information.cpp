@@ -73,14 +73,18 @@ VectorX compliances_m_per_n(const Recording& scene, const SimulatedObject& objec
     boundary.constraints = std::move(held.constraints);
     free_motions = std::move(held.free_motions);
   }
-  const fem::Statics statics(object.mesh, "linear", std::move(boundary), options);
-  const Eigen::SparseMatrix<double> watched = forces.transpose();
-  const fem::UnitResponses unit = statics.unit_responses(knowledge.poisson_ratio, watched);
+  const fem::ResponseQuery query{knowledge.young_modulus_pa, knowledge.poisson_ratio,
+                                 VectorX::Zero(boundary.forces.cols()), VectorX::Zero(boundary.motions.cols())};
+  fem::Response::Options response_options;
+  response_options.statics = options;
+  response_options.poisson_lower = response_options.poisson_upper = knowledge.poisson_ratio;
+  const fem::Response response(object.mesh, "linear", std::move(boundary), Eigen::SparseMatrix<double>(0, dofs), response_options);
+  const fem::ResponseState unit = response.at(query);
   VectorX compliance(static_cast<Index>(candidates.size()));
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     const Vec3& d = candidates[c].direction;
     const Index k = column[c];
-    compliance(static_cast<Index>(c)) = d.dot(unit.force.block<3, 3>(k, k) * d) / knowledge.young_modulus_pa;
+    compliance(static_cast<Index>(c)) = d.dot(unit.d_conjugate.block<3, 3>(k, unit.parameters + k) * d);
     if (free_motions.cols() == 0) continue;
     const VectorX load = forces.middleCols(k, 3) * d;
     if ((free_motions.transpose() * load).cwiseAbs().maxCoeff() > 1e-6 * load.lpNorm<1>())

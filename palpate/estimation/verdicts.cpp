@@ -265,6 +265,13 @@ void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
   }
 }
 
+void judge_equilibrium(const VerdictInput& in, std::vector<Verdict>& out) {
+  if (!in.certificate || !in.certificate->second_equilibrium) return;
+  out.push_back({"two_equilibria",
+                 "Under the highest load the simulated object has more than one equilibrium (it buckles, or caves in under the tool), and "
+                 "which of them the real one took is not known. Believe lower loads, or use a larger tool."});
+}
+
 }  // namespace
 
 Verdict partly_seen(const ShapeDoubt& doubt) {
@@ -284,6 +291,7 @@ std::vector<Verdict> judge(const VerdictInput& input) {
   judge_poisson(input, verdicts);
   judge_nuisances(input, verdicts);
   judge_state(input, verdicts);
+  judge_equilibrium(input, verdicts);
   judge_parts(input, verdicts);
   judge_steps(input, verdicts);
   return verdicts;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "palpate/core/identification.hpp"
@@ -20,6 +21,7 @@ struct VerdictInput {
   const Identification& answer;  ///< parameters, nuisances and fit are filled
   const CrossChecks& checks;     ///< empty where none were made
   const Doubts& doubts;          ///< the same
+  const std::optional<fem::Certificate>& certificate;  ///< of the hardest step; nothing where none was made
 };
 
 /// What the numbers mean, in plain words; codes are stable and listed in docs/uncertainty.md.

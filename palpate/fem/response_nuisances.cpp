@@ -5,8 +5,39 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/fem/boundary.hpp"
 
 namespace palpate::fem {
+
+ContactColumns contact_columns(const TetMesh& mesh, const Vec3& centre_m, double radius_m, const Vec3& direction) {
+  if (!(direction.norm() > 0)) throw Error("must not be zero", "contact_columns direction");
+  const Vec3 along = direction.normalized();
+  ContactColumns out;
+  out.tangent_1 = along.unitOrthogonal();
+  out.tangent_2 = along.cross(out.tangent_1);
+  const auto load = [&](const Vec3& centre, double radius) {
+    const Eigen::SparseMatrix<double> one = along.sparseView();
+    return Eigen::SparseMatrix<double>(spread_over_patch(mesh, centre, radius) * one);
+  };
+  // Differences over a tenth of the radius: shorter ones see the sub-sampling of the patch, longer ones its curvature.
+  const double h = 0.1 * radius_m, ratio = 0.1;
+  const Eigen::SparseMatrix<double> parts[4] = {
+      spread_over_patch(mesh, centre_m, radius_m),
+      (load(centre_m + h * out.tangent_1, radius_m) - load(centre_m - h * out.tangent_1, radius_m)) / (2 * h),
+      (load(centre_m + h * out.tangent_2, radius_m) - load(centre_m - h * out.tangent_2, radius_m)) / (2 * h),
+      (load(centre_m, radius_m * std::exp(ratio)) - load(centre_m, radius_m * std::exp(-ratio))) / (2 * ratio)};
+  std::vector<Eigen::Triplet<double>> entries;
+  int column = 0;
+  for (const auto& part : parts) {
+    for (int c = 0; c < part.outerSize(); ++c)
+      for (Eigen::SparseMatrix<double>::InnerIterator it(part, c); it; ++it)
+        entries.emplace_back(static_cast<int>(it.row()), column + c, it.value());
+    column += static_cast<int>(part.cols());
+  }
+  out.forces.resize(parts[0].rows(), column);
+  out.forces.setFromTriplets(entries.begin(), entries.end());
+  return out;
+}
 
 ContactCoefficients contact_coefficients(const ContactColumns& columns, const ContactNuisances& n) {
   const Vec3 along = columns.tangent_1.cross(columns.tangent_2);
@@ -43,48 +74,49 @@ Eigen::SparseMatrix<double> support_motions(const TetMesh& mesh, const std::vect
   return columns;
 }
 
-SprungState on_springs(const Response& response, double young_modulus_pa, double poisson_ratio, const VectorX& force,
-                       const VectorX& motion, const VectorX& stiffness) {
-  if (stiffness.size() != motion.size()) throw Error("needs one value for each motion", "on_springs stiffness");
+SprungState on_springs(const Response& response, ResponseQuery query, const VectorX& stiffness) {
+  const VectorX far_m = query.motion;
+  if (stiffness.size() != far_m.size()) throw Error("needs one value for each motion", "on_springs stiffness");
   if (stiffness.size() > 0 && !(stiffness.minCoeff() > 0)) throw Error("must be positive", "on_springs stiffness");
+  if (query.along || !query.derivatives) throw Error("needs derivatives to every coefficient", "on_springs query");
   const MatrixX springs = stiffness.asDiagonal();
   SprungState out;
-  out.support_motion = motion;
   constexpr int kSteps = 30;
   Eigen::PartialPivLU<Eigen::MatrixXd> factor;
   for (int step = 0;; ++step) {
-    out.state = response.at(young_modulus_pa, poisson_ratio, force, out.support_motion);
+    out.state = response.at(query);
     if (!out.state.converged) return out;
-    const VectorX pull = stiffness.cwiseProduct(out.support_motion - motion);
+    const VectorX pull = stiffness.cwiseProduct(query.motion - far_m);
     const VectorX unbalanced = out.state.reaction_n + pull;
-    factor.compute(out.state.reaction_d_motion + springs);
+    factor.compute(out.state.reaction_d_motion() + springs);
     // Units differ between translations and rotations: the work of what is left over, against that of the springs and loads.
     const VectorX correction = factor.solve(unbalanced);
-    const double scale = std::abs(pull.dot(out.support_motion)) + std::abs(out.state.reaction_n.dot(out.support_motion));
+    const double scale = std::abs(pull.dot(query.motion)) + std::abs(out.state.reaction_n.dot(query.motion));
     if (std::abs(unbalanced.dot(correction)) <= 1e-20 * scale || unbalanced.isZero(0)) break;
     if (step == kSteps) {
       out.state.converged = false;
       out.state.reason = "the motion of the sprung supports did not settle in " + std::to_string(kSteps) + " steps";
       return out;
     }
-    out.support_motion -= correction;
+    query.motion -= correction;
   }
+  out.support_motion = query.motion;
   ResponseState& s = out.state;
   // Supports follow: (reaction_d_motion + K) dc = -reaction_d_x, and the reaction is what the springs carry.
-  const auto follow = [&](const MatrixX& reaction_change) { return MatrixX(-factor.solve(reaction_change)); };
-  const MatrixX by_young = follow(s.reaction_d_log_young), by_poisson = follow(s.reaction_d_poisson),
-                by_force = follow(s.reaction_d_force), by_motion = -follow(springs);
-  const MatrixX by_stiffness = follow(MatrixX(stiffness.cwiseProduct(out.support_motion - motion).asDiagonal()));
-  s.d_log_young += s.d_motion * by_young;
-  s.d_poisson += s.d_motion * by_poisson;
-  s.d_force += s.d_motion * by_force;
-  out.d_log_stiffness = s.d_motion * by_stiffness;
-  s.d_motion = (s.d_motion * by_motion).eval();
-  const MatrixX carried = s.reaction_d_motion;
-  s.reaction_d_log_young += carried * by_young;
-  s.reaction_d_poisson += carried * by_poisson;
-  s.reaction_d_force += carried * by_force;
-  s.reaction_d_motion = carried * by_motion;
+  const MatrixX by_motion = s.d_motion(), carried = s.reaction_d_motion();
+  const MatrixX by_stiffness = -factor.solve(MatrixX(stiffness.cwiseProduct(out.support_motion - far_m).asDiagonal()));
+  const MatrixX by_far_ends = factor.solve(springs);
+  const Index others = static_cast<Index>(s.d_watched.cols() - far_m.size());
+  const MatrixX follow = -factor.solve(s.d_reaction.leftCols(others));
+  const auto put = [&](MatrixX& derivatives, const MatrixX& by_supports) {
+    derivatives.leftCols(others) += by_supports * follow;
+    derivatives.rightCols(far_m.size()) = by_supports * by_far_ends;
+  };
+  const MatrixX conjugate_by_motion = s.d_conjugate.rightCols(far_m.size());
+  put(s.d_watched, by_motion);
+  put(s.d_conjugate, conjugate_by_motion);
+  put(s.d_reaction, carried);
+  out.d_log_stiffness = by_motion * by_stiffness;
   out.reaction_d_log_stiffness = carried * by_stiffness;
   return out;
 }

@@ -7,6 +7,16 @@
 
 namespace palpate::fem {
 
+/// Six columns of one contact: forces along x, y, z spread over the patch; and, per newton along `direction`, what it means
+/// to shift the contact by a metre along two tangents (orthogonal to `direction`) and to widen the patch by log radius. A
+/// contact shift s under a force F is then the coefficient F s, a change of radius F dlog r, both to first order. Order: x,
+/// y, z, shift along tangent 1, tangent 2, log radius.
+struct ContactColumns {
+  Eigen::SparseMatrix<double> forces;  ///< 3n x 6
+  Vec3 tangent_1, tangent_2;
+};
+ContactColumns contact_columns(const TetMesh& mesh, const Vec3& centre_m, double radius_m, const Vec3& direction);
+
 /// Of one contact whose columns are contact_columns'.
 struct ContactNuisances {
   double force_n = 0;            ///< its norm
@@ -28,8 +38,8 @@ Eigen::SparseMatrix<double> support_motions(const TetMesh& mesh, const std::vect
 
 /// An answer whose supports give.
 struct SprungState {
-  ResponseState state;               ///< of the body; its derivatives hold the supports' stiffness fixed, d_motion is to
-                                     ///< the motion of the springs' far ends
+  ResponseState state;               ///< of the body, to every coefficient; its derivatives hold the supports' stiffness fixed,
+                                     ///< d_motion is to the motion of the springs' far ends
   VectorX support_motion;            ///< m: of the supports themselves
   MatrixX d_log_stiffness;           ///< r x m
   MatrixX reaction_d_log_stiffness;  ///< m x m
@@ -38,8 +48,8 @@ struct SprungState {
 /// Every motion coefficient is held by a spring: reaction = -stiffness (support motion - motion). Newton's method on the
 /// supports' motion, which one step solves for a linear material.
 /// @param stiffness  m: N/m, or N m/rad for rotations
-/// @throws Error where Response::at does, and for a stiffness that is not positive
-SprungState on_springs(const Response& response, double young_modulus_pa, double poisson_ratio, const VectorX& force,
-                       const VectorX& motion, const VectorX& stiffness);
+/// @param query  its motion is that of the springs' far ends; with derivatives to every coefficient
+/// @throws Error where Response::at does, for a stiffness that is not positive, and for directions
+SprungState on_springs(const Response& response, ResponseQuery query, const VectorX& stiffness);
 
 }  // namespace palpate::fem

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/fem/response.hpp"
 #include "palpate/fem/von_mises.hpp"
 
 namespace palpate::prediction {
@@ -25,15 +26,11 @@ double std_of(double d_log_young, double d_poisson, const Eigen::Matrix2d& covar
   return std::sqrt(std::max(0.0, d.dot(covariance * d)));
 }
 
-/// Of nodal displacements (3n), the patch's mean motion along the push: work-conjugate to its force.
-class Patch {
- public:
-  Patch(const Eigen::SparseMatrix<double>& forces, const Vec3& direction) : column_(forces.leftCols(3) * direction) {}
-  double travel_m(const VectorX& displacement) const { return column_.dot(displacement); }
-
- private:
-  VectorX column_;
-};
+/// The patch's mean motion along the push, work-conjugate to its force.
+double travel_of(const fem::ResponseState& state, const Vec3& direction) { return direction.dot(state.conjugate_m.head<3>()); }
+VectorX d_travel_of(const fem::ResponseState& state, const Vec3& direction) {
+  return state.d_conjugate.topRows<3>().transpose() * direction;
+}
 
 }  // namespace
 
@@ -83,45 +80,51 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
   const Eigen::Index columns = boundary.forces.cols(), motions = boundary.motions.cols();
   if (push.background.size() != 0 && push.background.size() != columns - 3)
     throw Error("has another size than the boundary's other columns", "push.background");
-  const Patch patch(boundary.forces, push.direction);
-  const fem::Statics statics(mesh, elasticity.material, std::move(boundary), options);
+  fem::Response::Options response_options;
+  response_options.statics = std::move(options);
+  const fem::Response response(mesh, elasticity.material, std::move(boundary),
+                               Eigen::SparseMatrix<double>(0, 3 * mesh.nodes_m.rows()), response_options);
   const double e = elasticity.young_modulus_pa, nu = elasticity.poisson_ratio;
 
   Prediction out;
-  VectorX force = VectorX::Zero(columns);
-  if (push.background.size() > 0) force.tail(columns - 3) = push.background;
-  const VectorX still = VectorX::Zero(motions);
-  const auto fail = [&](const fem::Equilibrium& at) {
+  fem::ResponseQuery query{e, nu, VectorX::Zero(columns), VectorX::Zero(motions)};
+  query.extra = elasticity.extra;
+  if (push.background.size() > 0) query.force.tail(columns - 3) = push.background;
+  // Derivatives: log E, nu, the push's force.
+  fem::LoadDirections pushing{MatrixX::Zero(columns, 1), MatrixX::Zero(motions, 1)};
+  pushing.force.col(0).head(3) = push.direction;
+  query.along = pushing;
+  constexpr Index by_young = 0, by_poisson = 1, by_force = 2;
+  const auto fail = [&](const fem::ResponseState& at) {
     out.reason = at.reason;
     return out;
   };
   // The state from which the push starts: under the background alone.
-  fem::Equilibrium before = statics.solve(e, nu, force, still, nullptr, elasticity.extra);
+  const fem::ResponseState before = response.solve(query);
   if (!before.converged) return fail(before);
-  const fem::Sensitivity from = statics.sensitivity(before);
-  const double start_m = patch.travel_m(before.displacement_m);
+  const double start_m = travel_of(before, push.direction);
 
   // Travel imposed: Newton on the force, with the exact compliance of each state.
   double force_n = push.force_n.value_or(0);
-  if (push.travel_m) force_n = *push.travel_m / patch.travel_m(from.d_force.leftCols(3) * push.direction);
-  fem::Equilibrium at = before;
-  fem::Sensitivity change;
-  double compliance_m_n = 0;
+  if (push.travel_m) force_n = *push.travel_m / d_travel_of(before, push.direction)(by_force);
+  fem::ResponseState at = before;
+  double stood_n = 0, compliance_m_n = 0;  // stood_n: the force of `at`
   constexpr int most_corrections = 30;
   for (int k = 0; k < most_corrections; ++k) {
-    force.head(3) = force_n * push.direction;
-    const fem::Equilibrium next = statics.solve(e, nu, force, still, &at.displacement_m, elasticity.extra);
+    query.force.head(3) = force_n * push.direction;
+    fem::ResponseStart start;
+    start.displacement_m = &at.solution->displacement_m;
+    const fem::ResponseState next = response.solve(query, start);
     if (!next.converged) {
       if (!push.travel_m || k + 1 == most_corrections) return fail(next);
-      force_n =
-          0.5 * (force_n + at.force_coefficients.head(3).dot(push.direction));  // half the way from the last that stood
+      force_n = 0.5 * (force_n + stood_n);  // half the way from the last that stood
       continue;
     }
     at = next;
-    change = statics.sensitivity(at);
-    compliance_m_n = patch.travel_m(change.d_force.leftCols(3) * push.direction);
+    stood_n = force_n;
+    compliance_m_n = d_travel_of(at, push.direction)(by_force);
     if (!push.travel_m) break;
-    const double short_m = *push.travel_m - (patch.travel_m(at.displacement_m) - start_m);
+    const double short_m = *push.travel_m - (travel_of(at, push.direction) - start_m);
     if (std::abs(short_m) < 1e-9 * std::max(1e-6, std::abs(*push.travel_m))) break;
     if (k + 1 == most_corrections) {
       out.reason = "no force was found that moves the patch so far";
@@ -132,13 +135,16 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
 
   // Derivatives to (log E, nu) of the displacement since the start; with the travel imposed, the force gives way so that it
   // stays.
-  const double travel_m = patch.travel_m(at.displacement_m) - start_m;
-  VectorX d[2] = {change.d_log_young - from.d_log_young, change.d_poisson - from.d_poisson};
-  VectorX whole[2] = {change.d_log_young, change.d_poisson};  // of the displacement from rest: what stress depends on
+  const double travel_m = travel_of(at, push.direction) - start_m;
+  const MatrixX& change = at.solution->derivative;
+  const MatrixX& from = before.solution->derivative;
+  VectorX whole[2] = {change.col(by_young), change.col(by_poisson)};  // of the displacement from rest: what stress depends on
+  VectorX d[2] = {whole[0] - from.col(by_young), whole[1] - from.col(by_poisson)};
+  const VectorX d_way = d_travel_of(at, push.direction) - d_travel_of(before, push.direction);
   double d_force[2] = {0, 0}, d_travel[2];
-  const VectorX push_column = change.d_force.leftCols(3) * push.direction;
+  const VectorX push_column = change.col(by_force);
   for (int p = 0; p < 2; ++p) {
-    d_travel[p] = patch.travel_m(d[p]);
+    d_travel[p] = d_way(p);
     if (!push.travel_m) continue;
     d_force[p] = -d_travel[p] / compliance_m_n;
     d[p] += d_force[p] * push_column;
@@ -151,14 +157,15 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
   out.inverted_elements = at.inverted_elements;
   out.force_n = positive_band(force_n, std_of(d_force[0], d_force[1], covariance));
   out.travel_m = positive_band(travel_m, std_of(d_travel[0], d_travel[1], covariance));
-  out.displacement_m = at.displacement_m - before.displacement_m;
+  const VectorX& displaced_m = at.solution->displacement_m;
+  out.displacement_m = displaced_m - before.solution->displacement_m;
   out.displacement_std_m.resize(out.displacement_m.size());
   for (Eigen::Index i = 0; i < out.displacement_m.size(); ++i)
     out.displacement_std_m(i) = std_of(d[0](i), d[1](i), covariance);
 
   // Stress and stiffness: differences along the exact derivative of the state, over a tenth of a standard deviation.
   const auto stress = [&](double log_step, double nu_step, double sign) {
-    const VectorX u = at.displacement_m + sign * (log_step * whole[0] + nu_step * whole[1]);
+    const VectorX u = displaced_m + sign * (log_step * whole[0] + nu_step * whole[1]);
     return fem::von_mises(mesh, elasticity.material, e * std::exp(sign * log_step), nu + sign * nu_step, elasticity.extra, u);
   };
   out.von_mises_pa = stress(0, 0, 1);

@@ -103,6 +103,16 @@ TEST(ArchitectureRules, FilesPrintingClocksAndAbortAreFound) {
   EXPECT_THAT(violations("palpate/io/a.cpp", spdx + "#include <iostream>\n", table), SizeIs(1));
 }
 
+TEST(ArchitectureRules, SolversBesideTheResponseAreFound) {
+  const Table table = the_table();
+  for (const char* path : {"palpate/estimation/a.cpp", "palpate/prediction/a.hpp", "palpate/suggest.cpp", "cli/a.cpp"}) {
+    EXPECT_THAT(violations(path, spdx + "fem::Statics s(mesh, law, boundary);\n", table), ElementsAre(HasSubstr("fem::Response"))) << path;
+    EXPECT_THAT(violations(path, spdx + "std::unique_ptr<fem::ContactStatics> s;\n", table), SizeIs(1)) << path;
+    EXPECT_THAT(violations(path, spdx + "fem::Response r; fem::StaticsOptions o;\n", table), IsEmpty()) << path;
+  }
+  EXPECT_THAT(violations("palpate/lab/a.cpp", spdx + "fem::Statics s(mesh, law, boundary);\n", table), IsEmpty());
+}
+
 TEST(ArchitectureRules, WordsInCommentsAndStringsAreNoCode) {
   const Table table = the_table();
   EXPECT_THAT(

@@ -128,6 +128,10 @@ inline std::vector<std::string> violations(const std::string& path, const std::s
       {R"(\b(getenv|setenv|setlocale)\b)", "reads the environment", false},
       {R"(\brandom_device\b|\b(srand|rand)\s*\()", "draws unseeded random numbers", false},
   };
+  // The lab's truths are no answer to be believed by its own solver's promises; whoever estimates, predicts or plans asks a Response.
+  static const std::regex solver(R"(\bfem::(Statics|ContactStatics|LinearResponse|LoadingBranch)\b)");
+  if (std::smatch match; room != "lab" && room != "fem" && std::regex_search(code, match, solver))
+    found.push_back(path + ": sees more of the solver than fem::Response (`" + match.str() + "`)");
   if (!front) {
     for (const Rule& rule : forbidden) {
       if (rule.files_only && rules.may_open_files) continue;

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a Response answers, against full solves and central differences: along its branch, beside it, beyond it.
 #include "palpate/fem/response.hpp"
+#include "palpate/fem/response_nuisances.hpp"
 
 #include <gtest/gtest.h>
 
 #include "fem_meshes.hpp"
+#include "palpate/core/error.hpp"
 
 namespace palpate::fem {
 namespace {
@@ -41,8 +43,11 @@ class ResponseContract : public testing::TestWithParam<const char*> {
   }
   TetMesh mesh;
   ContactColumns contact;
-  const VectorX none = VectorX(0);
 };
+
+ResponseQuery query(double young_modulus_pa, double poisson_ratio, const VectorX& force) {
+  return {young_modulus_pa, poisson_ratio, force, VectorX(0)};
+}
 
 VectorX load(double down_n, double aside_n = 0, double shift_nm = 0) {
   VectorX a = VectorX::Zero(6);
@@ -61,22 +66,26 @@ TEST_P(ResponseContract, AgreesWithFullSolves) {
     for (double nu : {0.11, 0.28, 0.43}) {
       const double young = kYoung / softer * 0.999;
       const VectorX a = load(5.9 * 0.999);
-      const ResponseState r = response.at(young, nu, a, none);
+      const ResponseQuery q = query(young, nu, a);
+      const ResponseState r = response.at(q);
       EXPECT_EQ(r.source, linear ? ResponseSource::superposed : ResponseSource::branch);
       ASSERT_TRUE(r.converged) << r.reason;
-      const Equilibrium e = full.statics().solve(young, nu, a, none);
-      ASSERT_TRUE(e.converged) << e.reason;
-      const Certificate c = response.certify(r, young, nu, a, none);
+      const Certificate c = response.certify(r, q);
       ASSERT_TRUE(c.converged) << c.reason;
       EXPECT_LT(c.difference, 2e-3);
       EXPECT_LT(c.difference, r.error);
       EXPECT_TRUE(c.stable);
       EXPECT_FALSE(c.second_equilibrium);
-      const ResponseState exact = full.at(young, nu, a, none);
-      EXPECT_LT((r.d_log_young - exact.d_log_young).norm(), 5e-3 * exact.d_log_young.norm());
-      EXPECT_LT((r.d_poisson - exact.d_poisson).norm(), 2e-2 * exact.d_poisson.norm());
-      for (Index k = 0; k < 6; ++k)
-        EXPECT_LT((r.d_force.col(k) - exact.d_force.col(k)).norm(), 1e-2 * exact.d_force.col(k).norm()) << k;
+      const ResponseState exact = full.solve(q);
+      ASSERT_TRUE(exact.converged) << exact.reason;
+      const auto near = [&](Index column, double tolerance) {
+        EXPECT_LT((r.d_watched.col(column) - exact.d_watched.col(column)).norm(), tolerance * exact.d_watched.col(column).norm()) << column;
+        EXPECT_LT((r.d_conjugate.col(column) - exact.d_conjugate.col(column)).norm(), tolerance * exact.d_conjugate.col(column).norm())
+            << column;
+      };
+      near(0, 5e-3), near(1, 3e-2);
+      for (Index k = 2; k < 8; ++k) near(k, 1e-2);
+      EXPECT_LT((r.conjugate_m - exact.conjugate_m).norm(), 2e-3 * exact.conjugate_m.norm());
     }
 }
 
@@ -85,41 +94,132 @@ TEST_P(ResponseContract, DerivativesAreThoseOfTheAnswer) {
   const Response response = make(6.0);
   const VectorX a = load(4.0, 0.1, 0.01);
   const double nu = 0.31;
-  const ResponseState r = response.at(kYoung, nu, a, none);
+  const ResponseState r = response.at(query(kYoung, nu, a));
+  const auto at = [&](double young, double poisson, const VectorX& force) { return response.at(query(young, poisson, force)).watched_m; };
   const auto check = [&](const VectorX& up, const VectorX& down, double step, const VectorX& exact, const char* what) {
     const VectorX d = (up - down) / (2 * step);
     EXPECT_LT((d - exact).norm(), 1e-5 * d.norm()) << what;
   };
   const double h = 1e-4;
-  check(response.at(kYoung * std::exp(h), nu, a, none).watched_m, response.at(kYoung * std::exp(-h), nu, a, none).watched_m,
-        h, r.d_log_young, "log E");
-  check(response.at(kYoung, nu + h, a, none).watched_m, response.at(kYoung, nu - h, a, none).watched_m, h, r.d_poisson,
-        "nu");
+  check(at(kYoung * std::exp(h), nu, a), at(kYoung * std::exp(-h), nu, a), h, r.d_watched.col(0), "log E");
+  check(at(kYoung, nu + h, a), at(kYoung, nu - h, a), h, r.d_watched.col(1), "nu");
   for (Index k = 0; k < 6; ++k) {
     const VectorX step = 1e-3 * VectorX::Unit(6, k);
-    check(response.at(kYoung, nu, a + step, none).watched_m, response.at(kYoung, nu, a - step, none).watched_m, 1e-3,
-          r.d_force.col(k), "force");
+    check(at(kYoung, nu, a + step), at(kYoung, nu, a - step), 1e-3, r.d_force().col(k), "force");
   }
+  // Along two directions at once: the same derivatives, added up.
+  ResponseQuery along = query(kYoung, nu, a);
+  along.along = LoadDirections{MatrixX::Random(6, 2), MatrixX(0, 2)};
+  const ResponseState turned = response.at(along);
+  EXPECT_LT((turned.d_watched.rightCols(2) - r.d_force() * along.along->force).norm(), 1e-9 * turned.d_watched.norm());
+  EXPECT_EQ(turned.watched_m, r.watched_m);
 }
 
 // Beside the branch its error grows and says so; far beside and beyond the branch, answers are solved for.
 TEST_P(ResponseContract, SaysWhereItsAnswersComeFrom) {
   if (std::string(GetParam()) == "linear") GTEST_SKIP() << "superposition has no branch to leave";
   const Response response = make(6.0);
-  const ResponseState beside = response.at(kYoung, 0.3, load(5, 0.4), none);
+  const ResponseState beside = response.at(query(kYoung, 0.3, load(5, 0.4)));
   EXPECT_EQ(beside.source, ResponseSource::branch);
-  EXPECT_GT(beside.error, response.at(kYoung, 0.3, load(5), none).error);
-  EXPECT_LT(response.certify(beside, kYoung, 0.3, load(5, 0.4), none).difference, beside.error);
+  EXPECT_GT(beside.error, response.at(query(kYoung, 0.3, load(5))).error);
+  EXPECT_LT(response.certify(beside, query(kYoung, 0.3, load(5, 0.4))).difference, beside.error);
   for (const VectorX& a : {load(5, 2), load(7), load(-1)}) {
-    const ResponseState far = response.at(kYoung, 0.3, a, none);
+    const ResponseState far = response.at(query(kYoung, 0.3, a));
     EXPECT_EQ(far.source, ResponseSource::solved);
-    EXPECT_LT(response.certify(far, kYoung, 0.3, a, none).difference, 1e-6);
+    EXPECT_LT(response.certify(far, query(kYoung, 0.3, a)).difference, 1e-6);
   }
-  EXPECT_EQ(response.at(kYoung, 0.47, load(5), none).source, ResponseSource::solved);
+  EXPECT_EQ(response.at(query(kYoung, 0.47, load(5))).source, ResponseSource::solved);
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, ResponseContract, testing::Values("linear", "neo_hookean", "neo_hookean_stable", "foam"),
                          [](const auto& each) { return std::string(each.param); });
+
+// A block on a rough table, a ball pressed into it by an imposed motion after a weight was put on: reactions and derivatives of the
+// second step of a sequence against differences of the whole sequence.
+class TouchedBlock : public testing::Test {
+ protected:
+  TouchedBlock() : mesh(to_quadratic(block_mesh(3, 3, 2, {0.1, 0.1, 0.06}))) {
+    RigidContact table, ball;
+    table.name = "table";
+    table.shape = plane_shape();
+    table.T_base_tool = tool_pose({0.05, 0.05, 0}, Vec3::UnitZ());
+    table.law = Touch::friction;
+    table.friction_coefficient = 0.5;
+    table.seat_m = 1e-6;
+    table.stiffness = 100;
+    ball.name = "ball";
+    ball.shape = sphere_shape(0.03);
+    ball.T_base_tool = tool_pose({0.052, 0.047, 0.06}, -Vec3::UnitZ());
+    options.contacts = {table, ball};
+    options.driven = {{1, -Vec3::UnitZ()}};
+    options.statics.residual_tolerance = 1e-12;
+    options.friction_tolerance = 1e-11;
+    boundary.forces = body_force(mesh);
+  }
+  Response make() const {
+    Eigen::SparseMatrix<double> watched(3 * mesh.nodes_m.rows(), 3 * mesh.nodes_m.rows());
+    watched.setIdentity();
+    return Response(mesh, "neo_hookean", boundary, watched, options);
+  }
+  static ResponseQuery lying(double log_young, double nu) {
+    return {std::exp(log_young), nu, Vec3(0, 0, -9.81 * 500), VectorX::Zero(1), true, LoadDirections{MatrixX::Zero(3, 1), MatrixX::Zero(1, 1)}};
+  }
+  /// The one direction of derivatives beside log E and nu: the ball's way.
+  static ResponseQuery pressed(double log_young, double nu, double way_m) {
+    ResponseQuery q = lying(log_young, nu);
+    q.motion(0) = way_m;
+    q.along->motion(0, 0) = 1;
+    return q;
+  }
+  TetMesh mesh;
+  Boundary boundary;
+  Response::Options options;
+};
+
+TEST_F(TouchedBlock, SequencesHaveTheirDerivatives) {
+  const Response response = make();
+  EXPECT_TRUE(response.touches());
+  EXPECT_EQ(response.motion_count(), 1);
+  const auto at = [&](double log_young, double nu, double way_m) {
+    const ResponseState first = response.solve(lying(log_young, nu));
+    EXPECT_TRUE(first.converged) << first.reason;
+    ResponseStart start;
+    start.from = first.solution;
+    start.on_path = true;
+    return response.solve(pressed(log_young, nu, way_m), start);
+  };
+  const Vec3 here(std::log(kYoung), 0.3, 0.004);
+  const ResponseState state = at(here(0), here(1), here(2));
+  ASSERT_TRUE(state.converged) << state.reason;
+  EXPECT_EQ(state.source, ResponseSource::solved);
+  EXPECT_GT(state.reaction_n(0), 0.1) << "the ball pushes along its way";
+  ASSERT_EQ(state.d_watched.cols(), 3);
+  const Vec3 steps(1e-5, 1e-5, 1e-8);  // short of the next point of the skin that the ball meets
+  for (Index k = 0; k < 3; ++k) {
+    Vec3 up = here, down = here;
+    up(k) += steps(k), down(k) -= steps(k);
+    const ResponseState a = at(up(0), up(1), up(2)), b = at(down(0), down(1), down(2));
+    const VectorX du = (a.watched_m - b.watched_m) / (2 * steps(k)), dr = (a.reaction_n - b.reaction_n) / (2 * steps(k));
+    EXPECT_LT((state.d_watched.col(k) - du).norm(), 2e-3 * du.norm() + 1e-9) << k;
+    EXPECT_NEAR(state.d_reaction(0, k), dr(0), 2e-3 * std::abs(dr(0)) + 1e-6) << k;
+  }
+}
+
+TEST_F(TouchedBlock, WhatDoesNotFitIsRefused) {
+  const Response response = make();
+  const ResponseState state = response.solve(lying(std::log(kYoung), 0.3));
+  ASSERT_TRUE(state.converged) << state.reason;
+  EXPECT_THROW(response.certify(state, lying(std::log(kYoung), 0.3)), Error);
+  EXPECT_THROW(response.readings(lying(std::log(kYoung), 0.3)), Error);
+  ResponseQuery plain = lying(std::log(kYoung), 0.3);
+  plain.derivatives = false;
+  ResponseStart start;
+  start.from = response.solve(plain).solution;
+  start.on_path = true;
+  EXPECT_THROW(response.solve(pressed(std::log(kYoung), 0.3, 0.004), start), Error) << "the step before has no derivatives to carry on";
+  plain.motion.resize(0);
+  EXPECT_THROW(response.solve(plain), Error);
+}
 
 // A co-rotational body gives way under a high pressure: the branch ends before, and the pressure tells why.
 TEST(Branch, EndsWhereTheMaterialGivesWay) {

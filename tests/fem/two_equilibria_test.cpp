@@ -36,13 +36,18 @@ class Column : public testing::Test {
   }
   // Straight and shortened, as Newton's method finds it where nothing pushes aside.
   Equilibrium straight(const Statics& statics, double load_n) const {
-    VectorX start = VectorX::Zero(3 * mesh.nodes_m.rows());
+    const VectorX start = squeezed(load_n);
+    return statics.solve(kYoung, 0.3, Vec3(0, 0, -load_n), VectorX(0), &start);
+  }
+  /// Shorter, not bent.
+  VectorX squeezed(double load_n) const {
+    VectorX start(3 * mesh.nodes_m.rows());
     const double strain = load_n / (kYoung * kWidth * kDepth);
     for (Index i = 0; i < mesh.nodes_m.rows(); ++i) {
       const Vec3 x = node_position(mesh, i);
       start.segment<3>(3 * i) = strain * Vec3(0.3 * (x.x() - kWidth / 2), 0.3 * (x.y() - kDepth / 2), -x.z());
     }
-    return statics.solve(kYoung, 0.3, Vec3(0, 0, -load_n), VectorX(0), &start);
+    return start;
   }
   TetMesh mesh;
   Boundary boundary;
@@ -85,9 +90,10 @@ TEST_F(Column, ACertificateSaysSo) {
   const Response response(mesh, "neo_hookean", boundary, watched, options);
   for (const double share : {0.8, 1.3}) {
     const Vec3 force(0, 0, -share * euler_n());
-    const ResponseState state = response.at(kYoung, 0.3, force, VectorX(0));
+    const ResponseQuery query{kYoung, 0.3, force, VectorX(0)};
+    const ResponseState state = response.at(query);
     ASSERT_TRUE(state.converged) << state.reason;
-    const Certificate c = response.certify(state, kYoung, 0.3, force, VectorX(0));
+    const Certificate c = response.certify(state, query);
     // Above the load the state that is found may be a bent one: then it is stable, and no other was met on the way.
     if (share < 1) {
       EXPECT_TRUE(c.stable);
@@ -95,6 +101,25 @@ TEST_F(Column, ACertificateSaysSo) {
     } else {
       EXPECT_EQ(c.second_equilibrium, !c.stable);
     }
+  }
+}
+
+// Whichever the full solve finds, straight or bent: an answer that is straight where a column buckles is not the only one.
+TEST_F(Column, ACertificateOfTheStraightStateSaysSo) {
+  Eigen::SparseMatrix<double> watched(3 * mesh.nodes_m.rows(), 3 * mesh.nodes_m.rows());
+  watched.setIdentity();
+  const Response response(mesh, "neo_hookean", boundary, watched, {});
+  for (const double share : {0.9, 1.152}) {
+    const double load_n = share * euler_n();
+    const VectorX start_m = squeezed(load_n);
+    ResponseQuery query{kYoung, 0.3, Vec3(0, 0, -load_n), VectorX(0)};
+    query.derivatives = false;
+    ResponseStart start;
+    start.displacement_m = &start_m;
+    const ResponseState straight = response.solve(query, start);
+    ASSERT_TRUE(straight.converged) << straight.reason;
+    ASSERT_LT(std::abs(straight.watched_m(3 * tip)), 0.05 * kLength) << "the straight state was left";
+    EXPECT_EQ(response.certify(straight, query).second_equilibrium, share > 1) << share;
   }
 }
 

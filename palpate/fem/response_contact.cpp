@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/fem/response_contact.hpp"
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::fem {
+namespace {
+
+ContactOptions contact_options(const Response::Options& given) {
+  ContactOptions options;
+  options.statics = given.statics;
+  if (given.friction_tolerance > 0) options.friction_tolerance = given.friction_tolerance;
+  return options;
+}
+
+}  // namespace
+
+TouchingResponse::TouchingResponse(const TetMesh& mesh, const std::string& material, Boundary boundary,
+                                   const Response::Options& options, Index parameters)
+    : node_motions_(static_cast<Index>(boundary.motions.cols())),
+      parameters_(parameters),
+      driven_(options.driven),
+      statics_(mesh, material, std::move(boundary), options.contacts, contact_options(options)) {}
+
+ResponseState TouchingResponse::solve(const ResponseQuery& query, const LoadDirections& along, const ResponseStart& start) {
+  ContactLoads loads = statics_.no_loads();
+  loads.force_coefficients = query.force;
+  loads.motion_coefficients = query.motion.head(node_motions_);
+  for (std::size_t t = 0; t < driven_.size(); ++t)
+    loads.motion[driven_[t].contact].head<3>() = query.motion(node_motions_ + static_cast<Index>(t)) * driven_[t].direction;
+  if (query.stiffness.size() > 0) statics_.set_region_stiffness(query.stiffness);
+
+  std::optional<ContactEquilibrium> guess;
+  if (start.on_path && start.nearby && start.nearby->touching) {
+    guess = *start.nearby->touching;
+    if (start.displacement_m != nullptr) guess->displacement_m = *start.displacement_m;
+  }
+  const auto solved_from = [&](const ContactEquilibrium* from) {
+    return std::make_shared<ContactEquilibrium>(statics_.solve(query.young_modulus_pa, query.poisson_ratio, loads, from, query.extra,
+                                                               guess ? &*guess : nullptr));
+  };
+  const ContactEquilibrium* from = start.from ? start.from->touching.get() : nullptr;
+  auto at = solved_from(from);
+  // Without memory the way does not matter: a start that led nowhere is left.
+  if (!at->converged && !start.on_path && from != nullptr) at = solved_from(nullptr);
+
+  ResponseState out;
+  out.converged = at->converged;
+  out.reason = at->reason;
+  out.inverted_elements = at->inverted_elements;
+  out.parameters = parameters_;
+  auto solution = std::make_shared<ResponseSolution>();
+  solution->touching = at;
+  solution->displacement_m = at->displacement_m;
+  solution->derivative.resize(at->displacement_m.size(), 0);
+  if (at->converged) {
+    out.reaction_n.resize(query.motion.size());
+    out.reaction_n.head(node_motions_) = at->motion_reaction;
+    for (std::size_t t = 0; t < driven_.size(); ++t)
+      out.reaction_n(node_motions_ + static_cast<Index>(t)) =
+          driven_[t].direction.dot(at->touches[driven_[t].contact].wrench.head<3>());
+  }
+  if (at->converged && query.derivatives) {
+    const Index count = parameters_ + static_cast<Index>(along.force.cols());
+    ContactLoadsAlong moved = statics_.no_loads_along(count);
+    moved.log_young(0) = moved.poisson(1) = 1;
+    // The first region's stiffness is E itself.
+    for (Index r = 1; r < moved.log_stiffness.rows(); ++r) moved.log_stiffness(r, 1 + r) = 1;
+    moved.force_coefficients.rightCols(along.force.cols()) = along.force;
+    moved.motion_coefficients.rightCols(along.motion.cols()) = along.motion.topRows(node_motions_);
+    for (std::size_t t = 0; t < driven_.size(); ++t)
+      moved.motion[driven_[t].contact].rightCols(along.motion.cols()).topRows<3>() =
+          driven_[t].direction * along.motion.row(node_motions_ + static_cast<Index>(t));
+    const bool carries_on = start.on_path && from != nullptr;
+    if (carries_on && !start.from->touching_along)
+      throw Error("was solved without derivatives, which those of this step continue", "ResponseStart::from");
+    auto d = std::make_shared<ContactPathSensitivity>(
+        statics_.sensitivity_along(*at, moved, carries_on ? *start.from->touching_along : statics_.rest_along(count)));
+    solution->derivative = d->displacement;
+    out.d_reaction = reactions_along(*d);
+    solution->touching_along = std::move(d);
+  }
+  out.solution = std::move(solution);
+  return out;
+}
+
+MatrixX TouchingResponse::reactions_along(const ContactPathSensitivity& d) const {
+  MatrixX out(node_motions_ + static_cast<Index>(driven_.size()), d.displacement.cols());
+  out.topRows(node_motions_) = d.motion_reaction;
+  for (std::size_t t = 0; t < driven_.size(); ++t)
+    out.row(node_motions_ + static_cast<Index>(t)) = driven_[t].direction.transpose() * d.wrench[driven_[t].contact].topRows<3>();
+  return out;
+}
+
+}  // namespace palpate::fem
