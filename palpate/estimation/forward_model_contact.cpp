@@ -141,8 +141,7 @@ ForwardModel::SolvedAtPtr ForwardModel::lying(std::size_t s, Body& body, const V
   return body.lying;
 }
 
-ForwardModel::SolvedAtPtr ForwardModel::contact_state(std::size_t s, Body& body, const VectorX& unknowns,
-                                                          bool derivatives) {
+ForwardModel::SolvedAtPtr ForwardModel::contact_state(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives) {
   SolvedAtPtr& known = memory_[s].contact;
   if (known && known->unknowns == unknowns && (known->differentiated() || !derivatives)) return known;
   SolvedAtPtr before = lying(s, body, unknowns, derivatives && path_);
@@ -168,33 +167,27 @@ bool ForwardModel::solve_contact_step(std::size_t s, Body& body, const Coefficie
     return false;
   }
 
+  auto solution = std::make_shared<fem::ResponseSolution>();
+  solution->displacement_m = now->state.solution->displacement_m;
+  if (rest) {
+    solution->displacement_m -= rest->state.solution->displacement_m;
+    seen.watched_m -= rest->state.watched_m;
+    seen.conjugate_m -= rest->state.conjugate_m;
+  }
+  solution->derivative.resize(solution->displacement_m.size(), 0);
   std::vector<int> columns;
   if (derivatives) {
     columns = parameter_columns();
     columns.insert(columns.end(), c.columns.begin(), c.columns.end());
-  }
-  const auto less_rest = [&](const auto& of_now, const auto& of_rest, auto& to) {
-    to = of_now;
-    if (rest) to -= of_rest;
-  };
-  auto solution = std::make_shared<fem::ResponseSolution>();
-  less_rest(now->state.solution->displacement_m, rest ? rest->state.solution->displacement_m : VectorX(), solution->displacement_m);
-  less_rest(now->state.watched_m, rest ? rest->state.watched_m : VectorX(), seen.watched_m);
-  less_rest(now->state.conjugate_m, rest ? rest->state.conjugate_m : VectorX(), seen.conjugate_m);
-  solution->derivative.resize(solution->displacement_m.size(), 0);
-  if (derivatives) {
-    const auto ordered = [&](const SolvedAt& from, const MatrixX& d) { return in_order(d, from.columns, columns); };
-    const auto difference = [&](const MatrixX& of_now, const MatrixX& of_rest) {
-      MatrixX d = ordered(*now, of_now);
-      if (rest) d -= ordered(*rest, of_rest);
+    const auto less_rest = [&](const MatrixX& of_now, const MatrixX* of_rest) {
+      MatrixX d = in_order(of_now, now->columns, columns);
+      if (of_rest) d -= in_order(*of_rest, rest->columns, columns);
       return d;
     };
-    const fem::ResponseState none;
-    const fem::ResponseState& weight = rest ? rest->state : none;
-    solution->derivative = difference(now->state.solution->derivative, rest ? weight.solution->derivative : MatrixX());
-    seen.d_watched = difference(now->state.d_watched, weight.d_watched);
-    seen.d_conjugate = difference(now->state.d_conjugate, weight.d_conjugate);
-    seen.d_reaction = ordered(*now, now->state.d_reaction);
+    solution->derivative = less_rest(now->state.solution->derivative, rest ? &rest->state.solution->derivative : nullptr);
+    seen.d_watched = less_rest(now->state.d_watched, rest ? &rest->state.d_watched : nullptr);
+    seen.d_conjugate = less_rest(now->state.d_conjugate, rest ? &rest->state.d_conjugate : nullptr);
+    seen.d_reaction = in_order(now->state.d_reaction, now->columns, columns);
   }
   seen.solution = std::move(solution);
   memory_[s].seen = std::make_shared<SolvedAt>(SolvedAt{unknowns, std::move(columns), seen});
