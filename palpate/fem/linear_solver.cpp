@@ -182,7 +182,7 @@ struct LinearSolver::Impl {
 
   /// Conjugate gradients on every column; stops at the first that fails.
   Outcome solve_by_steps(LinearMethod method, Preconditioner& preconditioner, Eigen::Ref<MatrixX> x, const MatrixX* start,
-                         int max_iterations, Eigen::Index& done) {
+                         int max_iterations, int extension, Eigen::Index& done) {
     Outcome outcome;
     outcome.used = method;
     const std::vector<Index>& padded = blocks->padded();
@@ -196,7 +196,7 @@ struct LinearSolver::Impl {
         for (Eigen::Index u = 0; u < x.rows(); ++u) solution[padded[static_cast<std::size_t>(u)]] = (*start)(u, done);
       }
       const ConjugateGradientsResult result =
-          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, tolerance, max_iterations, threads);
+          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, tolerance, max_iterations, extension, threads);
       outcome.iterations = std::max(outcome.iterations, result.iterations);
       outcome.residual = std::max(outcome.residual, result.residual);
       if (!result.converged) {
@@ -215,19 +215,21 @@ struct LinearSolver::Impl {
   Outcome solve_mixed(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
     if (!need_small_factor()) return refuse(LinearMethod::mixed);
     FactorPreconditioner preconditioner(*small_factor, blocks->padded());
-    return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, std::min(options.max_iterations, 100), done);
+    return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, std::min(options.max_iterations, 100), 0, done);
   }
 
   Outcome solve_iterative(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
     if (!need_rigid()) return refuse(LinearMethod::iterative);
-    // Automatic: no longer than the factor would take, or half as long again as expected; then the factor takes over.
-    int max_iterations = options.max_iterations;
+    // Automatic: no longer than the factor would take, or half as long again as expected; then the factor takes over, unless
+    // the steps that are left look cheaper than it.
+    int max_iterations = options.max_iterations, extension = 0;
     if (options.method == LinearMethod::automatic && fits(4)) {
       const double as_long_as_factor = mixed_cost(1) / (kIterationPerBlock * block_count());
+      extension = static_cast<int>(std::min<double>(max_iterations, as_long_as_factor));
       max_iterations =
           static_cast<int>(std::min<double>(max_iterations, std::max(as_long_as_factor, 1.5 * expected_iterations())));
     }
-    const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, max_iterations, done);
+    const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, max_iterations, extension, done);
     known_iterations = outcome.iterations;
     return outcome;
   }

@@ -17,8 +17,10 @@ struct ConjugateGradientsResult {
 /// the iteration starts again from the best point.
 /// @param b  padded right-hand side
 /// @param x  padded start and result
+/// @param extension  goes on beyond max_iterations while the mean fall of the residual so far promises the end within as many
+///                   further steps
 ConjugateGradientsResult conjugate_gradients(const BlockMatrix& matrix, const Aggregates& aggregates,
                                              Preconditioner& preconditioner, const VectorX& b, VectorX& x, double tolerance,
-                                             int max_iterations, int threads);
+                                             int max_iterations, int extension, int threads);
 
 }  // namespace palpate::fem
