@@ -17,13 +17,14 @@ constexpr double kDoubleFlops = 40e9, kFloatFlops = 76e9;  // of a factorisation
 constexpr double kSweepBytes = 15e9;                       // of L, both directions of a solve read it
 constexpr double kIterationPerBlock = 4e-9;                // one step of conjugate gradients, per 3 x 3 block
 constexpr double kSetUpPerBlock = 7e-8;                    // values, diagonal inverses and coarse matrix
-constexpr double kAnalysisPerUnknown = 2.5e-6;             // ordering and symbolic analysis
+constexpr double kAnalysisPerEntry = 6e-8;                 // ordering and symbolic analysis, an entry of the matrix
 constexpr int kMixedIterations = 4;                        // single precision factor, up to Poisson ratios of 0.49
 constexpr Eigen::Index kAnalyseAtOnceBelow = 3000;         // unknowns: the exact flops are worth the ordering
 
-// Volume meshes of 900 to 600 000 unknowns under nested dissection; thin bodies need less.
-double guessed_flops(double n) { return 7.0 * n * n; }
-double guessed_panel_values(double n) { return 7.6 * std::pow(n, 1.36); }
+// Volume meshes of 900 to 600 000 unknowns under nested dissection; thin bodies need less. Quadratic tetrahedra have twice the
+// entries a row of linear ones (78 and 38), and separators that are as much heavier.
+double guessed_flops(double n, double entries_a_row) { return 0.18 * entries_a_row * n * n; }
+double guessed_panel_values(double n, double entries_a_row) { return 0.19 * entries_a_row * std::pow(n, 1.36); }
 double guessed_iterations(double n, bool rigid_motions) { return rigid_motions ? 60.0 : 5.5 * std::cbrt(n); }
 
 }  // namespace
@@ -104,15 +105,19 @@ struct LinearSolver::Impl {
   }
 
   double unknowns() const { return static_cast<double>(lower.cols()); }
-  double flops() const { return tree ? tree->flops : guessed_flops(unknowns()); }
-  double panel_values() const { return tree ? static_cast<double>(tree->panel_values) : guessed_panel_values(unknowns()); }
+  double entries() const { return 2.0 * static_cast<double>(lower.nonZeros()); }  // both triangles
+  double entries_a_row() const { return entries() / unknowns(); }
+  double flops() const { return tree ? tree->flops : guessed_flops(unknowns(), entries_a_row()); }
+  double panel_values() const {
+    return tree ? static_cast<double>(tree->panel_values) : guessed_panel_values(unknowns(), entries_a_row());
+  }
   double block_count() const {
-    return blocks ? static_cast<double>(blocks->block_count()) : 2.0 * static_cast<double>(lower.nonZeros()) / 9.0;
+    return blocks ? static_cast<double>(blocks->block_count()) : entries() / 9.0;
   }
   bool fits(double bytes_a_value) const { return 1.5 * panel_values() * bytes_a_value <= options.memory_limit_bytes; }
 
   // The analysis serves all matrices: each has to bear its share, as if as many were still to come as have been.
-  double analysis_cost() const { return tree ? 0 : unknowns() * kAnalysisPerUnknown / std::max(1.0, matrices); }
+  double analysis_cost() const { return tree ? 0 : entries() * kAnalysisPerEntry / std::max(1.0, matrices); }
   double direct_cost(double count) const {
     if (factor_state == State::refused || !fits(8)) return std::numeric_limits<double>::infinity();
     const double sweeps = count <= 2 ? count : 3.0 * std::ceil(count / 16.0);
