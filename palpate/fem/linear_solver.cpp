@@ -18,6 +18,7 @@ constexpr double kSweepBytes = 15e9;                       // of L, both directi
 constexpr double kIterationPerBlock = 4e-9;                // one step of conjugate gradients, per 3 x 3 block
 constexpr double kSetUpPerBlock = 7e-8;                    // values, diagonal inverses and coarse matrix
 constexpr double kAnalysisPerEntry = 6e-8;                 // ordering and symbolic analysis, an entry of the matrix
+constexpr double kFirstLookAtMost = 100;                   // steps; residuals may fall hardly at all before
 constexpr int kMixedIterations = 4;                        // single precision factor, up to Poisson ratios of 0.49
 constexpr Eigen::Index kAnalyseAtOnceBelow = 3000;         // unknowns: the exact flops are worth the ordering
 
@@ -65,6 +66,7 @@ struct LinearSolver::Impl {
 
   double tolerance = 0;         // of the present solve
   double known_iterations = 0;  // of the last iterative solve, 0: none yet
+  double steps_left = 0;        // when conjugate gradients last stopped before the end
   double matrices = 0;          // that have been set
 
   void need_tree() {
@@ -187,7 +189,7 @@ struct LinearSolver::Impl {
 
   /// Conjugate gradients on every column; stops at the first that fails.
   Outcome solve_by_steps(LinearMethod method, Preconditioner& preconditioner, Eigen::Ref<MatrixX> x, const MatrixX* start,
-                         int max_iterations, int extension, Eigen::Index& done) {
+                         const Patience& patience, Eigen::Index& done) {
     Outcome outcome;
     outcome.used = method;
     const std::vector<Index>& padded = blocks->padded();
@@ -201,9 +203,10 @@ struct LinearSolver::Impl {
         for (Eigen::Index u = 0; u < x.rows(); ++u) solution[padded[static_cast<std::size_t>(u)]] = (*start)(u, done);
       }
       const ConjugateGradientsResult result =
-          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, tolerance, max_iterations, extension, threads);
+          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, tolerance, patience, threads);
       outcome.iterations = std::max(outcome.iterations, result.iterations);
       outcome.residual = std::max(outcome.residual, result.residual);
+      steps_left = std::min<double>(result.steps_left, options.max_iterations);
       if (!result.converged) {
         outcome.not_positive_definite = result.negative_curvature;
         outcome.reason = result.negative_curvature ? "the matrix is not positive definite"
@@ -220,22 +223,20 @@ struct LinearSolver::Impl {
   Outcome solve_mixed(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
     if (!need_small_factor()) return refuse(LinearMethod::mixed);
     FactorPreconditioner preconditioner(*small_factor, blocks->padded());
-    return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, std::min(options.max_iterations, 100), 0, done);
+    const Patience patience{.max_iterations = std::min(options.max_iterations, 100)};
+    return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, patience, done);
   }
 
   Outcome solve_iterative(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
     if (!need_rigid()) return refuse(LinearMethod::iterative);
-    // Automatic: no longer than the factor would take, or half as long again as expected; then the factor takes over, unless
-    // the steps that are left look cheaper than it.
-    int max_iterations = options.max_iterations, extension = 0;
+    // Automatic: where more steps are left than the factor would take, the factor takes over.
+    Patience patience{.max_iterations = options.max_iterations};
     if (options.method == LinearMethod::automatic && fits(4)) {
-      const double as_long_as_factor = mixed_cost(1) / (kIterationPerBlock * block_count());
-      extension = static_cast<int>(std::min<double>(max_iterations, as_long_as_factor));
-      max_iterations =
-          static_cast<int>(std::min<double>(max_iterations, std::max(as_long_as_factor, 1.5 * expected_iterations())));
+      patience.worth = mixed_cost(1) / (kIterationPerBlock * block_count());
+      patience.first_look = static_cast<int>(std::min(kFirstLookAtMost, std::max(patience.worth, 1.5 * expected_iterations())));
     }
-    const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, max_iterations, extension, done);
-    known_iterations = outcome.iterations;
+    const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, patience, done);
+    known_iterations = outcome.iterations + steps_left;
     return outcome;
   }
 };

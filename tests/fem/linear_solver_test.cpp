@@ -214,7 +214,7 @@ TEST(LinearSolver, AutomaticFallsBackOnTheFactor) {
   EXPECT_LT(cube.residual(x), 1e-9);
 }
 
-TEST(ConjugateGradients, GoOnWhereTheEndIsNear) {
+TEST(ConjugateGradients, StopWhereTheEndIsTooFar) {
   const Cube cube(8, 0.49);
   const QuotientGraph graph = quotient_graph(cube.lower, 3);
   const Aggregates aggregates = aggregate(graph, cube.placement, 16);
@@ -224,24 +224,26 @@ TEST(ConjugateGradients, GoOnWhereTheEndIsNear) {
   ASSERT_TRUE(preconditioner.update());
   VectorX b = VectorX::Zero(matrix.padded_size());
   for (Eigen::Index u = 0; u < cube.load.rows(); ++u) b[matrix.padded()[static_cast<std::size_t>(u)]] = cube.load(u, 0);
-  const auto solve = [&](int max_iterations, int extension, int threads, VectorX& x) {
+  const auto solve = [&](const Patience& patience, int threads, VectorX& x) {
     x.setZero(matrix.padded_size());
-    return conjugate_gradients(matrix, aggregates, preconditioner, b, x, 1e-8, max_iterations, extension, threads);
+    return conjugate_gradients(matrix, aggregates, preconditioner, b, x, 1e-8, patience, threads);
   };
   VectorX whole, x;
-  const auto unlimited = solve(5000, 0, 1, whole);
+  const auto unlimited = solve({}, 1, whole);
   ASSERT_TRUE(unlimited.converged);
-  const int limit = unlimited.iterations / 3;
-  const auto stopped = solve(limit, 0, 1, x);
-  EXPECT_FALSE(stopped.converged);
-  EXPECT_EQ(stopped.iterations, limit);
-  EXPECT_FALSE(solve(limit, 2, 1, x).converged) << "two more steps do not reach the end";
+  const int look = unlimited.iterations / 2;
   for (const int threads : {1, 2, 3}) {
-    const auto extended = solve(limit, 5000, threads, x);
-    EXPECT_TRUE(extended.converged);
-    EXPECT_EQ(extended.iterations, unlimited.iterations);
+    const auto patient = solve({.first_look = look, .worth = 2.0 * look}, threads, x);
+    EXPECT_TRUE(patient.converged);
+    EXPECT_EQ(patient.iterations, unlimited.iterations);
     EXPECT_EQ(x, whole) << threads;
+    const auto impatient = solve({.first_look = look, .worth = 0.3 * look}, threads, x);
+    EXPECT_FALSE(impatient.converged);
+    EXPECT_FALSE(impatient.negative_curvature);
+    EXPECT_EQ(impatient.iterations, look);
+    EXPECT_NEAR(impatient.steps_left, look, 0.3 * look);
   }
+  EXPECT_EQ(solve({.max_iterations = 7}, 1, x).iterations, 7);
 }
 
 TEST(LargeArray, IsAlignedAndKeepsWhatItHolds) {
