@@ -18,6 +18,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/fem/assembly.hpp"
 #include "palpate/fem/linear_solver.hpp"
+#include "palpate/fem/linear_solver/large_array.hpp"
 
 namespace palpate {
 namespace {
@@ -123,6 +124,8 @@ Eigen::SparseMatrix<double> free_part(const fem::BlockPattern& pattern, const fe
     for (++p; p < last; ++p) entries += columns * free_of(*p);
   }
   lower.resizeNonZeros(entries);
+  fem::ask_for_large_pages(lower.valuePtr(), static_cast<std::size_t>(entries) * sizeof(double));
+  fem::ask_for_large_pages(lower.innerIndexPtr(), static_cast<std::size_t>(entries) * sizeof(Index));
   Index* inner = lower.innerIndexPtr();
   double* value = lower.valuePtr();
   for (Index column = 0; column < n; ++column) {

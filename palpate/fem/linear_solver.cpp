@@ -8,6 +8,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/fem/linear_solver/conjugate_gradients.hpp"
 #include "palpate/fem/linear_solver/front_factor.hpp"
+#include "palpate/fem/linear_solver/large_array.hpp"
 
 namespace palpate::fem {
 namespace {
@@ -263,7 +264,15 @@ void LinearSolver::analyse(const Eigen::SparseMatrix<double>& lower, UnknownPlac
   const Options options = impl_->options;
   impl_ = std::make_unique<Impl>();
   impl_->options = options;
-  impl_->lower = lower;
+  // Copied by hand, so that the copy lies in large pages.
+  Eigen::SparseMatrix<double>& own = impl_->lower;
+  own.resize(lower.rows(), lower.cols());
+  own.resizeNonZeros(lower.nonZeros());
+  const auto entries = static_cast<std::size_t>(lower.nonZeros());
+  ask_for_large_pages(own.valuePtr(), entries * sizeof(double));
+  ask_for_large_pages(own.innerIndexPtr(), entries * sizeof(Index));
+  std::copy_n(lower.outerIndexPtr(), lower.cols() + 1, own.outerIndexPtr());
+  std::copy_n(lower.innerIndexPtr(), lower.nonZeros(), own.innerIndexPtr());
   impl_->placement = std::move(placement);
 }
 

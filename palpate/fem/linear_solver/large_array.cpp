@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/fem/linear_solver/large_array.hpp"
 
+#include <cstdint>
 #include <new>
 
 #ifdef __linux__
@@ -19,11 +20,16 @@ std::align_val_t alignment_of(std::size_t bytes) { return std::align_val_t{bytes
 
 void* allocate_large(std::size_t bytes) {
   void* const memory = ::operator new(bytes + kCacheLine, alignment_of(bytes));
-#ifdef MADV_HUGEPAGE
-  // A wish: where it is refused the pages stay small.
-  if (bytes >= kLargeFrom) madvise(memory, bytes / kLargePage * kLargePage, MADV_HUGEPAGE);
-#endif
+  ask_for_large_pages(memory, bytes);
   return memory;
+}
+
+void ask_for_large_pages([[maybe_unused]] void* memory, [[maybe_unused]] std::size_t bytes) noexcept {
+#ifdef MADV_HUGEPAGE
+  const auto begin = (reinterpret_cast<std::uintptr_t>(memory) + kLargePage - 1) / kLargePage * kLargePage;
+  const auto end = (reinterpret_cast<std::uintptr_t>(memory) + bytes) / kLargePage * kLargePage;
+  if (bytes >= kLargeFrom && begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+#endif
 }
 
 void free_large(void* memory, std::size_t bytes) noexcept { ::operator delete(memory, alignment_of(bytes)); }

@@ -12,6 +12,8 @@ namespace palpate::fem {
 /// At a cache line's border at least. @throws std::bad_alloc
 void* allocate_large(std::size_t bytes);
 void free_large(void* memory, std::size_t bytes) noexcept;
+/// For memory that others have allocated and nobody has touched yet. A wish: nothing is promised.
+void ask_for_large_pages(void* memory, std::size_t bytes) noexcept;
 
 /// Uninitialised memory.
 template <class T>
@@ -43,6 +45,16 @@ struct LargeAllocator {
     return true;
   }
 };
+
+/// Room for `size` elements of a vector that is filled next; what it held is lost.
+template <class T>
+void make_large_room(std::vector<T>& vector, std::size_t size) {
+  if (vector.capacity() >= size) return;
+  vector.clear();
+  vector.shrink_to_fit();
+  vector.reserve(size);
+  ask_for_large_pages(vector.data(), size * sizeof(T));
+}
 
 template <class T>
 using LargeVector = std::vector<T, LargeAllocator<T>>;
