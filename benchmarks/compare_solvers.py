@@ -13,7 +13,8 @@ differ. PETSc has no threads of its own and is left out above one.
   benchmarks/compare_solvers.py build/developer/benchmarks/solve_deck --cells 6 13 27 --poisson 0.3 0.49
 
 Programs that are absent are left out with a word. Options: --element tet4 tet10, --threads N..., --patient (SPOOLES, MUMPS and
-CHOLMOD on every mesh), --repeats, --keep FOLDER, --json FILE. Everything at once, for a machine with nothing else to do:
+CHOLMOD on every mesh), --calculix and --petsc SOLVER... (those alone; none: leaves the program out), --timeout, --repeats, --keep
+FOLDER, --json FILE. Everything at once, for a machine with nothing else to do:
 
   benchmarks/compare_solvers.py build/developer/benchmarks/solve_deck --cells 6 13 27 47 --element tet4 --threads 1 2 --patient
   benchmarks/compare_solvers.py build/developer/benchmarks/solve_deck --cells 6 13 20 --element tet10 --threads 1 2 --patient
@@ -30,6 +31,14 @@ import time
 import numpy as np
 
 EDGE, RADIUS, FORCE, YOUNG = 0.15, 0.025, 10.0, 20e3
+CALCULIX = ("SPOOLES", "ITERATIVE SCALING", "ITERATIVE CHOLESKY")
+PETSC = {
+    "CG + Jacobi": dict(ksp_type="cg", pc_type="jacobi"),
+    "CG + ICC": dict(ksp_type="cg", pc_type="icc"),
+    "CG + GAMG": dict(ksp_type="cg", pc_type="gamg"),
+    "MUMPS Cholesky": dict(ksp_type="preonly", pc_type="cholesky", pc_factor_mat_solver_type="mumps"),
+    "CHOLMOD": dict(ksp_type="preonly", pc_type="cholesky", pc_factor_mat_solver_type="cholmod"),
+}
 
 
 def environment(threads):
@@ -184,15 +193,9 @@ def dolfinx_worker(path):
     matrix.setNearNullSpace(PETSc.NullSpace().createRigidBody(coordinates))
     matrix.setOption(PETSc.Mat.Option.SPD, True)
 
-    solvers = {
-        "CG + Jacobi": dict(ksp_type="cg", pc_type="jacobi"),
-        "CG + ICC": dict(ksp_type="cg", pc_type="icc"),
-        "CG + GAMG": dict(ksp_type="cg", pc_type="gamg"),
-        "MUMPS Cholesky": dict(ksp_type="preonly", pc_type="cholesky", pc_factor_mat_solver_type="mumps"),
-        "CHOLMOD": dict(ksp_type="preonly", pc_type="cholesky", pc_factor_mat_solver_type="cholmod"),
-    }
     results = {}
-    for name, options in solvers.items():
+    for name in case["petsc"]:
+        options = PETSC[str(name)]
         if len(nodes) > 60000 and not patient and name in ("MUMPS Cholesky", "CHOLMOD", "CG + GAMG"):
             continue  # minutes and gigabytes
         try:
@@ -241,7 +244,7 @@ def compare(case, arguments, folder):
           flush=True)
 
     if shutil.which("ccx"):
-        for solver in ("SPOOLES", "ITERATIVE SCALING", "ITERATIVE CHOLESKY"):
+        for solver in arguments.calculix:
             if solver == "SPOOLES" and len(nodes) > 60000 and not arguments.patient:
                 continue
             name = solver.replace(" ", "_").lower()
@@ -261,11 +264,11 @@ def compare(case, arguments, folder):
     else:
         print("  CalculiX: ccx is not installed")
 
-    if threads > 1:
+    if threads > 1 or not arguments.petsc:
         return result
     in_process = ours["assemble_s"] + ours["solve_s"]
     path = os.path.join(folder, "case.npz")
-    np.savez(path, nodes=nodes, tets=tets, load=load, poisson=poisson, cells=n, patient=arguments.patient)
+    np.savez(path, nodes=nodes, tets=tets, load=load, poisson=poisson, cells=n, patient=arguments.patient, petsc=arguments.petsc)
     worker = subprocess.run([sys.executable, os.path.abspath(__file__), "--dolfinx-worker", path], env=environment(1),
                             capture_output=True, text=True)
     if worker.returncode != 0:
@@ -297,6 +300,8 @@ def main():
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--timeout", type=float, default=300, help="seconds a process")
     parser.add_argument("--patient", action="store_true", help="SPOOLES, MUMPS, CHOLMOD and GAMG above 60 000 nodes too")
+    parser.add_argument("--calculix", nargs="*", choices=CALCULIX, default=CALCULIX)
+    parser.add_argument("--petsc", nargs="*", choices=list(PETSC), default=list(PETSC))
     parser.add_argument("--keep", help="folder for decks and results (otherwise they are deleted)")
     parser.add_argument("--json", help="writes all numbers to this file")
     arguments = parser.parse_args()

@@ -18,6 +18,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/fem/assembly.hpp"
 #include "palpate/fem/linear_solver.hpp"
+#include "palpate/fem/linear_solver/large_array.hpp"
 
 namespace palpate {
 namespace {
@@ -108,27 +109,40 @@ Eigen::SparseMatrix<double> free_part(const fem::BlockPattern& pattern, const fe
     number[u] = static_cast<Index>(unknowns.size());
     unknowns.push_back(static_cast<Index>(u));
   }
-  std::vector<int> outer{0}, inner;
-  std::vector<double> values;
-  inner.reserve(9 * pattern.row.size());
-  values.reserve(9 * pattern.row.size());
-  for (const Index u : unknowns) {
-    const Index node = u / 3, c = u % 3;
+  const auto free_of = [&](Index node) {
+    const char* const held = &deck.held[3 * static_cast<std::size_t>(node)];
+    return 3 - (held[0] + held[1] + held[2]);
+  };
+  const auto n = static_cast<Index>(unknowns.size());
+  Eigen::SparseMatrix<double> lower(n, n);
+  Index entries = 0;
+  for (Index node = 0; node < pattern.nodes; ++node) {
+    const Index columns = free_of(node);
+    const Index *p = &pattern.row[static_cast<std::size_t>(pattern.column_start[static_cast<std::size_t>(node)])],
+                *const last = pattern.row.data() + pattern.column_start[static_cast<std::size_t>(node) + 1];
+    entries += columns * (columns + 1) / 2;
+    for (++p; p < last; ++p) entries += columns * free_of(*p);
+  }
+  lower.resizeNonZeros(entries);
+  fem::ask_for_large_pages(lower.valuePtr(), static_cast<std::size_t>(entries) * sizeof(double));
+  fem::ask_for_large_pages(lower.innerIndexPtr(), static_cast<std::size_t>(entries) * sizeof(Index));
+  Index* inner = lower.innerIndexPtr();
+  double* value = lower.valuePtr();
+  for (Index column = 0; column < n; ++column) {
+    const Index node = unknowns[static_cast<std::size_t>(column)] / 3, c = unknowns[static_cast<std::size_t>(column)] % 3;
     for (Index p = pattern.column_start[static_cast<std::size_t>(node)];
          p < pattern.column_start[static_cast<std::size_t>(node) + 1]; ++p) {
       const Index row = pattern.row[static_cast<std::size_t>(p)];
       for (Index r = row == node ? c : 0; r < 3; ++r) {
         const Index reduced = number[static_cast<std::size_t>(3 * row + r)];
         if (reduced < 0) continue;
-        inner.push_back(reduced);
-        values.push_back(blocks[9 * static_cast<std::size_t>(p) + static_cast<std::size_t>(3 * c + r)]);
+        *inner++ = reduced;
+        *value++ = blocks[9 * static_cast<std::size_t>(p) + static_cast<std::size_t>(3 * c + r)];
       }
     }
-    outer.push_back(static_cast<int>(inner.size()));
+    lower.outerIndexPtr()[column + 1] = static_cast<Index>(inner - lower.innerIndexPtr());
   }
-  const auto n = static_cast<Index>(unknowns.size());
-  return Eigen::Map<const Eigen::SparseMatrix<double>>(n, n, static_cast<Index>(inner.size()), outer.data(), inner.data(),
-                                                       values.data());
+  return lower;
 }
 
 int run(int argc, char** argv) {
@@ -162,6 +176,7 @@ int run(int argc, char** argv) {
                    blocks);
   std::vector<Index> unknowns;
   const Eigen::SparseMatrix<double> lower = free_part(assembly.pattern(), blocks, deck, unknowns);
+  fem::BlockValues().swap(blocks);
   stage("assemble");
   const auto n = static_cast<Eigen::Index>(unknowns.size());
   fem::UnknownPlacement placement{Points(n, 3), Points::Zero(n, 3)};

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "palpate/core/error.hpp"
+#include "palpate/fem/linear_solver/large_array.hpp"
 #include "palpate/fem/tetrahedron.hpp"
 
 namespace palpate::fem {
@@ -46,6 +47,7 @@ Assembly::Assembly(const TetMesh& mesh, Dilatation dilatation, std::vector<int> 
   connectivity_ = mesh.tetrahedra;
   const auto quadrature = nodes == 4 ? tet_quadrature_1() : tet_quadrature_4();
   const auto points = static_cast<Index>(quadrature.size());
+  make_large_room(gradients_, static_cast<std::size_t>(elements) * points * nodes * 3);
   gradients_.resize(static_cast<std::size_t>(elements) * points * nodes * 3);
   weights_.resize(static_cast<std::size_t>(elements) * points);
   const Vec3 extent = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).transpose();
@@ -133,7 +135,7 @@ void Assembly::build_pattern() {
                end = pattern_.row.begin() + pattern_.column_start[j + 1];
     return static_cast<Index>(std::lower_bound(begin, end, i) - pattern_.row.begin());
   };
-  block_of_.reserve(static_cast<std::size_t>(connectivity_.rows()) * nodes * (nodes + 1) / 2);
+  make_large_room(block_of_, static_cast<std::size_t>(connectivity_.rows()) * nodes * (nodes + 1) / 2);
   for (Index e = 0; e < connectivity_.rows(); ++e)
     for (int b = 0; b < nodes; ++b)
       for (int a = b; a < nodes; ++a) block_of_.push_back(find_block(connectivity_(e, a), connectivity_(e, b)));
@@ -232,6 +234,7 @@ double Assembly::energy_and_forces_of(const MaterialLaw& law, const Moduli& m, c
 
 template <int N, int Q>
 void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const {
+  make_large_room(blocks, 9 * static_cast<std::size_t>(pattern_.block_count()));
   blocks.assign(9 * static_cast<std::size_t>(pattern_.block_count()), 0.0);
   constexpr int kPairs = N * (N + 1) / 2;
   alignas(64) double local[kPairs * 9];

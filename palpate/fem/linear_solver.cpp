@@ -8,6 +8,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/fem/linear_solver/conjugate_gradients.hpp"
 #include "palpate/fem/linear_solver/front_factor.hpp"
+#include "palpate/fem/linear_solver/large_array.hpp"
 
 namespace palpate::fem {
 namespace {
@@ -17,13 +18,15 @@ constexpr double kDoubleFlops = 40e9, kFloatFlops = 76e9;  // of a factorisation
 constexpr double kSweepBytes = 15e9;                       // of L, both directions of a solve read it
 constexpr double kIterationPerBlock = 4e-9;                // one step of conjugate gradients, per 3 x 3 block
 constexpr double kSetUpPerBlock = 7e-8;                    // values, diagonal inverses and coarse matrix
-constexpr double kAnalysisPerUnknown = 2.5e-6;             // ordering and symbolic analysis
+constexpr double kAnalysisPerEntry = 6e-8;                 // ordering and symbolic analysis, an entry of the matrix
+constexpr double kFirstLookAtMost = 100;                   // steps; residuals may fall hardly at all before
 constexpr int kMixedIterations = 4;                        // single precision factor, up to Poisson ratios of 0.49
 constexpr Eigen::Index kAnalyseAtOnceBelow = 3000;         // unknowns: the exact flops are worth the ordering
 
-// Volume meshes of 900 to 600 000 unknowns under nested dissection; thin bodies need less.
-double guessed_flops(double n) { return 7.0 * n * n; }
-double guessed_panel_values(double n) { return 7.6 * std::pow(n, 1.36); }
+// Volume meshes of 900 to 600 000 unknowns under nested dissection; thin bodies need less. Quadratic tetrahedra have twice the
+// entries a row of linear ones (78 and 38), and separators that are as much heavier.
+double guessed_flops(double n, double entries_a_row) { return 0.18 * entries_a_row * n * n; }
+double guessed_panel_values(double n, double entries_a_row) { return 0.19 * entries_a_row * std::pow(n, 1.36); }
 double guessed_iterations(double n, bool rigid_motions) { return rigid_motions ? 60.0 : 5.5 * std::cbrt(n); }
 
 }  // namespace
@@ -64,6 +67,7 @@ struct LinearSolver::Impl {
 
   double tolerance = 0;         // of the present solve
   double known_iterations = 0;  // of the last iterative solve, 0: none yet
+  double steps_left = 0;        // when conjugate gradients last stopped before the end
   double matrices = 0;          // that have been set
 
   void need_tree() {
@@ -104,15 +108,19 @@ struct LinearSolver::Impl {
   }
 
   double unknowns() const { return static_cast<double>(lower.cols()); }
-  double flops() const { return tree ? tree->flops : guessed_flops(unknowns()); }
-  double panel_values() const { return tree ? static_cast<double>(tree->panel_values) : guessed_panel_values(unknowns()); }
+  double entries() const { return 2.0 * static_cast<double>(lower.nonZeros()); }  // both triangles
+  double entries_a_row() const { return entries() / unknowns(); }
+  double flops() const { return tree ? tree->flops : guessed_flops(unknowns(), entries_a_row()); }
+  double panel_values() const {
+    return tree ? static_cast<double>(tree->panel_values) : guessed_panel_values(unknowns(), entries_a_row());
+  }
   double block_count() const {
-    return blocks ? static_cast<double>(blocks->block_count()) : 2.0 * static_cast<double>(lower.nonZeros()) / 9.0;
+    return blocks ? static_cast<double>(blocks->block_count()) : entries() / 9.0;
   }
   bool fits(double bytes_a_value) const { return 1.5 * panel_values() * bytes_a_value <= options.memory_limit_bytes; }
 
   // The analysis serves all matrices: each has to bear its share, as if as many were still to come as have been.
-  double analysis_cost() const { return tree ? 0 : unknowns() * kAnalysisPerUnknown / std::max(1.0, matrices); }
+  double analysis_cost() const { return tree ? 0 : entries() * kAnalysisPerEntry / std::max(1.0, matrices); }
   double direct_cost(double count) const {
     if (factor_state == State::refused || !fits(8)) return std::numeric_limits<double>::infinity();
     const double sweeps = count <= 2 ? count : 3.0 * std::ceil(count / 16.0);
@@ -182,7 +190,7 @@ struct LinearSolver::Impl {
 
   /// Conjugate gradients on every column; stops at the first that fails.
   Outcome solve_by_steps(LinearMethod method, Preconditioner& preconditioner, Eigen::Ref<MatrixX> x, const MatrixX* start,
-                         int max_iterations, Eigen::Index& done) {
+                         const Patience& patience, Eigen::Index& done) {
     Outcome outcome;
     outcome.used = method;
     const std::vector<Index>& padded = blocks->padded();
@@ -196,9 +204,10 @@ struct LinearSolver::Impl {
         for (Eigen::Index u = 0; u < x.rows(); ++u) solution[padded[static_cast<std::size_t>(u)]] = (*start)(u, done);
       }
       const ConjugateGradientsResult result =
-          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, tolerance, max_iterations, threads);
+          conjugate_gradients(*blocks, aggregates, preconditioner, b, solution, tolerance, patience, threads);
       outcome.iterations = std::max(outcome.iterations, result.iterations);
       outcome.residual = std::max(outcome.residual, result.residual);
+      steps_left = std::min<double>(result.steps_left, options.max_iterations);
       if (!result.converged) {
         outcome.not_positive_definite = result.negative_curvature;
         outcome.reason = result.negative_curvature ? "the matrix is not positive definite"
@@ -215,20 +224,20 @@ struct LinearSolver::Impl {
   Outcome solve_mixed(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
     if (!need_small_factor()) return refuse(LinearMethod::mixed);
     FactorPreconditioner preconditioner(*small_factor, blocks->padded());
-    return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, std::min(options.max_iterations, 100), done);
+    const Patience patience{.max_iterations = std::min(options.max_iterations, 100)};
+    return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, patience, done);
   }
 
   Outcome solve_iterative(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
     if (!need_rigid()) return refuse(LinearMethod::iterative);
-    // Automatic: no longer than the factor would take, or half as long again as expected; then the factor takes over.
-    int max_iterations = options.max_iterations;
+    // Automatic: where more steps are left than the factor would take, the factor takes over.
+    Patience patience{.max_iterations = options.max_iterations};
     if (options.method == LinearMethod::automatic && fits(4)) {
-      const double as_long_as_factor = mixed_cost(1) / (kIterationPerBlock * block_count());
-      max_iterations =
-          static_cast<int>(std::min<double>(max_iterations, std::max(as_long_as_factor, 1.5 * expected_iterations())));
+      patience.worth = mixed_cost(1) / (kIterationPerBlock * block_count());
+      patience.first_look = static_cast<int>(std::min(kFirstLookAtMost, std::max(patience.worth, 1.5 * expected_iterations())));
     }
-    const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, max_iterations, done);
-    known_iterations = outcome.iterations;
+    const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, patience, done);
+    known_iterations = outcome.iterations + steps_left;
     return outcome;
   }
 };
@@ -255,7 +264,15 @@ void LinearSolver::analyse(const Eigen::SparseMatrix<double>& lower, UnknownPlac
   const Options options = impl_->options;
   impl_ = std::make_unique<Impl>();
   impl_->options = options;
-  impl_->lower = lower;
+  // Copied by hand, so that the copy lies in large pages.
+  Eigen::SparseMatrix<double>& own = impl_->lower;
+  own.resize(lower.rows(), lower.cols());
+  own.resizeNonZeros(lower.nonZeros());
+  const auto entries = static_cast<std::size_t>(lower.nonZeros());
+  ask_for_large_pages(own.valuePtr(), entries * sizeof(double));
+  ask_for_large_pages(own.innerIndexPtr(), entries * sizeof(Index));
+  std::copy_n(lower.outerIndexPtr(), lower.cols() + 1, own.outerIndexPtr());
+  std::copy_n(lower.innerIndexPtr(), lower.nonZeros(), own.innerIndexPtr());
   impl_->placement = std::move(placement);
 }
 

@@ -5,11 +5,16 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <cstdint>
 #include <ostream>
+#include <utility>
 
 #include "benchmarks/cube.hpp"
 #include "fem/lattice.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/fem/linear_solver/conjugate_gradients.hpp"
+#include "palpate/fem/linear_solver/large_array.hpp"
 
 namespace palpate::fem {
 namespace {
@@ -207,6 +212,52 @@ TEST(LinearSolver, AutomaticFallsBackOnTheFactor) {
   EXPECT_TRUE(outcome.solved) << outcome.reason;
   EXPECT_NE(outcome.used, LinearMethod::iterative);
   EXPECT_LT(cube.residual(x), 1e-9);
+}
+
+TEST(ConjugateGradients, StopWhereTheEndIsTooFar) {
+  const Cube cube(8, 0.49);
+  const QuotientGraph graph = quotient_graph(cube.lower, 3);
+  const Aggregates aggregates = aggregate(graph, cube.placement, 16);
+  BlockMatrix matrix(cube.lower, graph, aggregates.order);
+  matrix.set_values(cube.lower.valuePtr());
+  RigidMotionPreconditioner preconditioner(matrix, aggregates, cube.placement);
+  ASSERT_TRUE(preconditioner.update());
+  VectorX b = VectorX::Zero(matrix.padded_size());
+  for (Eigen::Index u = 0; u < cube.load.rows(); ++u) b[matrix.padded()[static_cast<std::size_t>(u)]] = cube.load(u, 0);
+  const auto solve = [&](const Patience& patience, int threads, VectorX& x) {
+    x.setZero(matrix.padded_size());
+    return conjugate_gradients(matrix, aggregates, preconditioner, b, x, 1e-8, patience, threads);
+  };
+  VectorX whole, x;
+  const auto unlimited = solve({}, 1, whole);
+  ASSERT_TRUE(unlimited.converged);
+  const int look = unlimited.iterations / 2;
+  for (const int threads : {1, 2, 3}) {
+    const auto patient = solve({.first_look = look, .worth = 2.0 * look}, threads, x);
+    EXPECT_TRUE(patient.converged);
+    EXPECT_EQ(patient.iterations, unlimited.iterations);
+    EXPECT_EQ(x, whole) << threads;
+    const auto impatient = solve({.first_look = look, .worth = 0.3 * look}, threads, x);
+    EXPECT_FALSE(impatient.converged);
+    EXPECT_FALSE(impatient.negative_curvature);
+    EXPECT_EQ(impatient.iterations, look);
+    EXPECT_NEAR(impatient.steps_left, look, 0.3 * look);
+  }
+  EXPECT_EQ(solve({.max_iterations = 7}, 1, x).iterations, 7);
+}
+
+TEST(LargeArray, IsAlignedAndKeepsWhatItHolds) {
+  for (const std::size_t size : {std::size_t{0}, std::size_t{3}, std::size_t{1} << 20}) {
+    LargeArray<double> array(size);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(array.data()) % 64, 0U);
+    std::fill_n(array.data(), size, 1.0);
+    const LargeArray<double> moved = std::move(array);
+    EXPECT_TRUE(std::all_of(moved.data(), moved.data() + size, [](double value) { return value == 1.0; }));
+  }
+  LargeVector<int> growing;
+  for (int i = 0; i < 3000000; ++i) growing.push_back(i);
+  EXPECT_EQ(growing[2999999], 2999999);
+  EXPECT_EQ(growing[12], 12);
 }
 
 TEST(LinearSolver, IndefiniteMatricesAreSolvedAndCounted) {

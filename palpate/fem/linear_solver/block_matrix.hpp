@@ -9,6 +9,7 @@
 
 #include "palpate/core/math.hpp"
 #include "palpate/fem/linear_solver/elimination_order.hpp"
+#include "palpate/fem/linear_solver/large_array.hpp"
 
 namespace palpate::fem {
 
@@ -46,8 +47,8 @@ class BlockMatrix {
   struct Target {
     std::uint32_t direct, mirrored;  // offsets in values_
   };
-  std::vector<Target> targets_;  // of every entry of the lower triangle
-  std::vector<double> values_;   // column-major blocks, and one number more for the last wide load
+  LargeVector<Target> targets_;  // of every entry of the lower triangle
+  LargeVector<double> values_;   // column-major blocks, and one number more for the last wide load
 };
 
 }  // namespace palpate::fem

@@ -4,9 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <vector>
 
 namespace palpate::fem {
 namespace {
+
+constexpr int kStepsToNextLook = 50;
 
 struct Vectors {
   explicit Vectors(Eigen::Index size, Index aggregates)
@@ -32,7 +35,7 @@ class Member {
         team_(team),
         share_(share_of(team, aggregates.count())) {}
 
-  ConjugateGradientsResult run(double tolerance, int max_iterations) {
+  ConjugateGradientsResult run(double tolerance, const Patience& patience) {
     ConjugateGradientsResult result;
     const double norm_b = std::sqrt(sum([&](Index a) { return rows(b_, a).squaredNorm(); }));
     if (norm_b == 0 || !std::isfinite(norm_b)) {
@@ -41,17 +44,20 @@ class Member {
       return result;
     }
     double best = std::numeric_limits<double>::infinity();
+    norms_.clear();
     while (true) {
       const double residual = true_residual() / norm_b;
+      if (norms_.empty()) norms_.push_back(residual * norm_b);
       result.residual = residual;
       if (residual <= tolerance) {
         result.converged = true;
         return result;
       }
       // A restart that does not at least halve the true residual has met the limit of the arithmetic.
-      if (!(residual < 0.5 * best) || result.iterations >= max_iterations || result.negative_curvature) return result;
+      if (!(residual < 0.5 * best) || result.iterations >= patience.max_iterations) return result;
+      if (result.negative_curvature || impatient_) return result;
       best = residual;
-      iterate(tolerance * norm_b, max_iterations, result);
+      iterate(tolerance * norm_b, patience, result);
     }
   }
 
@@ -93,13 +99,21 @@ class Member {
     }));
   }
 
-  void iterate(double target, int max_iterations, ConjugateGradientsResult& result) {
+  /// Steps that are left when the residual goes on falling as it has over the last half of all steps: the first ones often
+  /// fall hardly at all, and then the fall is steady. Infinity: it does not fall.
+  double steps_left(double target) const {
+    const std::size_t steps = norms_.size() - 1, from = steps / 2;
+    const double fall = std::log(norms_[from] / norms_[steps]) / static_cast<double>(steps - from);
+    return fall > 0 ? std::log(norms_[steps] / target) / fall : std::numeric_limits<double>::infinity();
+  }
+
+  void iterate(double target, const Patience& patience, ConjugateGradientsResult& result) {
     preconditioner_.apply(v_.r.data(), v_.z.data(), team_);
     double r_z = sum([&](Index a) {
       rows(v_.p, a) = rows(v_.z, a);
       return rows(v_.r, a).dot(rows(v_.z, a));
     });
-    while (result.iterations < max_iterations) {
+    while (result.iterations < patience.max_iterations) {
       ++result.iterations;
       const double p_q = sum([&](Index a) {
         multiply(v_.p, v_.q, a);
@@ -115,7 +129,16 @@ class Member {
         rows(v_.r, a) -= step * rows(v_.q, a);
         return rows(v_.r, a).squaredNorm();
       });
-      if (!(std::sqrt(r_r) > target)) return;
+      norms_.push_back(std::sqrt(r_r));
+      if (!(norms_.back() > target)) return;
+      if (result.iterations >= patience.first_look && (result.iterations - patience.first_look) % kStepsToNextLook == 0) {
+        const double left = steps_left(target);
+        impatient_ = left > patience.worth;
+        if (impatient_) {
+          result.steps_left = left;
+          return;
+        }
+      }
       preconditioner_.apply(v_.r.data(), v_.z.data(), team_);
       const double next = sum([&](Index a) { return rows(v_.r, a).dot(rows(v_.z, a)); });
       const double beta = next / r_z;
@@ -133,18 +156,20 @@ class Member {
   Vectors& v_;
   const ThreadTeam& team_;
   Share share_;
+  std::vector<double> norms_;  // of the residual: at the start, after every step
+  bool impatient_ = false;
 };
 
 }  // namespace
 
 ConjugateGradientsResult conjugate_gradients(const BlockMatrix& matrix, const Aggregates& aggregates,
                                              Preconditioner& preconditioner, const VectorX& b, VectorX& x, double tolerance,
-                                             int max_iterations, int threads) {
+                                             const Patience& patience, int threads) {
   Vectors vectors(matrix.padded_size(), aggregates.count());
   ConjugateGradientsResult result;
   run_team(threads, [&](const ThreadTeam& team) {
     const ConjugateGradientsResult mine =
-        Member(matrix, aggregates, preconditioner, b, x, vectors, team).run(tolerance, max_iterations);
+        Member(matrix, aggregates, preconditioner, b, x, vectors, team).run(tolerance, patience);
     if (team.id == 0) result = mine;
   });
   return result;

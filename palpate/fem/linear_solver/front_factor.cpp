@@ -28,29 +28,29 @@ int block_size(int pivots) {
 
 template <class T>
 struct FrontFactor<T>::Workspace {
-  AlignedArray<T> stack[2];
-  AlignedArray<T> strips, panels, diagonal_panels, diagonal_strip;
+  LargeArray<T> stack[2];
+  LargeArray<T> strips, panels, diagonal_panels, diagonal_strip;
 };
 
 template <class T>
 FrontFactor<T>::FrontFactor(std::shared_ptr<const FrontTree> tree, int threads, const DenseKernels<T>& kernels)
     : tree_(std::move(tree)), kernels_(kernels), threads_(tree_->flops < kFlopsWorthThreads ? 1 : std::max(1, threads)) {
   plan(threads_);
-  values_ = AlignedArray<T>(tree_->panel_values);
-  inverse_pivots_ = AlignedArray<T>(at(tree_->size));
-  floor_ = AlignedArray<T>(at(tree_->size));
-  kept_ = AlignedArray<T>(kept_size_);
+  values_ = LargeArray<T>(tree_->panel_values);
+  inverse_pivots_ = LargeArray<T>(at(tree_->size));
+  floor_ = LargeArray<T>(at(tree_->size));
+  kept_ = LargeArray<T>(kept_size_);
   for (int thread = 0; thread < threads_; ++thread) {
     auto workspace = std::make_unique<Workspace>();
     const bool also_top = thread == 0;
     for (const int s : {0, 1}) {
-      workspace->stack[s] = AlignedArray<T>(std::max(task_stack_[s], also_top ? top_stack_[s] : 0));
+      workspace->stack[s] = LargeArray<T>(std::max(task_stack_[s], also_top ? top_stack_[s] : 0));
     }
-    workspace->strips = AlignedArray<T>(std::max(strip_size_[0], also_top ? strip_size_[1] : 0));
-    workspace->panels = AlignedArray<T>(std::max(panel_size_[0], also_top ? panel_size_[1] : 0));
+    workspace->strips = LargeArray<T>(std::max(strip_size_[0], also_top ? strip_size_[1] : 0));
+    workspace->panels = LargeArray<T>(std::max(panel_size_[0], also_top ? panel_size_[1] : 0));
     const int block = round_up(kBlock, kernels_.strip_rows);
-    workspace->diagonal_panels = AlignedArray<T>(at(block) * at(block));
-    workspace->diagonal_strip = AlignedArray<T>(at(block) * at(kernels_.strip_rows));
+    workspace->diagonal_panels = LargeArray<T>(at(block) * at(block));
+    workspace->diagonal_strip = LargeArray<T>(at(block) * at(kernels_.strip_rows));
     workspaces_.push_back(std::move(workspace));
   }
 }
@@ -325,7 +325,7 @@ void FrontFactor<T>::solve(double* columns, Eigen::Index count, Eigen::Index str
   Index tallest = 0;
   for (const auto& front : tree_->fronts) tallest = std::max(tallest, front.height);
   run_team(threads, [&](const ThreadTeam& team) {
-    const AlignedArray<T> x(at(tree_->size) * static_cast<std::size_t>(width)),
+    const LargeArray<T> x(at(tree_->size) * static_cast<std::size_t>(width)),
         work(at(tallest) * static_cast<std::size_t>(width));
     for (Eigen::Index bundle = team.id; bundle < bundles; bundle += team.count) {
       const Eigen::Index first = bundle * width;

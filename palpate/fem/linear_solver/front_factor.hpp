@@ -4,31 +4,15 @@
 
 #include <cstddef>
 #include <memory>
-#include <new>
 #include <vector>
 
 #include "palpate/core/math.hpp"
 #include "palpate/fem/linear_solver/dense_kernels.hpp"
 #include "palpate/fem/linear_solver/front_tree.hpp"
+#include "palpate/fem/linear_solver/large_array.hpp"
 #include "palpate/fem/linear_solver/thread_team.hpp"
 
 namespace palpate::fem {
-
-/// Uninitialised memory at cache line borders.
-template <class T>
-class AlignedArray {
- public:
-  AlignedArray() = default;
-  explicit AlignedArray(std::size_t size) : data_(static_cast<T*>(::operator new(size * sizeof(T) + 64, kAlignment))) {}
-  T* data() const { return data_.get(); }
-
- private:
-  static constexpr std::align_val_t kAlignment{64};
-  struct Free {
-    void operator()(T* p) const { ::operator delete(p, kAlignment); }
-  };
-  std::unique_ptr<T, Free> data_;
-};
 
 /// T is double, or float for a preconditioner of half the size. The arithmetic of a front does not depend on which thread
 /// does it, so every number of threads gives the same bits.
@@ -73,7 +57,7 @@ class FrontFactor {
   std::size_t task_stack_[2] = {0, 0}, top_stack_[2] = {0, 0}, kept_size_ = 0;
   std::size_t strip_size_[2] = {0, 0}, panel_size_[2] = {0, 0};  // packed operands: of tasks, of the top
   int threads_;
-  AlignedArray<T> values_, inverse_pivots_, floor_, kept_;
+  LargeArray<T> values_, inverse_pivots_, floor_, kept_;
   std::vector<std::unique_ptr<Workspace>> workspaces_;
   int negative_ = 0;
 };
