@@ -58,35 +58,34 @@ double relevance(const TermRows& rows, const Loss& loss) {
 
 }  // namespace
 
-VectorX row_weights(const TermRows& rows, const Loss& loss) {
-  VectorX weight = VectorX::Constant(rows.residual.size(), relevance(rows, loss));
-  for (Index i = 0; rows.robust && i < weight.size(); ++i) weight(i) *= tukey_weight(rows.residual(i), loss.tukey);
-  return weight;
-}
-
-double mean_bend(const TermRows& rows, const Loss& loss) {
-  if (!rows.robust) return 1;
-  double slopes = 0, weights = 0;
-  for (Index i = 0; i < rows.residual.size(); ++i) {
-    slopes += tukey_slope(rows.residual(i), loss.tukey);
-    weights += tukey_weight(rows.residual(i), loss.tukey);
+WeighedRows weigh(const TermRows& rows, const Loss& loss) {
+  const double each = relevance(rows, loss);
+  WeighedRows out;
+  if (!rows.robust) {
+    out.weight = VectorX::Constant(rows.residual.size(), each);
+    out.cost = 0.5 * each * rows.residual.squaredNorm();
+    return out;
   }
+  out.weight.resize(rows.residual.size());
+  const double per_cut2 = 1 / (loss.tukey * loss.tukey);
+  double saved = 0, slopes = 0, weights = 0;  // of what an outlier costs
+  for (Index i = 0; i < rows.residual.size(); ++i) {
+    const double r = rows.residual(i), ratio2 = r * r * per_cut2;
+    const double t2 = ratio2 < 1 ? ratio2 : 1, keep = 1 - t2;
+    saved += keep * keep * keep;
+    slopes += keep * (1 - 5 * t2);
+    weights += keep * keep;
+    out.weight(i) = each * keep * keep;
+  }
+  out.cost = each * loss.tukey * loss.tukey / 6 * (static_cast<double>(rows.residual.size()) - saved);
   constexpr double least = 0.3;  // where most rows are outliers the loss bends the other way: no step leads there
-  return weights > 0 ? std::max(slopes / weights, least) : 1;
-}
-
-double loss_of(const TermRows& rows, const Loss& loss) {
-  double sum = 0;
-  for (Index i = 0; i < rows.residual.size(); ++i)
-    sum += rows.robust ? tukey_rho(rows.residual(i), loss.tukey) : 0.5 * rows.residual(i) * rows.residual(i);
-  return relevance(rows, loss) * sum;
+  if (weights > 0) out.bend = std::max(slopes / weights, least);
+  return out;
 }
 
 void add_rows(const TermRows& rows, const Loss& loss, const std::vector<int>& places, Evaluation& out) {
-  const double cost = loss_of(rows, loss);
+  const auto [weight, cost, bend] = weigh(rows, loss);
   (rows.robust ? out.robust_cost : out.cost) += cost;
-  const double bend = mean_bend(rows, loss);
-  const VectorX weight = row_weights(rows, loss);
   const VectorX finite = (weight.array() == 0).select(0, rows.residual);
   const MatrixX weighted = weight.asDiagonal() * rows.jacobian;
   const MatrixX block = rows.jacobian.transpose() * weighted;

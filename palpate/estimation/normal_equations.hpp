@@ -60,12 +60,14 @@ double tukey_slope(double residual, double cut);  ///< second derivative of rho
 /// under clean Gaussian data: E[psi']^2 / (E[psi^2] E[w]) (Huber and Ronchetti, Robust Statistics, eq. 6.5).
 double tukey_information_factor(double cut);
 
-/// Squares of these rows count so often; nothing but outliers that weigh nothing may have a residual that is not finite.
-VectorX row_weights(const TermRows& rows, const Loss& loss);
-/// Curvature of the loss over the weights, on average over the rows: below one where Tukey's loss bends less than its weights say.
-double mean_bend(const TermRows& rows, const Loss& loss);
-/// Sum of rho.
-double loss_of(const TermRows& rows, const Loss& loss);
+/// What the loss makes of some rows.
+struct WeighedRows {
+  VectorX weight;   ///< a row: how often its square counts; nothing but outliers that weigh nothing may have a residual that is not finite
+  double cost = 0;  ///< sum of rho
+  /// Curvature of the loss over the weights, on average over the rows: below one where Tukey's loss bends less than its weights say.
+  double bend = 1;
+};
+WeighedRows weigh(const TermRows& rows, const Loss& loss);
 /// Adds what some rows say. Robust rows' cost goes to `robust_cost` only. @param places  where their unknowns are in `out`
 void add_rows(const TermRows& rows, const Loss& loss, const std::vector<int>& places, Evaluation& out);
 

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/cell_sums.hpp"
 
 namespace palpate::estimation {
 
@@ -183,7 +184,7 @@ ResidualSummary Objective::summarise(const Loss& loss) const {
     for (std::size_t t = 0; t < rows_[s].size(); ++t) {
       const TermRows& rows = rows_[s][t];
       const bool chosen = choice != nullptr && t < choice->size() && (*choice)[t].size() == static_cast<std::size_t>(rows.residual.size());
-      std::map<int, std::pair<double, std::size_t>> cell_sums;
+      CellSums cell_sums(rows.cell);
       for (Index i = 0; i < rows.residual.size(); ++i) {
         const double r = rows.residual(i);
         if (chosen && (*choice)[t][static_cast<std::size_t>(i)] == grazes) continue;
@@ -202,17 +203,15 @@ ResidualSummary Objective::summarise(const Loss& loss) const {
           ++summary.lengths;
         }
         if (!rows.cell.empty() && inside) {
-          auto& [sum, n] = cell_sums[rows.cell[static_cast<std::size_t>(i)]];
-          sum += r;
-          ++n;
+          cell_sums.add(rows.cell[static_cast<std::size_t>(i)], r);
           total += r * r;
           ++in_cells;
         }
       }
-      for (const auto& [cell, sums] : cell_sums) {
-        between += sums.first * sums.first / static_cast<double>(sums.second);
+      cell_sums.for_each([&](const CellSums::Cell& cell) {
+        between += cell.sum * cell.sum / cell.count;
         ++cells;
-      }
+      });
     }
   }
   if (cells > 0 && total > 0) {

@@ -40,6 +40,9 @@ class Objective {
   /// Normal equations of rows that were made before, at the unknowns that they were made at. No step is solved.
   Evaluation assemble(const std::vector<std::vector<TermRows>>& rows, const VectorX& unknowns, const Loss& loss) const;
 
+  /// What one step said in the last evaluation, priors included.
+  Evaluation of_step(std::size_t s, const VectorX& unknowns, const Loss& loss) const;
+
   /// Rows of step s for a prediction that was made elsewhere.
   std::vector<TermRows> rows_of(std::size_t s, const StepPrediction& predicted, const VectorX& unknowns, const Loss& loss,
                                 bool surface_slopes = false) const;

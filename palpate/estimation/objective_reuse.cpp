@@ -77,7 +77,7 @@ Objective::Anchor Objective::anchor_of(const std::vector<TermRows>& rows, const 
   anchor.loss = loss;
   anchor.terms.resize(rows.size());
   for (std::size_t t = 0; t < rows.size(); ++t)
-    if (!rows[t].surface.empty()) anchor.terms[t].emplace(*pattern_, rows[t], loss, there, unknowns);
+    if (rows[t].facets || !rows[t].surface.empty()) anchor.terms[t].emplace(*pattern_, rows[t], loss, there, unknowns);
   return anchor;
 }
 
@@ -197,6 +197,15 @@ Evaluation Objective::sum(const std::vector<StepNormal>& steps, const VectorX& u
   }
   add_priors(unknowns, out);
   return out;
+}
+
+Evaluation Objective::of_step(std::size_t s, const VectorX& unknowns, const Loss& loss) const {
+  if (s < anchors_.size() && anchors_[s].last.size() == unknowns.size()) return sum({anchors_[s].said}, unknowns);
+  Loss one = loss;
+  one.every = 1;
+  one.steps.assign(model_.step_count(), 0);
+  one.steps[s] = 1;
+  return assemble(rows_, unknowns, one);
 }
 
 Objective::Kept Objective::take_kept() {

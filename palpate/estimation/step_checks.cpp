@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/estimation/cell_sums.hpp"
 #include "palpate/estimation/cross_check.hpp"
 
 namespace palpate::estimation {
@@ -28,11 +29,7 @@ struct Asked {
 };
 std::optional<Asked> asked_by(const Objective& objective, const Optimum& optimum, std::size_t s, const std::vector<int>& about, double factor) {
   const Unknowns& unknowns = objective.unknowns();
-  Loss one = optimum.loss;
-  one.every = 1;
-  one.steps.assign(objective.model().step_count(), 0);
-  one.steps[s] = 1;
-  const Evaluation evaluation = objective.assemble(objective.last_rows(), optimum.unknowns, one);
+  const Evaluation evaluation = objective.of_step(s, optimum.unknowns, optimum.loss);
   MatrixX hessian = evaluation.information(factor);
   VectorX gradient = evaluation.gradient;
   for (int k : about) {  // the data alone
@@ -177,18 +174,18 @@ Pattern residual_pattern(const Objective& objective, const Loss& loss) {
   for (const auto& step : objective.last_rows()) {
     for (const TermRows& rows : step) {
       if (rows.cell.empty()) continue;
-      std::map<int, std::pair<double, double>> sums;
+      CellSums sums(rows.cell);
       for (Index i = 0; i < rows.residual.size(); ++i) {
         const double r = rows.residual(i);
         if (!(std::abs(r) < loss.tukey)) continue;
-        auto& [sum, n] = sums[rows.cell[static_cast<std::size_t>(i)]];
-        sum += r;
-        ++n;
+        sums.add(rows.cell[static_cast<std::size_t>(i)], r);
         total += r * r;
         ++count;
       }
-      for (const auto& [cell, sum] : sums) between += sum.first * sum.first / sum.second;
-      cells += static_cast<double>(sums.size());
+      sums.for_each([&](const CellSums::Cell& cell) {
+        between += cell.sum * cell.sum / cell.count;
+        ++cells;
+      });
     }
   }
   Pattern out;

@@ -20,64 +20,67 @@ SurfacePattern::SurfacePattern(const TriMesh& surface)
   }
 }
 
-namespace {
-
-/// Rows that count, those of a triangle one after another.
-std::vector<Index> rows_by_triangle(const TermRows& rows, const VectorX& weight, Index triangles) {
-  std::vector<std::size_t> first(static_cast<std::size_t>(triangles) + 1, 0);
-  const auto counts = [&](Index i) { return weight(i) != 0 && rows.surface[static_cast<std::size_t>(i)].triangle >= 0; };
-  for (Index i = 0; i < weight.size(); ++i)
-    if (counts(i)) ++first[static_cast<std::size_t>(rows.surface[static_cast<std::size_t>(i)].triangle) + 1];
-  for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
-  std::vector<Index> order(first.back());
-  for (Index i = 0; i < weight.size(); ++i)
-    if (counts(i)) order[first[static_cast<std::size_t>(rows.surface[static_cast<std::size_t>(i)].triangle)]++] = i;
-  return order;
-}
-
-}  // namespace
-
-struct SurfaceQuadratic::RowsByTriangle {
+struct SurfaceQuadratic::Seen {
   const SurfacePattern& pattern;
   const TermRows& rows;
   const VectorX& weight;
-  Index own_first, own_count;        ///< columns of the jacobian
-  const std::vector<Index>&vertex, &edge;  ///< the pattern's among those seen
-  std::vector<Index> order;
+  Index own_first, own_count;       ///< columns of the jacobian
+  std::vector<Index> vertex, edge;  ///< the pattern's among those seen
+
+  Index triangle_of(Index row) const {
+    const auto i = static_cast<std::size_t>(row);
+    return rows.facets ? rows.facets->triangle[i] : rows.surface[i].triangle;
+  }
+  bool counts(Index row) const { return weight(row) != 0 && triangle_of(row) >= 0; }
+
+  /// Rows that count, those of a triangle one after another.
+  std::vector<Index> rows_by_triangle() const {
+    std::vector<std::size_t> first(static_cast<std::size_t>(pattern.triangles.rows()) + 1, 0);
+    for (Index i = 0; i < weight.size(); ++i)
+      if (counts(i)) ++first[static_cast<std::size_t>(triangle_of(i)) + 1];
+    for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
+    std::vector<Index> order(first.back());
+    for (Index i = 0; i < weight.size(); ++i)
+      if (counts(i)) order[first[static_cast<std::size_t>(triangle_of(i))]++] = i;
+    return order;
+  }
 };
 
 SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows& rows, const Loss& loss,
                                    const StepPrediction& there, const VectorX& unknowns)
-    : robust_(rows.robust), cost_(loss_of(rows, loss)), bend_(mean_bend(rows, loss)) {
+    : robust_(rows.robust) {
+  const WeighedRows weighed = weigh(rows, loss);
+  cost_ = weighed.cost;
+  bend_ = weighed.bend;
   const Index first = static_cast<Index>(there.columns.size());
   own_.assign(rows.unknowns.begin() + first, rows.unknowns.end());
   const Index count = static_cast<Index>(own_.size());
-  own_at_ = unknowns(own_);
   span_ = there.in_span;
   if (span_) span_->d_at.resize(0, 0);
   radius_m_ = 0.5 * (there.surface_m.colwise().maxCoeff() - there.surface_m.colwise().minCoeff()).norm();
 
-  const VectorX weight = row_weights(rows, loss);
   constexpr Index unseen = -1;
-  std::vector<Index> vertex(static_cast<std::size_t>(pattern.vertices), unseen), edge(pattern.edges.size(), unseen);
-  for (Index i = 0; i < weight.size(); ++i) {
-    const Index triangle = rows.surface[static_cast<std::size_t>(i)].triangle;
-    if (weight(i) == 0 || triangle < 0) continue;
+  Seen seen{pattern, rows, weighed.weight, first, count, {}, {}};
+  seen.vertex.assign(static_cast<std::size_t>(pattern.vertices), unseen);
+  seen.edge.assign(pattern.edges.size(), unseen);
+  for (Index i = 0; i < weighed.weight.size(); ++i) {
+    if (!seen.counts(i)) continue;
+    const Index triangle = seen.triangle_of(i);
     for (int k = 0; k < 3; ++k) {
-      vertex[static_cast<std::size_t>(pattern.triangles(triangle, k))] = 0;
-      edge[pattern.edges_of[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)]] = 0;
+      seen.vertex[static_cast<std::size_t>(pattern.triangles(triangle, k))] = 0;
+      seen.edge[pattern.edges_of[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)]] = 0;
     }
   }
-  for (std::size_t v = 0; v < vertex.size(); ++v) {
-    if (vertex[v] == unseen) continue;
-    vertex[v] = static_cast<Index>(seen_.size());
+  for (std::size_t v = 0; v < seen.vertex.size(); ++v) {
+    if (seen.vertex[v] == unseen) continue;
+    seen.vertex[v] = static_cast<Index>(seen_.size());
     seen_.push_back(static_cast<Index>(v));
   }
-  for (std::size_t e = 0; e < edge.size(); ++e) {
-    if (edge[e] == unseen) continue;
-    edge[e] = static_cast<Index>(edges_.size());
+  for (std::size_t e = 0; e < seen.edge.size(); ++e) {
+    if (seen.edge[e] == unseen) continue;
+    seen.edge[e] = static_cast<Index>(edges_.size());
     const auto [low, high] = pattern.edges[e];
-    edges_.push_back({vertex[static_cast<std::size_t>(low)], vertex[static_cast<std::size_t>(high)]});
+    edges_.push_back({seen.vertex[static_cast<std::size_t>(low)], seen.vertex[static_cast<std::size_t>(high)]});
   }
   const Index size = static_cast<Index>(seen_.size());
   seen_m_ = there.markers_m()(seen_, Eigen::all);
@@ -88,30 +91,100 @@ SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows
   own_block_ = MatrixX::Zero(count, count);
   surface_slope_ = VectorX::Zero(3 * size);
   own_slope_ = VectorX::Zero(count);
-  const RowsByTriangle seen{pattern, rows, weight, first, count, vertex, edge, rows_by_triangle(rows, weight, pattern.triangles.rows())};
   constexpr int narrow = 16, wide = 24;  // whole vector registers: three corners, own unknowns, residual
-  if (10 + count <= narrow) {
+  if (rows.facets) {
+    gather_facets(seen);
+    if (there.field != nullptr) append_modes(there);
+  } else if (10 + count <= narrow) {
     gather<narrow>(seen);
   } else if (10 + count <= wide) {
     gather<wide>(seen);
   } else {
     gather<Eigen::Dynamic>(seen);
   }
+  own_at_ = unknowns(own_);
+}
+
+void SurfaceQuadratic::gather_facets(const Seen& seen) {
+  const FacetSlopes& facets = *seen.rows.facets;
+  constexpr Index shares = FacetSlopes::shares;
+  struct Sum {
+    Eigen::Matrix<double, shares, shares> block = Eigen::Matrix<double, shares, shares>::Zero();
+    Eigen::Matrix<double, shares, 1> slope = Eigen::Matrix<double, shares, 1>::Zero();
+    bool any = false;
+  };
+  std::vector<Sum> sums(static_cast<std::size_t>(seen.pattern.triangles.rows()));
+  for (Index i = 0; i < seen.weight.size(); ++i) {
+    if (!seen.counts(i)) continue;
+    Sum& sum = sums[static_cast<std::size_t>(seen.triangle_of(i))];
+    const Eigen::Matrix<double, shares, 1> share = facets.share.row(i), weighed = seen.weight(i) * share;
+    sum.block.noalias() += weighed * share.transpose();
+    sum.slope += seen.rows.residual(i) * weighed;
+    sum.any = true;
+  }
+  RowMajor bent(shares, seen.own_count);
+  for (Index triangle = 0; triangle < seen.pattern.triangles.rows(); ++triangle) {
+    const Sum& sum = sums[static_cast<std::size_t>(triangle)];
+    if (!sum.any) continue;
+    const Vec3 normal = facets.normal.row(triangle);
+    const Mat3 outer = normal * normal.transpose();
+    const auto own = facets.own.middleRows<shares>(shares * triangle);
+    bent = sum.block.lazyProduct(own);
+    for (Index k = 0; k < 3; ++k) {
+      const Index at = seen.vertex[static_cast<std::size_t>(seen.pattern.triangles(triangle, k))];
+      const std::size_t edge = seen.pattern.edges_of[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)];
+      vertex_blocks_[static_cast<std::size_t>(at)] += sum.block(k, k) * outer;
+      edge_blocks_[static_cast<std::size_t>(seen.edge[edge])] += sum.block(k, (k + 1) % 3) * outer;
+      cross_.middleRows<3>(3 * at) -= normal.lazyProduct(bent.row(k));
+      surface_slope_.segment<3>(3 * at) -= sum.slope(k) * normal;
+    }
+    own_block_ += own.transpose().lazyProduct(bent);
+    own_slope_ += own.transpose().lazyProduct(sum.slope);
+  }
+}
+
+/// The rest surface's error moves every vertex along its normal: what the form says of vertices it says of the error's modes.
+void SurfaceQuadratic::append_modes(const StepPrediction& there) {
+  const MatrixX basis = there.field->basis()(seen_, Eigen::all);
+  const Points normals = there.field_directions(seen_, Eigen::all);
+  const Index size = static_cast<Index>(seen_.size()), modes = static_cast<Index>(basis.cols()), own = static_cast<Index>(own_.size());
+  const auto along = [&](const RowMajor& of_vertices) {
+    MatrixX out(size, of_vertices.cols());
+    for (Index v = 0; v < size; ++v) out.row(v) = normals.row(v) * of_vertices.middleRows<3>(3 * v);
+    return out;
+  };
+  RowMajor moves(3 * size, modes);
+  for (Index v = 0; v < size; ++v) moves.middleRows<3>(3 * v) = normals.row(v).transpose() * basis.row(v);
+  const RowMajor turned = times_blocks(moves);
+  MatrixX block(own + modes, own + modes);
+  block.topLeftCorner(own, own) = own_block_;
+  block.topRightCorner(own, modes) = along(cross_).transpose() * basis;
+  block.bottomLeftCorner(modes, own) = block.topRightCorner(own, modes).transpose();
+  block.bottomRightCorner(modes, modes) = basis.transpose() * along(turned);
+  own_block_ = std::move(block);
+  VectorX slope(own + modes);
+  slope << own_slope_, basis.transpose() * along(surface_slope_);
+  own_slope_ = std::move(slope);
+  RowMajor cross(3 * size, own + modes);
+  cross << cross_, turned;
+  cross_ = std::move(cross);
+  for (Index k = 0; k < modes; ++k) own_.push_back(there.field_unknown + static_cast<int>(k));
 }
 
 template <int width>
-void SurfaceQuadratic::gather(const RowsByTriangle& seen) {
+void SurfaceQuadratic::gather(const Seen& seen) {
   using Square = Eigen::Matrix<double, width, width>;
   using Row = Eigen::Matrix<double, width, 1>;
   const Index count = seen.own_count, size = width == Eigen::Dynamic ? 10 + count : width;
   Square gram(size, size);
   Row row = Row::Zero(size);
-  for (std::size_t from = 0; from < seen.order.size();) {
-    const Index triangle = seen.rows.surface[static_cast<std::size_t>(seen.order[from])].triangle;
+  const std::vector<Index> order = seen.rows_by_triangle();
+  for (std::size_t from = 0; from < order.size();) {
+    const Index triangle = seen.triangle_of(order[from]);
     gram.setZero();
     std::size_t to = from;
-    for (; to < seen.order.size(); ++to) {
-      const Index i = seen.order[to];
+    for (; to < order.size(); ++to) {
+      const Index i = order[to];
       const SurfaceSlope& slope = seen.rows.surface[static_cast<std::size_t>(i)];
       if (slope.triangle != triangle) break;
       for (int k = 0; k < 3; ++k) row.template segment<3>(3 * k) = slope.per_corner.col(k);

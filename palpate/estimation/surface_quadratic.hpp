@@ -48,9 +48,11 @@ class SurfaceQuadratic {
 
  private:
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  struct RowsByTriangle;
+  struct Seen;
   template <int width>
-  void gather(const RowsByTriangle& seen);
+  void gather(const Seen& seen);
+  void gather_facets(const Seen& seen);
+  void append_modes(const StepPrediction& there);
   /// Columns `from` to `from + width` of the blocks times `columns`; beyond the last one they count as zero.
   template <int width>
   void multiply(const RowMajor& columns, Index from, RowMajor& out) const;

@@ -10,6 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/bvh.hpp"
 #include "palpate/geometry/closest_search.hpp"
+#include "palpate/geometry/watertight_ray.hpp"
 #include "palpate/geometry/wide_bvh.hpp"
 
 namespace palpate::geometry {
@@ -17,21 +18,12 @@ namespace {
 
 constexpr int leaf_size = 4;
 
-/// Ray prepared for the slab test and for the watertight triangle test (Woop, Benthin, Wald 2013): the ray becomes the
-/// z axis of a sheared frame, and a point on a shared edge belongs to both triangles, so that no ray slips between.
+/// Ray prepared for the slab test and for triangles.
 struct Ray {
   Vec3 origin, inverse;
-  int kx = 0, ky = 1, kz = 2;
-  double sx = 0, sy = 0, sz = 1;
+  WatertightRay watertight;
 
-  Ray(const Vec3& o, const Vec3& d) : origin(o), inverse(d.cwiseInverse()) {
-    d.cwiseAbs().maxCoeff(&kz);
-    kx = (kz + 1) % 3;
-    ky = (kx + 1) % 3;
-    sx = d[kx] / d[kz];
-    sy = d[ky] / d[kz];
-    sz = 1 / d[kz];
-  }
+  Ray(const Vec3& o, const Vec3& d) : origin(o), inverse(d.cwiseInverse()), watertight(d) {}
 
   /// Entry into the box, or infinity. Comparisons are written so that 0 * inf (a ray within a face of the box) counts as in.
   double enter(const Box& b, double max_range) const {
@@ -48,18 +40,7 @@ struct Ray {
 
   bool hit(const Vec3& a, const Vec3& b, const Vec3& c, double max_range, RayHit& out) const {
     const Vec3 A = a - origin, B = b - origin, C = c - origin;
-    const double ax = A[kx] - sx * A[kz], ay = A[ky] - sy * A[kz];
-    const double bx = B[kx] - sx * B[kz], by = B[ky] - sy * B[kz];
-    const double cx = C[kx] - sx * C[kz], cy = C[ky] - sy * C[kz];
-    const double u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
-    if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0)) return false;
-    const double det = u + v + w;
-    if (det == 0) return false;
-    const double t = (u * sz * A[kz] + v * sz * B[kz] + w * sz * C[kz]) / det;
-    if (!(t >= 0 && t < max_range)) return false;
-    out.barycentric = Vec3(u, v, w) / det;
-    out.range_m = t;
-    return true;
+    return watertight.hit(A.data(), B.data(), C.data(), max_range, out);
   }
 };
 

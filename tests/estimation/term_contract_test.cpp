@@ -55,6 +55,19 @@ TermInput rays(const Scene& scene) {
   return observation;
 }
 
+/// Seen by two cameras at once, as one cloud of rays.
+TermInput rays_of_two_eyes(const Scene& scene) {
+  RayObservation observation = std::get<RayObservation>(rays(scene));
+  RayCloud& r = observation.rays;
+  for (Index i = 1; i < r.range_m.size(); i += 2) {
+    const Vec3 point = r.origins_m.row(i) + r.range_m(i) * r.directions.row(i), eye(0.15, -0.18, 0.37);
+    r.origins_m.row(i) = eye.transpose();
+    r.range_m(i) = (point - eye).norm();
+    r.directions.row(i) = (point - eye).normalized().transpose();
+  }
+  return observation;
+}
+
 /// Four times the usual light spread in the lens, of a picture that ends half a metre behind the object.
 TermInput rays_in_scattered_light(const Scene& scene) {
   RayObservation observation = std::get<RayObservation>(rays(scene));
@@ -133,6 +146,7 @@ const std::vector<Case> cases{
     {"rays_tip", rays, 0, true},
     {"rays_as_points_tip", rays, 0, false},
     {"rays_plate", rays, 2, true},
+    {"rays_of_two_eyes_tip", rays_of_two_eyes, 0, true},
     {"rays_of_a_camera_tip", rays_of_a_camera, 0, true},
     {"rays_of_a_camera_as_points_plate", rays_of_a_camera, 2, false},
     {"rays_in_scattered_light_tip", rays_in_scattered_light, 0, true},
@@ -232,7 +246,8 @@ TEST_P(TermContract, ItsRowsAsAQuadraticOfTheSurfaceSayTheSame) {
   const VectorX at = away_from_rest(unknowns);
   const StepPrediction predicted = model.predict(test.step, at);
   const TermRows rows = term->rows(predicted, at, {test.along_rays, nullptr, true});
-  ASSERT_EQ(rows.surface.size(), sees_surface ? static_cast<std::size_t>(rows.residual.size()) : 0u);
+  const std::size_t said = rows.facets ? rows.facets->triangle.size() : rows.surface.size();
+  ASSERT_EQ(said, sees_surface ? static_cast<std::size_t>(rows.residual.size()) : 0u);
   if (!sees_surface) return;
 
   const Loss loss;

@@ -9,7 +9,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
-#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/geometry/perspective_grid.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -36,13 +36,16 @@ class RayTerm : public Term {
         rest_(rest_tree_->mesh()),
         hints_(static_cast<std::size_t>(rays_.range_m.size()), -1) {
     centre_m_ = rest_.vertices_m.colwise().mean();
-    for (Index i = 0; i < rays_.range_m.size(); ++i) pivot_m_ += point(i) / static_cast<double>(rays_.range_m.size());
+    pivot_m_ = (rays_.origins_m.colwise().sum().transpose() + rays_.directions.transpose() * rays_.range_m) /
+               static_cast<double>(rays_.range_m.size());
     typical_ = rays_.sigma_m.mean();
+    one_eye_ = (rays_.origins_m.rowwise() - rays_.origins_m.row(0)).isZero(0);
   }
 
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const override {
-    geometry::TriangleTree& tree = tree_at(predicted.surface_m);
-    const RigidMap frame = frame_pose(unknowns, pose_, pivot_m_), camera = camera_pose(unknowns);
+    if (view.along_rays && view.surface_slopes && scatter_ < 0) return facet_rows(predicted, unknowns, view);
+    Sight sight = look(predicted.surface_m, unknowns, view.along_rays);
+    const RigidMap &frame = sight.frame, &camera = sight.camera;
     const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
     const Index count = static_cast<Index>(predicted.columns.size());
     const Index pose_column = count;
@@ -50,30 +53,20 @@ class RayTerm : public Term {
     const Index bias_column = camera_column + (camera_ >= 0 ? 6 : 0);
     const Index scatter_column = bias_column + (bias_ >= 0 ? 1 : 0);
     const double share = scatter_ >= 0 ? unknowns(scatter_) : 0;
-    TermRows rows;
-    rows.unknowns = predicted.columns;
-    for (int unknown : own_unknowns()) rows.unknowns.push_back(unknown);
+    TermRows rows = blank_rows(predicted, view);
     const FieldColumns field(predicted);
     field.append_unknowns(rows.unknowns);
     rows.jacobian = MatrixX::Zero(rays_.range_m.size(), static_cast<Index>(rows.unknowns.size()));
-    rows.residual.resize(rays_.range_m.size());
-    rows.sigma = rays_.sigma_m;
-    rows.observed_m.resize(rays_.range_m.size(), 3);
-    if (view.along_rays) rows.facing = VectorX::Zero(rays_.range_m.size());
-    rows.robust = true;
-    rows.unit = "m";
-    rows.cell.resize(static_cast<std::size_t>(rays_.range_m.size()));
     if (view.surface_slopes) rows.surface.resize(static_cast<std::size_t>(rays_.range_m.size()));
 
     const MatrixX slopes = predicted.d_surface.transpose();  // a vertex's in one place
     const MatrixX material_slopes = share != 0 ? MatrixX(predicted.d_markers().transpose()) : MatrixX();
     VectorX slope(count);
     for (Index i = 0; i < rays_.range_m.size(); ++i) {
-      rows.cell[static_cast<std::size_t>(i)] = cell(i);
       // The measured point, with the sensor's common offset taken out, where the corrected camera pose puts it.
       const Vec3 measured = point(i) - bias_m * Vec3(rays_.directions.row(i));
       const Vec3 observed = frame.apply(camera.apply(measured));
-      const Vec3 direction = frame.rotation() * (camera.rotation() * rays_.directions.row(i).transpose());
+      const Vec3 direction = sight.rotation * rays_.directions.row(i).transpose();
       rows.observed_m.row(i) = observed;
 
       Index triangle = -1;
@@ -81,17 +74,15 @@ class RayTerm : public Term {
       double residual_m = 0;
       std::optional<Scattered> scattered;
       Vec3 lever = measured;  // where the frame's pose acts: the hit, for a ray
-      Index& hint = hints_[static_cast<std::size_t>(i)];
       const bool chosen = view.chosen != nullptr && (*view.chosen)[static_cast<std::size_t>(i)] == counts_in;
       if (view.chosen != nullptr && !chosen) {
         rows.residual(i) = std::numeric_limits<double>::infinity();
         continue;
       }
       if (view.along_rays) {
-        const Vec3 origin_m = frame.apply(camera.apply(rays_.origins_m.row(i)));
+        const Vec3 origin_m = sight.place(rays_.origins_m.row(i));
         double range_m = 0;  // at which the ray meets the surface
-        if (const auto hit = tree.cast(origin_m, direction, endless, hint)) {
-          hint = hit->triangle;
+        if (const auto hit = cast(sight, predicted.surface_m, i, origin_m, direction)) {
           const Vec3 normal = face_normal(predicted.surface_m, hit->triangle);
           const double cosine = normal.dot(direction);
           rows.facing(i) = std::abs(cosine) / least_cosine_;
@@ -102,7 +93,7 @@ class RayTerm : public Term {
             range_m = hit->range_m;
           }
         } else if (chosen && !view.surface_slopes) {  // nearest points jump from edge to edge: no quadratic form holds them
-          if (const auto beside = beside_outline(tree, origin_m, direction, observed, rays_.sigma_m(i))) {
+          if (const auto beside = beside_outline(tree_of(sight, predicted.surface_m), origin_m, direction, observed, rays_.sigma_m(i))) {
             triangle = beside->triangle;
             barycentric = beside->barycentric;
             gradient = across_edge(predicted.surface_m, *beside, direction);
@@ -118,7 +109,8 @@ class RayTerm : public Term {
           }
         }
       } else {
-        const auto hit = tree.closest(observed, hint);
+        Index& hint = hints_[static_cast<std::size_t>(i)];
+        const auto hit = tree_of(sight, predicted.surface_m).closest(observed, hint);
         triangle = hint = hit.triangle;
         barycentric = hit.barycentric;
         const Vec3 apart = observed - hit.point_m;
@@ -187,16 +179,112 @@ class RayTerm : public Term {
     }
     return RigidMap(offset);
   }
-  geometry::TriangleTree& tree_at(const Points& surface_m) const {
-    if (!tree_) tree_.emplace(*rest_tree_);
-    tree_->refit(surface_m);
-    return *tree_;
+  /// Where the rays of one evaluation come from, and the surface before them.
+  struct Sight {
+    RigidMap frame, camera;
+    Mat3 rotation;
+    std::optional<geometry::PerspectiveGrid> grid = {};  ///< nothing: the tree is asked
+    const geometry::TriangleTree* tree = nullptr;        ///< once somebody asked
+    Vec3 place(const Vec3& seen_m) const { return frame.apply(camera.apply(seen_m)); }
+  };
+  Sight look(const Points& surface_m, const VectorX& unknowns, bool along_rays) const {
+    Sight out{frame_pose(unknowns, pose_, pivot_m_), camera_pose(unknowns), {}};
+    out.rotation = out.frame.rotation() * out.camera.rotation();
+    if (!along_rays || !one_eye_) return out;
+    out.grid.emplace(surface_m, rest_.triangles, out.place(rays_.origins_m.row(0)));
+    if (!out.grid->in_view()) out.grid.reset();
+    return out;
+  }
+  const geometry::TriangleTree& tree_of(Sight& sight, const Points& surface_m) const {
+    if (sight.tree == nullptr) {
+      if (!tree_) tree_.emplace(*rest_tree_);
+      tree_->refit(surface_m);
+      sight.tree = &*tree_;
+    }
+    return *sight.tree;
+  }
+  std::optional<geometry::RayHit> cast(Sight& sight, const Points& surface_m, Index i, const Vec3& origin_m, const Vec3& direction) const {
+    if (sight.grid) return sight.grid->cast(direction);
+    Index& hint = hints_[static_cast<std::size_t>(i)];
+    const auto hit = tree_of(sight, surface_m).cast(origin_m, direction, endless, hint);
+    if (hit) hint = hit->triangle;
+    return hit;
+  }
+  TermRows blank_rows(const StepPrediction& predicted, const TermView& view) const {
+    const Index count = static_cast<Index>(rays_.range_m.size());
+    if (cell_.empty())
+      for (Index i = 0; i < count; ++i) cell_.push_back(cell(i));
+    TermRows rows;
+    rows.unknowns = predicted.columns;
+    for (int unknown : own_unknowns()) rows.unknowns.push_back(unknown);
+    rows.residual.resize(count);
+    rows.sigma = rays_.sigma_m;
+    rows.observed_m.resize(count, 3);
+    if (view.along_rays) rows.facing = VectorX::Zero(count);
+    rows.robust = true;
+    rows.unit = "m";
+    rows.cell = cell_;
+    return rows;
+  }
+  /// Rows by triangle: within one the gradient has one direction, and what moves the rays moves them as its corners.
+  TermRows facet_rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const {
+    Sight sight = look(predicted.surface_m, unknowns, true);
+    const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
+    const Index count = static_cast<Index>(rays_.range_m.size()), triangles = static_cast<Index>(rest_.triangles.rows());
+    TermRows rows = blank_rows(predicted, view);
+    FacetSlopes& facets = rows.facets.emplace();
+    facets.triangle.assign(static_cast<std::size_t>(count), -1);
+    facets.share.setZero(count, FacetSlopes::shares);
+    facets.normal.resize(triangles, 3);
+    facets.own.setZero(triangles * FacetSlopes::shares, static_cast<Index>(own_unknowns().size()));
+    std::vector<char> met(static_cast<std::size_t>(triangles), 0);
+    const Vec3 eye_m = sight.place(rays_.origins_m.row(0));
+    for (Index i = 0; i < count; ++i) {
+      const Vec3 origin_m = one_eye_ ? eye_m : sight.place(rays_.origins_m.row(i));
+      const Vec3 direction = sight.rotation * rays_.directions.row(i).transpose();
+      const double measured_m = rays_.range_m(i) - bias_m;
+      rows.observed_m.row(i) = (origin_m + measured_m * direction).transpose();
+      rows.residual(i) = std::numeric_limits<double>::infinity();
+      const bool chosen = view.chosen != nullptr && (*view.chosen)[static_cast<std::size_t>(i)] == counts_in;
+      if (view.chosen != nullptr && !chosen) continue;
+      const auto hit = cast(sight, predicted.surface_m, i, origin_m, direction);
+      if (!hit) continue;  // the ray passes the object by; nearest points jump from edge to edge: no quadratic form holds them
+      if (!met[static_cast<std::size_t>(hit->triangle)]) {
+        met[static_cast<std::size_t>(hit->triangle)] = 1;
+        add_facet(predicted.surface_m, hit->triangle, sight, facets);
+      }
+      const double cosine = facets.normal.row(hit->triangle).dot(direction);
+      rows.facing(i) = std::abs(cosine) / least_cosine_;
+      if (!chosen && !(rows.facing(i) > 1)) continue;
+      const double along = 1 / (std::copysign(std::max(std::abs(cosine), steepest_cosine), cosine) * rays_.sigma_m(i));
+      facets.triangle[static_cast<std::size_t>(i)] = hit->triangle;
+      facets.share.row(i) << along * hit->barycentric.transpose(), along * cosine;
+      rows.residual(i) = (measured_m - hit->range_m) / rays_.sigma_m(i);
+    }
+    return rows;
+  }
+  void add_facet(const Points& surface_m, Index triangle, const Sight& sight, FacetSlopes& facets) const {
+    const Vec3 normal = face_normal(surface_m, triangle);
+    const Mat3 back = sight.frame.rotation().transpose();
+    facets.normal.row(triangle) = normal.transpose();
+    for (Index k = 0; k < 3; ++k) {
+      auto own = facets.own.row(FacetSlopes::shares * triangle + k);
+      const Vec3 corner_m = surface_m.row(rest_.triangles(triangle, k));
+      const Vec3 in_frame_m = back * (corner_m - sight.frame.apply(Vec3::Zero()));
+      if (pose_ >= 0) own.head<6>() = sight.frame.slope(normal, in_frame_m);
+      if (camera_ < 0) continue;
+      const Vec3 in_camera_m = sight.camera.rotation().transpose() * (in_frame_m - sight.camera.apply(Vec3::Zero()));
+      const auto of_base = sight.camera.slope(back * normal, in_camera_m);
+      auto of_axes = own.segment<6>(pose_ >= 0 ? 6 : 0);
+      of_axes << of_base.head<3>() * R_base_camera_, of_base.tail<3>() * R_base_camera_;
+    }
+    if (bias_ >= 0) facets.own(FacetSlopes::shares * triangle + 3, facets.own.cols() - 1) = -1;
   }
   /// Where the surface comes nearest to a ray that counts and just misses it: its depth goes on as that of the outline. As an outlier
   /// it would hold the fit where the outline stood when the rays were chosen, at a sharp edge above all.
   /// @param observed_m  on the ray, near the surface
   /// @returns nothing further off than noise reaches
-  static std::optional<geometry::ClosestPoint> beside_outline(geometry::TriangleTree& tree, const Vec3& origin_m, const Vec3& direction,
+  static std::optional<geometry::ClosestPoint> beside_outline(const geometry::TriangleTree& tree, const Vec3& origin_m, const Vec3& direction,
                                                               const Vec3& observed_m, double sigma_m) {
     constexpr double near_std = 5;
     constexpr int rounds = 8;
@@ -264,10 +352,12 @@ class RayTerm : public Term {
   int bias_, scatter_;
   Vec3 pivot_m_ = Vec3::Zero(), centre_m_;
   double typical_ = 0;
+  bool one_eye_ = false;  // all rays start at one point
   std::shared_ptr<const geometry::TriangleTree> rest_tree_;
   const TriMesh& rest_;
-  mutable std::optional<geometry::TriangleTree> tree_;  // steps that a growing fit does not ask again need none
+  mutable std::optional<geometry::TriangleTree> tree_;  // rays of one eye need none
   mutable std::vector<Index> hints_;
+  mutable std::vector<int> cell_;  // made when it is first of use
 };
 
 }  // namespace

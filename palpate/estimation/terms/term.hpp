@@ -44,13 +44,24 @@ struct TermView {
   /// A RayChoice each: rays that count, whatever they meet and how they graze it; the others are not asked about. nullptr: all that meet the
   /// surface at no steeper an angle than the term trusts
   const std::vector<char>* chosen = nullptr;
-  bool surface_slopes = false;  ///< TermRows::surface is wanted, by terms that look at the surface
+  bool surface_slopes = false;  ///< TermRows::surface or facets is wanted, by terms that look at the surface
 };
 
 /// How a residual follows the surface that it looks at: it changes by the sum of per_corner.col(k) . motion of corner k.
 struct SurfaceSlope {
   Index triangle = -1;  ///< -1: it meets none
   Mat3 per_corner = Mat3::Zero();
+};
+
+/// The same where all that rows of one triangle differ in is a few shares, as for rays: where on it they end and how steeply. Row i changes
+/// by the sum over k of share(i, k) (own(4 t + k) . change of the term's own unknowns - normal(t) . motion of corner k), t being its
+/// triangle. The fourth share has no corner. The rest surface's error moves vertices and is no own unknown.
+struct FacetSlopes {
+  static constexpr Index shares = 4;
+  std::vector<Index> triangle;  ///< a row; -1: it meets none
+  Eigen::Matrix<double, Eigen::Dynamic, shares, Eigen::RowMajor> share;
+  Points normal;                                                            ///< a triangle; of those that no row meets nothing is said
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> own;  ///< triangles * shares x own unknowns
 };
 
 /// Rows of one term: residual = (observed - predicted) / sigma, jacobian = d residual / d unknowns.
@@ -65,6 +76,7 @@ struct TermRows {
   /// |cosine| between ray and surface normal over the least with which a ray counts, 0 where it passes by; empty: not along rays
   VectorX facing;
   std::vector<SurfaceSlope> surface;  ///< a row; empty: not asked for, or not the term's way
+  std::optional<FacetSlopes> facets;  ///< in place of `surface` and `jacobian`, which are empty then
   std::vector<int> cell;      ///< group of neighbours whose errors may be correlated (image or space cell); empty = independent
 };
 
