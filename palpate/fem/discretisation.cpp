@@ -26,16 +26,20 @@ double longest_edge_near(const TetMesh& mesh, const ContactPatch& patch) {
 }
 
 // The error left after two changes, where it falls as C h^p: (h0^p - h1^p) / (h1^p - h2^p) is the changes' ratio. Orders
-// beyond 2 are not believed: then the second change is small by chance (or the first is a coarse mesh's), and the first one
-// says what is left.
-double error_left(double first_change, double change, double h0, double h1, double h2) {
+// beyond 2 are not believed: then the second change is small by chance, and the first one says what is left. Or the first is a
+// coarse mesh's that says nothing. The depth alone does not tell; where the area of the contact came to rest too, no chance is
+// at work (`settled`), and the error lies between what the first change says and what the second promises at order 2.
+double error_left(double first_change, double change, double h0, double h1, double h2, bool settled) {
   const auto left = [&](double p) { return change / (std::pow(h1 / h2, p) - 1); };
   const auto excess = [&](double p) {
     return (std::pow(h0, p) - std::pow(h1, p)) * change - (std::pow(h1, p) - std::pow(h2, p)) * first_change;
   };
   double low = 0.6, high = 2;
   if (excess(low) >= 0) return left(low);  // slower still
-  if (excess(high) <= 0) return first_change * std::pow(h2, high) / (std::pow(h0, high) - std::pow(h1, high));
+  if (excess(high) <= 0) {
+    const double by_first = first_change * std::pow(h2, high) / (std::pow(h0, high) - std::pow(h1, high));
+    return settled ? std::sqrt(by_first * left(high)) : by_first;
+  }
   for (int i = 0; i < 40; ++i) {
     const double middle = 0.5 * (low + high);
     (excess(middle) < 0 ? low : high) = middle;
@@ -60,7 +64,7 @@ Discretisation discretise(const TetMesh& base, const ContactPatch& patch, const 
     const Statics body(quadratic, "linear", boundary, statics);
     const Equilibrium e =
         body.solve(1.0, options.poisson_ratio, force, VectorX::Zero(static_cast<Index>(boundary.motions.cols())));
-    return ContactAnswer{force.dot(forces.transpose() * e.displacement_m), e.displacement_m, 0};
+    return ContactAnswer{force.dot(forces.transpose() * e.displacement_m), e.displacement_m, 0, 0};
   };
   return discretise(base, patch, SolveOn(solve), options);
 }
@@ -81,12 +85,14 @@ Discretisation discretise(const TetMesh& base, const ContactPatch& given, const 
     if (given.distance_m(base.nodes_m.row(node).transpose()) > given.radius_m) seen.push_back(node);
   }
   VectorX surface(3 * static_cast<Index>(seen.size()));
+  double area_m2 = 0;
   const auto work = [&](const RefinedMesh& linear, const TetMesh& quadratic) {
     const ContactAnswer answer = solve(quadratic, linear);
     for (std::size_t i = 0; i < seen.size(); ++i)
       surface.segment<3>(3 * static_cast<Index>(i)) = answer.displacement_m.segment<3>(3 * seen[i]);
     // A mesh that is much coarser than the patch finds a few points of it, and no radius.
     if (longest_edge_near(linear.mesh, patch) <= 2 * answer.patch_radius_m) patch.radius_m = answer.patch_radius_m;
+    area_m2 = answer.patch_area_m2;
     return answer.depth_m;
   };
 
@@ -108,12 +114,14 @@ Discretisation discretise(const TetMesh& base, const ContactPatch& given, const 
     if (full && level > 1) break;
     TetMesh quadratic = to_quadratic(finer.mesh);
     const VectorX last_surface = surface;
+    const double last_area_m2 = area_m2;
     const double now = work(finer, quadratic);
     out.surface_change = surface.norm() > 0 ? (surface - last_surface).norm() / surface.norm() : 0;
     const double previous_change = change;
     change = std::abs(now - last) / std::abs(now);
-    out.young_error =
-        level == 1 ? change / 2 : error_left(previous_change, change, level == 2 ? base_edge : 4 * edge, 2 * edge, edge);
+    const bool settled = area_m2 > 0 && std::abs(area_m2 - last_area_m2) <= options.tolerance * area_m2;
+    out.young_error = level == 1 ? change / 2
+                                 : error_left(previous_change, change, level == 2 ? base_edge : 4 * edge, 2 * edge, edge, settled);
     out.base_young_error = std::abs(base_work - now) / std::abs(now);
     out.linear = std::move(finer);
     out.mesh = std::move(quadratic);

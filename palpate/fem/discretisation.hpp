@@ -63,12 +63,14 @@ struct ContactAnswer {
   double depth_m = 0;         ///< what a force-controlled probe reads; any number in proportion to 1 / E will do
   VectorX displacement_m;     ///< 3n
   double patch_radius_m = 0;  ///< of the patch where it was found; 0: it is the one that was given
+  double patch_area_m2 = 0;   ///< the same: of the contact
 };
 using SolveOn = std::function<ContactAnswer(const TetMesh& quadratic, const RefinedMesh& linear)>;
 
 /// Refines under the tool until the depth of the load, work-conjugate (W = a' F' u), which is what a force-controlled probe sees
 /// (E_hat / E = u_h / u), changes by so little from level to level that the error left is below the tolerance. The error left is
 /// what the last two changes and edges say when it falls as C h^p (0.6 <= p <= 2; the rim of the load keeps p between 1 and 2).
+/// A change that is smaller than that is one by chance, unless the area of a contact that was found agrees as well.
 /// One change alone is no estimate, so there are two levels at least (within the limit of nodes; then half of the first change).
 /// Each level also refines farther away from the tool, for the surface that cameras see.
 /// @param solve  any solution of the same load on a mesh, contact search included (contact_statics.hpp)

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "fem_meshes.hpp"
 
 namespace palpate::fem {
@@ -55,6 +57,31 @@ TEST_P(PressedCube, DepthIsRightToOnePercentAndTheErrorIsKnown) {
   RecordProperty("base_error_percent", std::to_string(100 * base_error));
   RecordProperty("base_estimated_percent", std::to_string(100 * d.base_young_error));
   RecordProperty("levels", d.levels);
+}
+
+// Two depths that hardly differ say little by themselves: by chance, as long as the contact that was found still grows; if that has
+// come to rest, it is the base mesh's change that says nothing.
+TEST(DiscretisationError, IsBelievedToBeSmallWhereTheContactCameToRest) {
+  const TetMesh base = block_mesh(2, 2, 2, {0.1, 0.1, 0.1});
+  const ContactPatch patch{{0.05, 0.05, 0.1}, 0.03, Vec3::Zero()};
+  const auto error = [&](const std::array<double, 3>& depth_mm, const std::array<double, 3>& area_mm2) {
+    std::size_t level = 0;
+    const Discretisation d = discretise(base, patch, [&](const TetMesh& mesh, const RefinedMesh&) {
+      const std::size_t at = level++;
+      return ContactAnswer{1e-3 * depth_mm[at], VectorX::Ones(3 * mesh.nodes_m.rows()), 0, 1e-6 * area_mm2[at]};
+    });
+    EXPECT_EQ(d.levels, 2);
+    return d.young_error;
+  };
+  const std::array<double, 3> agree{3.0, 4.0, 4.001};
+  const double by_chance = error(agree, {50, 80, 88}), settled = error(agree, {50, 80, 80.4}), unknown = error(agree, {0, 0, 0});
+  EXPECT_EQ(by_chance, unknown);
+  EXPECT_GT(by_chance, 0.005);
+  EXPECT_LT(settled, 0.3 * by_chance);
+  EXPECT_GT(settled, 0.001 / 4 / 3) << "more than what the second change promises at order two";
+  // Where the changes fall no faster than the order allows, the area has no say.
+  const std::array<double, 3> fall{3.6, 3.9, 3.98};
+  EXPECT_EQ(error(fall, {50, 80, 80.4}), error(fall, {50, 80, 88}));
 }
 
 TEST(RefineNear, KeepsVolumeOrientationAndConformity) {

@@ -64,6 +64,7 @@ class KnownContactError : public testing::TestWithParam<Tool> {
     ContactAnswer answer;
     answer.depth_m = kHeight - touch.T_base_tool.translation().z() - body.layer_travel_m(e)(0);
     answer.displacement_m = e.displacement_m;
+    answer.patch_area_m2 = touch.area_m2;
     for (Index i = 0; i < touch.patch_m.rows(); ++i)
       answer.patch_radius_m = std::max(answer.patch_radius_m, std::abs(touch.patch_m(i, 1)));
     return answer;
