@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for arrays of many megabytes. Every page costs its first touch a trip into the system, which for pages of 4 KB took
-// a third of a solve; arrays that are large enough ask for pages of 2 MB.
+// Memory for large arrays. Every page costs its first touch a trip into the system, which for pages of 4 KB took a third of a
+// solve, on virtual machines two thirds of a small one; arrays that are large enough ask for pages of 2 MB, smaller ones for all
+// of theirs in one trip.
 #pragma once
 
 #include <cstddef>

@@ -5,6 +5,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "palpate/fem/linear_solver/large_array.hpp"
+
 namespace palpate::fem {
 namespace {
 
@@ -59,7 +61,10 @@ RigidMotionPreconditioner::RigidMotionPreconditioner(const BlockMatrix& matrix, 
     }
   }
   pair_begin_.assign(1, 0);
+  std::size_t pairs = 0;
+  for (const auto& of_column : touching) pairs += of_column.size();
   std::vector<Eigen::Triplet<double>> pattern;
+  make_large_room(pattern, 36 * pairs);
   for (Index b = 0; b < count; ++b) {
     pair_row_.insert(pair_row_.end(), touching[at(b)].begin(), touching[at(b)].end());
     pair_begin_.push_back(static_cast<Index>(pair_row_.size()));
