@@ -195,8 +195,9 @@ struct LinearSolver::Impl {
     outcome.used = method;
     const std::vector<Index>& padded = blocks->padded();
     VectorX b = VectorX::Zero(blocks->padded_size()), solution(blocks->padded_size());
-    // Threads pay from about 10 000 blocks a thread on.
-    const int threads = blocks->block_count() > 20000 ? options.threads : 1;
+    // With two threads 30 000 blocks take a fifth longer, 260 000 a tenth less.
+    constexpr Index kBlocksForThreads = 100000;
+    const int threads = blocks->block_count() > kBlocksForThreads ? options.threads : 1;
     for (; done < x.cols(); ++done) {
       solution.setZero();
       for (Eigen::Index u = 0; u < x.rows(); ++u) b[padded[static_cast<std::size_t>(u)]] = x(u, done);
