@@ -199,19 +199,20 @@ def dolfinx_worker(path):
         if len(nodes) > 60000 and not patient and name in ("MUMPS Cholesky", "CHOLMOD", "CG + GAMG"):
             continue  # minutes and gigabytes
         try:
-            ksp = PETSc.KSP().create(MPI.COMM_SELF)
-            for key, value in options.items():
-                PETSc.Options()[key] = value
-            ksp.setOperators(matrix)
-            ksp.setFromOptions()
-            if options["ksp_type"] == "cg":
-                ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-                ksp.setTolerances(rtol=1e-8, max_it=5000)
-            x = b.duplicate()
-            start = time.process_time()
-            ksp.setUp()
-            ksp.solve(b, x)
-            seconds = time.process_time() - start
+            for _ in range(2):  # the second counts: its memory was touched before
+                ksp = PETSc.KSP().create(MPI.COMM_SELF)
+                for key, value in options.items():
+                    PETSc.Options()[key] = value
+                ksp.setOperators(matrix)
+                ksp.setFromOptions()
+                if options["ksp_type"] == "cg":
+                    ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+                    ksp.setTolerances(rtol=1e-8, max_it=5000)
+                x = b.duplicate()
+                start = time.process_time()
+                ksp.setUp()
+                ksp.solve(b, x)
+                seconds = time.process_time() - start
             if ksp.getConvergedReason() > 0:
                 results[name] = dict(seconds=seconds, steps=ksp.getIterationNumber())
                 solution = x.getArray().reshape(-1, 3)[block_of]
