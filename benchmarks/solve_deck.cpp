@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/process_heap.hpp"
 #include "palpate/fem/assembly.hpp"
 #include "palpate/fem/linear_solver.hpp"
 #include "palpate/fem/linear_solver/large_array.hpp"
@@ -226,6 +227,7 @@ int run(int argc, char** argv) {
 }  // namespace palpate
 
 int main(int argc, char** argv) {
+  palpate::keep_heap_in_large_pages();
   try {
     return palpate::run(argc, argv);
   } catch (const std::exception& error) {

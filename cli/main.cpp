@@ -14,6 +14,7 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/process_heap.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -125,6 +126,7 @@ int parse_and_run(const std::vector<std::string>& arguments, Session& session) {
 
 int main(int argc, char** argv) {
   using namespace palpate::cli;
+  palpate::keep_heap_in_large_pages();
   Session session;
   stop_on_interrupt();
   try {

@@ -14,7 +14,7 @@ Mat3 polar_rotation(const Mat3& f) {
   if (f.determinant() > 1e-3 * size * std::sqrt(size)) {
     // Newton's iteration (Higham 1986), scaled while it is far: quadratic, four steps at the strains of a push.
     Mat3 r = f;
-    bool far = true;
+    bool far = std::abs(size - 1) > 0.2;
     for (int i = 0; i < 30; ++i) {
       Mat3 cofactor;
       cofactor << r.col(1).cross(r.col(2)), r.col(2).cross(r.col(0)), r.col(0).cross(r.col(1));
