@@ -115,6 +115,20 @@ std::vector<geometry::FinerNear> finer_under_tools(const Recording& recording) {
   return finer;
 }
 
+/// Facets that follow the dent: half as long as the elements, and a third of those under a tool there, where the slope of the
+/// surface turns within millimetres. Ones of a quarter of the pad's radius made E of a cube 0.2 % too high by themselves.
+TriMesh follows_dents(const Recording& recording, double edge_m) {
+  constexpr double share = 0.35, growth = 0.5;  // of the elements' edges; with the distance from where facets must be short
+  std::vector<geometry::FinerNear> tools;
+  if (recording.model.refine == "auto") tools = finer_under_tools(recording);
+  return geometry::subdivided(*recording.rest.surface, [&](const Vec3& at) {
+    double longest_m = edge_m;
+    for (const auto& near : tools)
+      longest_m = std::min(longest_m, share * near.edge_m + growth * std::max(0.0, (at - near.point_m).norm() - 0.85 * near.radius_m));
+    return longest_m;
+  });
+}
+
 /// Table that hides a side of the object from every view: where it rests, else the first plane of the environment.
 std::optional<Plane> hiding_plane(const Recording& recording) {
   for (const auto& support : recording.supports) {
@@ -350,11 +364,7 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
   }
   if (recording.rest.surface) {
     // Sensors see the given surface, not the mesh that fills it; its facets must follow the dent as well as elements do.
-    double edge_m = 0.5 * typical_edge_m(object.mesh);
-    if (recording.model.refine == "auto") {
-      for (const auto& near : finer_under_tools(recording)) edge_m = std::min(edge_m, 0.5 * near.edge_m);
-    }
-    const TriMesh surface = geometry::subdivided(*recording.rest.surface, edge_m);
+    const TriMesh surface = follows_dents(recording, 0.5 * typical_edge_m(object.mesh));
     object.surface = estimation::SimulatedSurface::embedded(object.mesh, surface, geometry::embed(surface.vertices_m, object.mesh));
   } else {
     object.surface = estimation::SimulatedSurface::boundary_of(

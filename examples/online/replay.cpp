@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "palpate/core/process_heap.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/online.hpp"
 
@@ -30,6 +31,7 @@ int main(int argc, char** argv) try {
     std::fprintf(stderr, "usage: replay RECORDING\n");
     return 2;
   }
+  palpate::keep_heap_in_large_pages();
   palpate::Recording scene = palpate::io::read_recording(argv[1]);
   std::vector<palpate::Push> pushes;
   std::swap(pushes, scene.pushes);

@@ -44,9 +44,10 @@ class Scene {
   static constexpr int levels = 6, points = 2000;
   /// Truths are solved by CalculiX (C3D10) instead of our own solver, on the same mesh of theirs.
   bool by_calculix = false;
+  double noise = 1;  ///< of the depths, in sigma_m: 0 shows what meshes do to the answer
 
   /// @param fine  elements across the pad's radius of the true mesh (the fit's has three)
-  Scene(SceneSpec given, int fine) : spec_(std::move(given)) {
+  Scene(SceneSpec given, int fine, int true_tetrahedra) : spec_(std::move(given)) {
     recording_.rest.surface = spec_.surface;
     recording_.supports = spec_.supports;
     recording_.model.material = "linear";
@@ -68,7 +69,7 @@ class Scene {
     recording_.pushes.clear();
 
     reconstruction::BuildOptions filling;
-    filling.mesh.tetrahedra = 24000;
+    filling.mesh.tetrahedra = true_tetrahedra;
     filling.mesh.finer = {{spec_.contact_m, 1.1 * spec_.pad_radius_m, spec_.pad_radius_m / fine}};
     // Where a round object is glued is as sharp as the pad's rim: half the fit's edges.
     for (const Support& support : spec_.supports) {
@@ -170,7 +171,7 @@ class Scene {
       const RandomField waves(row.correlated_m, row.correlated_length_m, wave_random);
       for (Index i = 0; i < seen.rays.range_m.size(); ++i) {
         const Vec3 hit = (seen.rays.origins_m.row(i) + seen.rays.range_m(i) * seen.rays.directions.row(i)).transpose();
-        seen.rays.range_m(i) += sigma_m * noise_random.normal();
+        seen.rays.range_m(i) += noise * sigma_m * noise_random.normal();
         if (row.correlated_m > 0) seen.rays.range_m(i) += waves.at(hit);
         if (row.outlier_share > 0 && outlier_random.uniform() < row.outlier_share)
           seen.rays.range_m(i) += (outlier_random.uniform() < 0.5 ? -1 : 1) * outlier_random.uniform(0.01, 0.06);

@@ -3,7 +3,8 @@
 // How often the intervals hold the truth, how far off the answers are, and how near they come to the Cramer-Rao bound: the table
 // of docs/uncertainty.md. A few recordings a row by default;
 //   PALPATE_SEEDS=200 PALPATE_ROW=pose,rest PALPATE_SCENE=ball_top estimation_coverage_test
-// for figures that mean something (PALPATE_FIRST_SEED to go on elsewhere, PALPATE_EACH=1 for a line a recording, PALPATE_TRUTH=calculix for
+// for figures that mean something (PALPATE_FIRST_SEED to go on elsewhere, PALPATE_EACH=1 for a line a recording, PALPATE_NOISELESS=1 for what meshes alone do,
+// PALPATE_TRUE_TETRAHEDRA, PALPATE_TRUTH=calculix for
 // truths by CalculiX).
 #include <gtest/gtest.h>
 #include <time.h>
@@ -53,6 +54,9 @@ Vec2 bound(Scene& scene, const Row& row, const Draw& draw) {
   for (std::size_t s = 0; row.correlated_m > 0 && s < objective.last_rows().size(); ++s) {
     for (const TermRows& rows : objective.last_rows()[s]) {
       const Index count = static_cast<Index>(rows.residual.size());
+      MatrixX slopes = rows.jacobian;
+      for (Index i = 0; i < count; ++i)
+        if (!std::isfinite(rows.residual(i))) slopes.row(i).setZero();  // a ray that passes by has none
       MatrixX noise = MatrixX::Identity(count, count);
       for (Index i = 0; i < count; ++i) {
         for (Index k = 0; k < count; ++k) {
@@ -60,7 +64,7 @@ Vec2 bound(Scene& scene, const Row& row, const Draw& draw) {
           noise(i, k) += std::pow(row.correlated_m / Scene::sigma_m, 2) * std::exp(-0.5 * d2 / std::pow(row.correlated_length_m, 2));
         }
       }
-      const MatrixX lost = rows.jacobian.transpose() * (noise.llt().solve(rows.jacobian) - rows.jacobian);
+      const MatrixX lost = slopes.transpose() * (noise.llt().solve(slopes) - slopes);
       for (std::size_t a = 0; a < rows.unknowns.size(); ++a)
         for (std::size_t b = 0; b < rows.unknowns.size(); ++b)
           information(rows.unknowns[a], rows.unknowns[b]) += lost(static_cast<Index>(a), static_cast<Index>(b));
@@ -99,9 +103,10 @@ struct Tally {
 
 TEST(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
   const int seeds = from_environment("PALPATE_SEEDS", 3), first = from_environment("PALPATE_FIRST_SEED", 1);
-  const int fine = from_environment("PALPATE_FINE", 6);
+  const int fine = from_environment("PALPATE_FINE", 6), tetrahedra = from_environment("PALPATE_TRUE_TETRAHEDRA", 24000);
   const bool each = std::getenv("PALPATE_EACH") != nullptr;
   const char* solver = std::getenv("PALPATE_TRUTH");
+  const bool noiseless = std::getenv("PALPATE_NOISELESS") != nullptr;
   const bool by_calculix = solver != nullptr && std::string(solver) == "calculix";
   if (by_calculix && !fem::calculix_is_there()) GTEST_SKIP() << "CalculiX (ccx) is not installed";
   estimation::FitOptions options;
@@ -109,8 +114,9 @@ TEST(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
   std::printf("| scene       | row        |    |    n | 68 %%| 95 %%| pull   | bias     | rms     | bound   | stated  | rms / bound |\n");
   for (const SceneSpec& spec : scenes()) {
     if (!wanted("PALPATE_SCENE", spec.name)) continue;
-    Scene scene(spec, fine);
+    Scene scene(spec, fine, tetrahedra);
     scene.by_calculix = by_calculix;
+    scene.noise = noiseless ? 0 : 1;
     if (each) {
       std::printf("%s: %d tetrahedra, the truth has %d, its own error over nu is %.1e\n", spec.name.c_str(),
                   int(scene.object().mesh.tetrahedra.rows()), int(scene.true_tetrahedra()), scene.solver_error());
