@@ -3,9 +3,9 @@
 // How often the intervals hold the truth, how far off the answers are, and how near they come to the Cramer-Rao bound: the table
 // of docs/uncertainty.md. A few recordings a row by default;
 //   PALPATE_SEEDS=200 PALPATE_ROW=pose,rest PALPATE_SCENE=ball_top estimation_coverage_test
-// for figures that mean something (PALPATE_FIRST_SEED to go on elsewhere, PALPATE_EACH=1 for a line a recording, PALPATE_NOISELESS=1 for what meshes alone do,
-// PALPATE_TRUE_TETRAHEDRA, PALPATE_TRUTH=calculix for
-// truths by CalculiX).
+// for figures that mean something (PALPATE_FIRST_SEED to go on elsewhere, PALPATE_EACH=1 for a line a recording, PALPATE_NOISELESS=1
+// for what meshes alone do, PALPATE_TRUE_TETRAHEDRA and PALPATE_FINE for the truth's mesh, PALPATE_TRUTH=calculix for truths by
+// CalculiX).
 #include <gtest/gtest.h>
 #include <time.h>
 
