@@ -52,6 +52,20 @@ class Grid {
   const Vec3& point(Index i) const { return points_[i]; }
   const Vec3& normal(Index i) const { return normals_[i]; }
 
+  /// Is any point like that in the place's cell or those around it?
+  template <class F>
+  bool any_around(const Vec3& p, F like) const {
+    const Cell c = cell_of(p);
+    constexpr std::array<std::int64_t, 3> own_first{0, -1, 1};
+    for (const auto x : own_first)
+      for (const auto y : own_first)
+        for (const auto z : own_first)
+          if (const auto it = index_.find(key_of({c[0] + x, c[1] + y, c[2] + z})); it != index_.end())
+            for (const Index i : bins_[it->second])
+              if (like(i)) return true;
+    return false;
+  }
+
   template <class F>
   void around(const Vec3& p, int reach, F visit) const {
     const Cell c = cell_of(p);

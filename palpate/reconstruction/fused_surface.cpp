@@ -9,6 +9,7 @@
 #include "palpate/geometry/union_find.hpp"
 #include "palpate/geometry/winding_number.hpp"
 #include "palpate/reconstruction/facets.hpp"
+#include "palpate/reconstruction/unseen_patches.hpp"
 
 namespace palpate::reconstruction {
 namespace {
@@ -27,9 +28,15 @@ PointCloud middles_of(const TriMesh& facets) {
 
 /// Signed distance from the fused surface, negative inside; good near it, only a sign far off and where it was cut by sight.
 class Field {
+  static constexpr double beside = 0.6;  // of the reach: further from every facet is beside the rims
+
  public:
   Field(const FusedViews& fused, double reach, const std::function<bool(const Vec3&)>& free)
       : winding_(fused.facets), reach_(reach), grid_({middles_of(fused.facets)}, reach), free_(free) {}
+
+  const Grid& facets() const { return grid_; }
+  /// Beyond this distance from every facet only the winding number knows the surface.
+  double known_within_m() const { return beside * reach_; }
 
   double operator()(const Vec3& x) {
     const double d = by_facets(x);
@@ -39,9 +46,7 @@ class Field {
   /// Did a sensor look through a place that no facet says anything about?
   bool looked_through(const Vec3& x) {
     if (!free_) return false;
-    bool near = false;
-    grid_.around(x, 1, [&](Index i) { near = near || (grid_.point(i) - x).squaredNorm() < 0.15 * reach_ * reach_; });
-    return !near && free_(x);
+    return !grid_.any_around(x, [&](Index i) { return (grid_.point(i) - x).squaredNorm() < 0.15 * reach_ * reach_; }) && free_(x);
   }
 
   /// The same as if nobody had looked through anything.
@@ -74,7 +79,7 @@ class Field {
     }
     const double d = sum / weights;
     // far from the surface, and beside its rims, only the winding number knows the side
-    if (std::abs(d) < 0.4 * reach_ && least < 0.36 * reach_ * reach_) return d;
+    if (std::abs(d) < 0.4 * reach_ && least < beside * beside * reach_ * reach_) return d;
     return std::abs(d) * side(x);
   }
 
@@ -276,9 +281,10 @@ TriMesh fused_surface(const FusedViews& fused, const SurfaceOptions& options) {
   for (Index i = 0; i < fused.facets.triangles.rows(); ++i)
     march.add_cubes_around(fused.facets.vertices_m.row(fused.facets.triangles(i, 0)).transpose());
   const TriMesh all = march.run();
-  const TriMesh out = all.triangles.rows() > 0 ? without_specks(all, options.belongs) : all;
+  TriMesh out = all.triangles.rows() > 0 ? without_specks(all, options.belongs) : all;
   if (out.triangles.rows() == 0)
     throw Error("what was seen encloses nothing: there is no inside. Add views, or complete it with its support", "clouds");
+  smooth_unseen_patches(out, field.facets(), field.known_within_m(), options.free);
   return out;
 }
 

@@ -65,7 +65,42 @@ TEST(FusedSurface, averages_noise_and_closes_what_nobody_saw) {
   for (Index v = 0; v < m.vertices_m.rows(); ++v)
     if (m.vertices_m(v, 2) > -0.8 * radius) seen += std::pow(m.vertices_m.row(v).norm() - radius, 2), ++count;
   EXPECT_LT(std::sqrt(seen / count), 0.22 * sigma);
-  EXPECT_LT(off_ball(m, radius).first, 0.1 * radius);  // the missing cap is a tenth of the radius high
+  EXPECT_LT(off_ball(m, radius).first, 0.06 * radius);  // a flat lid would lie a tenth too high
+}
+
+TEST(FusedSurface, goes_on_without_a_bend_where_nobody_saw_it) {
+  constexpr double radius = 0.06;
+  for (const double above : {-0.9, -0.75}) {  // holes of 26 and 41 degrees: flat lids would lie 0.1 and 0.25 of the radius too high
+    const FusedViews fused = fuse_views({ball(radius, Vec3::Zero(), 40000, 0.0002, above)});
+    const TriMesh m = fused_surface(fused);
+    EXPECT_TRUE(geometry::check_surface(m).watertight());
+    EXPECT_LT(off_ball(m, radius).first, 0.3 * (1 + above) * radius) << above;
+  }
+}
+
+TEST(FusedSurface, follows_a_groove_whose_floor_nobody_saw) {
+  // two balls that overlap, the ring where they meet out of sight
+  constexpr double radius = 0.05, apart = 0.035, seen_beyond = 0.014;
+  PointCloud both = ball(radius, Vec3(0, 0, apart), 40000, 0.0002), lower = ball(radius, Vec3(0, 0, -apart), 40000, 0.0002);
+  PointCloud cloud;
+  const auto take = [&](const PointCloud& from, double sign) {
+    for (Index i = 0; i < from.points_m.rows(); ++i) {
+      if (sign * from.points_m(i, 2) < seen_beyond) continue;
+      cloud.points_m.conservativeResize(cloud.points_m.rows() + 1, 3);
+      cloud.normals.conservativeResize(cloud.normals.rows() + 1, 3);
+      cloud.points_m.bottomRows<1>() = from.points_m.row(i);
+      cloud.normals.bottomRows<1>() = from.normals.row(i);
+    }
+  };
+  take(both, 1), take(lower, -1);
+  cloud.sigma_m = VectorX::Constant(1, 0.0002);
+  const TriMesh m = fused_surface(fuse_views({cloud}));
+  double narrowest = 1;
+  for (Index v = 0; v < m.vertices_m.rows(); ++v)
+    if (std::abs(m.vertices_m(v, 2)) < 0.002) narrowest = std::min(narrowest, m.vertices_m.row(v).head<2>().norm());
+  const double rim = std::sqrt(radius * radius - std::pow(apart - seen_beyond, 2)), floor = std::sqrt(radius * radius - apart * apart);
+  EXPECT_LT(narrowest, rim - 0.3 * (rim - floor));
+  EXPECT_GT(narrowest, 0.9 * floor);
 }
 
 TEST(FusedSurface, ends_where_a_sensor_looked_through) {
