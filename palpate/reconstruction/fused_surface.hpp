@@ -14,8 +14,9 @@ struct SurfaceOptions {
 
 /// Where facets are near, the surface is where the mean of their distances vanishes, each measured along the mean of its own
 /// normal and that of its neighbourhood (which a sphere satisfies exactly to second order, so that curved parts do not
-/// bulge); elsewhere, where their winding number passes one half or a sensor's sight ends, then bent as little as may be (unseen_patches.hpp). Marching tetrahedra over a body-centred lattice: every
-/// edge has exactly two triangles. Parts below a hundredth of the largest one's area are left out.
+/// bulge); elsewhere, where their winding number passes one half or a sensor's sight ends, then bent as little as may be
+/// (unseen_patches.hpp). Marching tetrahedra over a body-centred lattice: every edge has exactly two triangles. Parts below a
+/// hundredth of the largest one's area are left out.
 /// @throws Error when the facets enclose nothing, or the cells are too small for the object.
 TriMesh fused_surface(const FusedViews& fused, const SurfaceOptions& options = {});
 

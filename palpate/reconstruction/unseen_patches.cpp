@@ -6,16 +6,18 @@
 #include <algorithm>
 #include <vector>
 
+#include "palpate/geometry/union_find.hpp"
+
 namespace palpate::reconstruction {
 namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr int rounds = 3;  // edges that were stretched count anew; more rounds move a patch by less than a tenth of the first
+constexpr int rounds = 3;              // edges that were stretched count anew
 constexpr double shortest_edge = 0.2;  // of the reach: marching leaves slivers, which would count without bound
 constexpr int halvings = 4;            // of a way that ends in free space
 
-/// Which rows of `bending` and which unknowns belong to a vertex; -1 where none does.
+/// Which unknown and which row of `differences` belong to a vertex; -1 where none does.
 struct Places {
   std::vector<Index> vertices;  ///< that move
   std::vector<Index> unknown;   ///< a vertex
@@ -33,6 +35,18 @@ void around_those_that_move(const TriMesh& surface, const std::vector<Index>& un
   }
 }
 
+/// A part that is far from every facet has no shape of least bending but a point.
+void leave_alone_what_nothing_holds(const TriMesh& surface, std::vector<Index>& far) {
+  geometry::UnionFind parts(surface.vertices_m.rows());
+  for (Index t = 0; t < surface.triangles.rows(); ++t)
+    for (int k = 1; k < 3; ++k) parts.join(surface.triangles(t, 0), surface.triangles(t, k));
+  std::vector<char> held(far.size(), 0);
+  for (std::size_t v = 0; v < far.size(); ++v)
+    if (far[v] < 0) held[static_cast<std::size_t>(parts.root(static_cast<Index>(v)))] = 1;
+  for (std::size_t v = 0; v < far.size(); ++v)
+    if (!held[static_cast<std::size_t>(parts.root(static_cast<Index>(v)))]) far[v] = -1;
+}
+
 Places places_of(const TriMesh& surface, const Grid& facets, double reach_m) {
   const auto count = static_cast<std::size_t>(surface.vertices_m.rows());
   std::vector<Index> far(count, -1);
@@ -40,6 +54,7 @@ Places places_of(const TriMesh& surface, const Grid& facets, double reach_m) {
     const Vec3 p = surface.vertices_m.row(static_cast<Index>(v)).transpose();
     if (!facets.any_around(p, [&](Index i) { return (facets.point(i) - p).squaredNorm() < reach_m * reach_m; })) far[v] = 0;
   }
+  leave_alone_what_nothing_holds(surface, far);
   Places out;
   out.unknown.assign(count, -1);
   out.row.assign(count, -1);

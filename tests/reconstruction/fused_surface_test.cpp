@@ -7,10 +7,12 @@
 
 #include <random>
 
+#include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/reconstruction/build_object.hpp"
+#include "palpate/reconstruction/unseen_patches.hpp"
 
 namespace palpate::reconstruction {
 namespace {
@@ -81,18 +83,17 @@ TEST(FusedSurface, goes_on_without_a_bend_where_nobody_saw_it) {
 TEST(FusedSurface, follows_a_groove_whose_floor_nobody_saw) {
   // two balls that overlap, the ring where they meet out of sight
   constexpr double radius = 0.05, apart = 0.035, seen_beyond = 0.014;
-  PointCloud both = ball(radius, Vec3(0, 0, apart), 40000, 0.0002), lower = ball(radius, Vec3(0, 0, -apart), 40000, 0.0002);
   PointCloud cloud;
-  const auto take = [&](const PointCloud& from, double sign) {
-    for (Index i = 0; i < from.points_m.rows(); ++i) {
-      if (sign * from.points_m(i, 2) < seen_beyond) continue;
-      cloud.points_m.conservativeResize(cloud.points_m.rows() + 1, 3);
-      cloud.normals.conservativeResize(cloud.normals.rows() + 1, 3);
-      cloud.points_m.bottomRows<1>() = from.points_m.row(i);
-      cloud.normals.bottomRows<1>() = from.normals.row(i);
-    }
-  };
-  take(both, 1), take(lower, -1);
+  for (const double sign : {1.0, -1.0}) {
+    const PointCloud whole = ball(radius, Vec3(0, 0, sign * apart), 40000, 0.0002);
+    std::vector<Index> seen;
+    for (Index i = 0; i < whole.points_m.rows(); ++i)
+      if (sign * whole.points_m(i, 2) > seen_beyond) seen.push_back(i);
+    const Index before = static_cast<Index>(cloud.points_m.rows()), count = static_cast<Index>(seen.size());
+    cloud.points_m.conservativeResize(before + count, 3), cloud.normals.conservativeResize(before + count, 3);
+    cloud.points_m.bottomRows(count) = whole.points_m(seen, Eigen::all);
+    cloud.normals.bottomRows(count) = whole.normals(seen, Eigen::all);
+  }
   cloud.sigma_m = VectorX::Constant(1, 0.0002);
   const TriMesh m = fused_surface(fuse_views({cloud}));
   double narrowest = 1;
@@ -101,6 +102,22 @@ TEST(FusedSurface, follows_a_groove_whose_floor_nobody_saw) {
   const double rim = std::sqrt(radius * radius - std::pow(apart - seen_beyond, 2)), floor = std::sqrt(radius * radius - apart * apart);
   EXPECT_LT(narrowest, rim - 0.3 * (rim - floor));
   EXPECT_GT(narrowest, 0.9 * floor);
+}
+
+TEST(UnseenPatches, leave_alone_what_no_facet_holds) {
+  constexpr double radius = 0.05, apart = 0.2;
+  const TriMesh one = shapes::sphere(radius, 3);
+  const Index n = static_cast<Index>(one.vertices_m.rows());
+  TriMesh two = one;
+  two.vertices_m.conservativeResize(2 * n, 3), two.triangles.conservativeResize(2 * one.triangles.rows(), 3);
+  two.vertices_m.bottomRows(n) = one.vertices_m.rowwise() + Vec3(apart, 0, 0).transpose();
+  two.triangles.bottomRows(one.triangles.rows()) = one.triangles.array() + n;
+  const TriMesh before = two;
+  const Grid facets({ball(radius, Vec3::Zero(), 4000, 0, -0.8)}, 0.01);  // of the first one, all but a cap
+  smooth_unseen_patches(two, facets, 0.005, {});
+  EXPECT_EQ(two.vertices_m.bottomRows(n), before.vertices_m.bottomRows(n));
+  EXPECT_NE(two.vertices_m.topRows(n), before.vertices_m.topRows(n));
+  EXPECT_LT((two.vertices_m.topRows(n).rowwise().norm().array() - radius).abs().maxCoeff(), 0.1 * radius);
 }
 
 TEST(FusedSurface, ends_where_a_sensor_looked_through) {
