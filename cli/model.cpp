@@ -44,10 +44,13 @@ reconstruction::BuiltObject build_from_recording(const Options& o, const reconst
   if (rest.volume) return reconstruction::build_object(*rest.volume, recording.supports);
   if (rest.surface) return reconstruction::build_object(*rest.surface, recording.supports, options, session.progress());
   std::vector<PointCloud> clouds;
+  sensing::ObserveOptions smooth;
+  smooth.back_projection.smooth = true;
   for (const DepthFrame& view : rest.views) {
     Points normals;
-    const RayCloud rays = sensing::observe(view, recording.environment, {}, &normals);
+    const RayCloud rays = sensing::observe(view, recording.environment, smooth, &normals);
     clouds.push_back(sensing::to_point_cloud(rays, normals));
+    clouds.back().pose_std_m = view.pose_std_m, clouds.back().pose_std_rad = view.pose_std_rad;
   }
   reconstruction::FuseOptions fuse;
   if (!recording.environment.planes.empty()) fuse.support = recording.environment.planes.front();

@@ -141,11 +141,14 @@ std::optional<Plane> hiding_plane(const Recording& recording) {
 reconstruction::BuiltObject build_from_views(const Recording& recording, const reconstruction::BuildOptions& options,
                                              reconstruction::Completion completion, const OnProgress& progress) {
   std::vector<PointCloud> clouds;
+  sensing::ObserveOptions smooth;
+  smooth.back_projection.smooth = true;
   const std::vector<DepthFrame> images = sensing::images_at_rest(recording);
   for (const DepthFrame& view : images) {
     Points normals;
-    const RayCloud rays = sensing::observe(view, recording.environment, {}, &normals);
+    const RayCloud rays = sensing::observe(view, recording.environment, smooth, &normals);
     clouds.push_back(sensing::to_point_cloud(rays, normals));
+    clouds.back().pose_std_m = view.pose_std_m, clouds.back().pose_std_rad = view.pose_std_rad;
   }
   reconstruction::FuseOptions fuse;
   fuse.support = hiding_plane(recording);

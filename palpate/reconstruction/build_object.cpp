@@ -11,6 +11,7 @@
 #include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/geometry/union_find.hpp"
+#include "palpate/reconstruction/facets.hpp"
 #include "palpate/reconstruction/fused_surface.hpp"
 #include "palpate/registration/views.hpp"
 
@@ -126,8 +127,23 @@ void hand_on_uncertainty(BuiltObject& out, const FusedViews& fused) {
   }
 }
 
-/// @param loose_facets  the surface is a heap of facets that share no vertices
-BuiltObject fill(const TriMesh& surface, bool loose_facets, const std::vector<Support>& supports, const BuildOptions& options,
+/// Of the surface's area, where no corner of a triangle was seen.
+double unseen_share(const BuiltObject& object) {
+  const TriMesh& surface = object.model.surface;
+  double unseen = 0, all = 0;
+  for (Index t = 0; t < surface.triangles.rows(); ++t) {
+    const double area = area_of(surface, t).norm();
+    all += area;
+    const auto was_seen = [&](int k) { return object.seen[static_cast<std::size_t>(surface.triangles(t, k))] != 0; };
+    if (!was_seen(0) && !was_seen(1) && !was_seen(2)) unseen += area;
+  }
+  return all > 0 ? unseen / all : 0;
+}
+
+/// Of a surface where it stands: known to its outline, or a few facets that noise moved.
+enum class Foot { outlined, rough };
+
+BuiltObject fill(const TriMesh& surface, Foot foot, const std::vector<Support>& supports, const BuildOptions& options,
                  const OnProgress& progress) {
   for (const Support& s : supports)
     if (!s.vertices.empty())
@@ -141,11 +157,11 @@ BuiltObject fill(const TriMesh& surface, bool loose_facets, const std::vector<Su
   out.model.volume = std::move(filled.mesh);
   for (const Support& s : supports) {
     if (!is_plane(s.kind)) continue;
-    if (loose_facets) geometry::lay_on(s.plane, out.model.volume);
+    if (foot == Foot::rough) geometry::lay_on(s.plane, out.model.volume);
     else geometry::stand_on(s.plane, surface, out.model.volume);
   }
   for (const Plane& plane : options.pressed_faces) {
-    if (loose_facets) geometry::lay_on(plane, out.model.volume);
+    if (foot == Foot::rough) geometry::lay_on(plane, out.model.volume);
     else geometry::stand_on(plane, surface, out.model.volume);
   }
   out.model.embedding = geometry::embed(surface.vertices_m, out.model.volume);
@@ -168,7 +184,7 @@ BuiltObject fill(const TriMesh& surface, bool loose_facets, const std::vector<Su
 
 BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options,
                          const OnProgress& progress) {
-  return fill(surface, false, supports, options, progress);
+  return fill(surface, Foot::outlined, supports, options, progress);
 }
 
 BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions& fuse, const std::vector<Support>& supports,
@@ -195,7 +211,11 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
     }
   }
   const FusedViews fused = fuse_views(clouds, fuse);
-  BuiltObject out = fill(fused.facets, true, supports, options, progress);
+  SurfaceOptions fine;
+  fine.free = fuse.free, fine.support = fuse.support;
+  TriMesh skin;
+  if (fused.inside) skin = fused_surface(fused, fine);
+  BuiltObject out = fill(fused.inside ? skin : fused.facets, Foot::rough, supports, options, progress);
   const double floating = drop_floating(supports, out.model.volume);
   if (floating > 0)
     warnings.push_back(std::to_string(static_cast<int>(100 * floating + 0.5)) +
@@ -206,17 +226,18 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   hand_on_uncertainty(out, fused);
   if (options.fine_surface) {
     const geometry::TriangleTree boundary(out.model.surface);
-    SurfaceOptions fine;
-    fine.free = fuse.free;
     if (floating > 0)
       fine.belongs = [&](const Vec3& p) { return boundary.within(p, std::pow(2 * fused.cell_m, 2)); };
-    out.fine_surface = fused_surface(fused, fine);
+    out.fine_surface = fused.inside && floating == 0 ? std::move(skin) : fused_surface(fused, fine);
     out.fine_embedding = geometry::embed(out.fine_surface.vertices_m, out.model.volume);
   }
   out.view_correction = std::move(correction);
-  // the plane's share was not seen either
-  const double all = fused.seen_area_m2 + fused.support_area_m2;
-  out.model.unseen_share += (1 - out.model.unseen_share) * (all > 0 ? fused.support_area_m2 / all : 0);
+  if (fused.inside) {
+    out.model.unseen_share = unseen_share(out);
+  } else {  // the plane's share was not seen either
+    const double all = fused.seen_area_m2 + fused.support_area_m2;
+    out.model.unseen_share += (1 - out.model.unseen_share) * (all > 0 ? fused.support_area_m2 / all : 0);
+  }
   out.model.warnings = std::move(warnings);  // facets are open by nature; what they say of holes is said by the share
   add_warnings(out.model, out.check.findings);
   if (out.model.unseen_share > 0.05)

@@ -8,7 +8,9 @@
 
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/geometry/winding_number.hpp"
+#include "palpate/reconstruction/cubes.hpp"
 #include "palpate/reconstruction/facets.hpp"
+#include "palpate/reconstruction/hidden_field.hpp"
 #include "palpate/reconstruction/mirrors.hpp"
 
 namespace palpate::reconstruction {
@@ -21,33 +23,6 @@ constexpr double close_cubes = 8;           // to a seen facet, in cubes: ...
 constexpr double anchor_cubes = 2.5;        // ... right behind it, the object was seen
 constexpr double touch_margin = 1.3;        // of a tool's radius
 constexpr double from_behind = 0.3;         // cosine between a push and the way to the sensors
-
-/// Cubes along the support's plane.
-struct Cubes {
-  Mat3 axes;  // columns; the last one points up
-  Vec3 low;   // corner, in those axes
-  double h = 0;
-  std::array<int, 3> n{};
-
-  std::size_t count() const { return std::size_t(n[0]) * std::size_t(n[1]) * std::size_t(n[2]); }
-  std::size_t at(int x, int y, int z) const { return (std::size_t(z) * std::size_t(n[1]) + std::size_t(y)) * std::size_t(n[0]) + std::size_t(x); }
-  bool holds(int x, int y, int z) const { return x >= 0 && y >= 0 && z >= 0 && x < n[0] && y < n[1] && z < n[2]; }
-  Vec3 middle(int x, int y, int z) const { return axes * (low + h * Vec3(x + 0.5, y + 0.5, z + 0.5)); }
-  /// Of the cube that holds a point; -1 outside of all.
-  std::ptrdiff_t of(const Vec3& p) const {
-    const Vec3 local = (axes.transpose() * p - low) / h;
-    const int x = int(std::floor(local.x())), y = int(std::floor(local.y())), z = int(std::floor(local.z()));
-    return holds(x, y, z) ? std::ptrdiff_t(at(x, y, z)) : -1;
-  }
-  template <class Visit>
-  void each(Visit visit) const {
-    for (int z = 0; z < n[2]; ++z)
-      for (int y = 0; y < n[1]; ++y)
-        for (int x = 0; x < n[0]; ++x) visit(x, y, z);
-  }
-};
-
-constexpr std::array<std::array<int, 3>, 6> sides{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
 class Completer {
  public:
@@ -64,7 +39,7 @@ class Completer {
 
   /// Cubes of the solid that is asked for; empty where the planar completion will do.
   std::vector<char> solid() const {
-    if (toward_.isZero() && options_.completion == Completion::mirrored) return {};  // seen from all around, or from above
+    if (toward_.isZero() && options_.completion == Completion::mirrored) return {};  // seen from above
     const geometry::WindingNumber winding(planar_);
     const geometry::TriangleTree to_seen(seen_);
     std::vector<char> hidden(cubes_.count()), planar(cubes_.count()), anchored(cubes_.count());
@@ -105,7 +80,7 @@ class Completer {
         if (!open[k]) return;
         const Vec3 p = cubes_.middle(x, y, z), image = mirror.of(p);
         if (value(out, image)) {
-          const bool within = std::all_of(sides.begin(), sides.end(), [&](const auto& s) {
+          const bool within = std::all_of(Cubes::sides.begin(), Cubes::sides.end(), [&](const auto& s) {
             return z + s[2] < 0 || value(out, mirror.of(p + cubes_.h * cubes_.axes * Vec3(s[0], s[1], s[2])));
           });
           if (within || value(anchored, image)) next[k] = 1, still_open[k] = 0;
@@ -117,7 +92,7 @@ class Completer {
     }
     if (options_.completion == Completion::mirrored) close_grooves(hidden, open, out);
     for (const Touch& touch : options_.touched) reach_to(touch, anchored, out);
-    out = connected(out, planar);
+    out = cubes_.connected(out, planar);
     std::size_t changed = before - static_cast<std::size_t>(std::count(planar.begin(), planar.end(), 1));
     for (std::size_t k = 0; k < out.size(); ++k) changed += out[k] != planar[k];
     return double(changed) < unchanged * double(before) ? std::vector<char>() : out;
@@ -135,7 +110,7 @@ class Completer {
     std::vector<Vec3> middles, normals;
     cubes_.each([&](int x, int y, int z) {
       if (!solid[cubes_.at(x, y, z)]) return;
-      for (const auto& s : sides) {
+      for (const auto& s : Cubes::sides) {
         const int a = x + s[0], b = y + s[1], c = z + s[2];
         if (cubes_.holds(a, b, c) && solid[cubes_.at(a, b, c)]) continue;
         const Vec3 out = cubes_.axes * Vec3(s[0], s[1], s[2]);
@@ -249,27 +224,6 @@ class Completer {
     return {up_, 0.5 * (top + cubes_.low.z())};
   }
 
-  /// Of `from`, what hangs together with `core`.
-  std::vector<char> connected(const std::vector<char>& from, const std::vector<char>& core) const {
-    std::vector<char> out(from.size(), 0);
-    std::vector<std::array<int, 3>> pending;
-    cubes_.each([&](int x, int y, int z) {
-      const std::size_t k = cubes_.at(x, y, z);
-      if (core[k] && from[k]) out[k] = 1, pending.push_back({x, y, z});
-    });
-    while (!pending.empty()) {
-      const auto [x, y, z] = pending.back();
-      pending.pop_back();
-      for (const auto& s : sides) {
-        const int a = x + s[0], b = y + s[1], c = z + s[2];
-        if (!cubes_.holds(a, b, c) || out[cubes_.at(a, b, c)] || !from[cubes_.at(a, b, c)]) continue;
-        out[cubes_.at(a, b, c)] = 1;
-        pending.push_back({a, b, c});
-      }
-    }
-    return out;
-  }
-
   std::vector<double> blur(const std::vector<double>& in) const {
     std::vector<double> out(in.size());
     cubes_.each([&](int x, int y, int z) {
@@ -296,6 +250,10 @@ class Completer {
 
 void complete(FusedViews& fused, const FuseOptions& options) {
   if (!options.free) return;
+  if (fused.around && options.completion != Completion::planar) {
+    fused.inside = hidden_field(fused, options);
+    return;
+  }
   const Completer completer(fused, options);
   const std::vector<char> solid = completer.solid();
   if (solid.empty()) return;

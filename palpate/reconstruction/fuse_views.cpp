@@ -10,9 +10,12 @@
 #include "palpate/core/error.hpp"
 #include "palpate/reconstruction/completion.hpp"
 #include "palpate/reconstruction/facets.hpp"
+#include "palpate/reconstruction/skirts.hpp"
 
 namespace palpate::reconstruction {
 namespace {
+
+constexpr double skirt_cells = 3.5;  // above the support: flanks that end lower go on to it
 
 /// The object's shadow on the plane, closed with facets that face into the support, and walls from the shadow's rim up to
 /// the surface above it.
@@ -134,6 +137,13 @@ FusedViews fuse_views(const std::vector<PointCloud>& clouds, const FuseOptions& 
     out.seen_area_m2 += facets[i].area_m2;
     out.sigma_m[i] = facets[i].sigma_m;
   }
+  const double low_m = skirt_cells * out.cell_m;
+  out.around = options.free && seen_from_all_around(facets, options.support, low_m);
+  if (options.support && out.around && options.completion != Completion::planar) {
+    const auto strip = skirts(facets, *options.support, low_m, out.cell_m, options.free);
+    facets.insert(facets.end(), strip.begin(), strip.end());
+  }
+  out.held = static_cast<Index>(facets.size());
   if (options.support) {
     const auto bottom = down_to(*options.support, facets, out.cell_m);
     for (const Facet& f : bottom) out.support_area_m2 += f.area_m2;

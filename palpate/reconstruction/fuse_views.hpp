@@ -40,6 +40,10 @@ void check(const FuseOptions& options);
 struct FusedViews {
   TriMesh facets;              ///< one triangle a cell, outward, as large as the surface that it stands for; open
   Index seen = 0;              ///< that many facets come first and were seen; the others complete the object
+  Index held = 0;              ///< so many lie on the surface: those seen, and the strip down to the support
+  bool around = false;         ///< seen from all sides, down to the support, and free space is known
+  /// Where it is given, a place is inside where this is above one half, and not where the facets' winding number is.
+  std::function<double(const Vec3&)> inside;
   VectorX sigma_m;             ///< of the seen facets along their normals, from the scatter of the points and their number
   double cell_m = 0;           ///< width that was used
   double seen_area_m2 = 0;     ///< area of the facets that sensors saw

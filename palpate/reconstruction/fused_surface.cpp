@@ -31,8 +31,10 @@ class Field {
   static constexpr double beside = 0.6;  // of the reach: further from every facet is beside the rims
 
  public:
-  Field(const FusedViews& fused, double reach, const std::function<bool(const Vec3&)>& free)
-      : winding_(fused.facets), reach_(reach), grid_({middles_of(fused.facets)}, reach), free_(free) {}
+  Field(const TriMesh& facets, const std::function<double(const Vec3&)>& inside, double reach, const SurfaceOptions& options)
+      : inside_(inside), reach_(reach), grid_({middles_of(facets)}, reach), options_(options) {
+    if (!inside_) winding_.emplace(facets);
+  }
 
   const Grid& facets() const { return grid_; }
   /// Beyond this distance from every facet only the winding number knows the surface.
@@ -40,13 +42,14 @@ class Field {
 
   double operator()(const Vec3& x) {
     const double d = by_facets(x);
+    if (inside_ && options_.support) return std::max(d, options_.support->normal.dot(options_.support->point_m - x));
     return d < 0 && looked_through(x) ? reach_ : d;
   }
 
   /// Did a sensor look through a place that no facet says anything about?
   bool looked_through(const Vec3& x) {
-    if (!free_) return false;
-    return !grid_.any_around(x, [&](Index i) { return (grid_.point(i) - x).squaredNorm() < 0.15 * reach_ * reach_; }) && free_(x);
+    if (!options_.free || inside_) return false;
+    return !grid_.any_around(x, [&](Index i) { return (grid_.point(i) - x).squaredNorm() < 0.15 * reach_ * reach_; }) && options_.free(x);
   }
 
   /// The same as if nobody had looked through anything.
@@ -89,12 +92,13 @@ class Field {
     double weight;  ///< the squared distance at first
   };
 
-  double side(const Vec3& x) const { return std::clamp(2 * (0.5 - winding_(x)), -1.0, 1.0); }
+  double side(const Vec3& x) const { return std::clamp(1 - 2 * (inside_ ? inside_(x) : (*winding_)(x)), -1.0, 1.0); }
 
-  geometry::WindingNumber winding_;
+  const std::function<double(const Vec3&)>& inside_;
+  std::optional<geometry::WindingNumber> winding_;
   double reach_;
   Grid grid_;
-  const std::function<bool(const Vec3&)>& free_;
+  const SurfaceOptions& options_;
   std::vector<Near> near_;
 };
 
@@ -275,16 +279,18 @@ TriMesh fused_surface(const FusedViews& fused, const SurfaceOptions& options) {
     throw Error("must be a length, or 0", "SurfaceOptions: cell_m");
   if (fused.facets.triangles.rows() == 0) throw Error("there is no facet to lay a surface through", "FusedViews: facets");
   const double cell = options.cell_m > 0 ? options.cell_m : 1.1 * fused.cell_m;
-  Field field(fused, 1.25 * fused.cell_m, options.free);
-  const Vec3 low = fused.facets.vertices_m.colwise().minCoeff().transpose();
+  TriMesh facets = fused.facets;
+  if (fused.inside) facets.triangles.conservativeResize(fused.held, 3);  // what completes them is in the field
+  Field field(facets, fused.inside, 1.25 * fused.cell_m, options);
+  const Vec3 low = facets.vertices_m.colwise().minCoeff().transpose();
   March march(field, low - Vec3(0.31, 0.37, 0.43) * cell, cell);
-  for (Index i = 0; i < fused.facets.triangles.rows(); ++i)
-    march.add_cubes_around(fused.facets.vertices_m.row(fused.facets.triangles(i, 0)).transpose());
+  for (Index i = 0; i < facets.triangles.rows(); ++i)
+    march.add_cubes_around(facets.vertices_m.row(facets.triangles(i, 0)).transpose());
   const TriMesh all = march.run();
   TriMesh out = all.triangles.rows() > 0 ? without_specks(all, options.belongs) : all;
   if (out.triangles.rows() == 0)
     throw Error("what was seen encloses nothing: there is no inside. Add views, or complete it with its support", "clouds");
-  smooth_unseen_patches(out, field.facets(), field.known_within_m(), options.free);
+  smooth_unseen_patches(out, field.facets(), field.known_within_m(), options.free, fused.inside ? options.support : std::nullopt);
   return out;
 }
 

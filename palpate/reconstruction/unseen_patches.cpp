@@ -13,6 +13,7 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
+constexpr double stands_within = 0.1;   // of the reach, above the support
 constexpr int rounds = 3;              // edges that were stretched count anew
 constexpr double shortest_edge = 0.2;  // of the reach: marching leaves slivers, which would count without bound
 constexpr int halvings = 4;            // of a way that ends in free space
@@ -47,11 +48,12 @@ void leave_alone_what_nothing_holds(const TriMesh& surface, std::vector<Index>& 
     if (!held[static_cast<std::size_t>(parts.root(static_cast<Index>(v)))]) far[v] = -1;
 }
 
-Places places_of(const TriMesh& surface, const Grid& facets, double reach_m) {
+Places places_of(const TriMesh& surface, const Grid& facets, double reach_m, const std::optional<Plane>& support) {
   const auto count = static_cast<std::size_t>(surface.vertices_m.rows());
   std::vector<Index> far(count, -1);
   for (std::size_t v = 0; v < count; ++v) {
     const Vec3 p = surface.vertices_m.row(static_cast<Index>(v)).transpose();
+    if (support && support->normal.dot(p - support->point_m) < stands_within * reach_m) continue;
     if (!facets.any_around(p, [&](Index i) { return (facets.point(i) - p).squaredNorm() < reach_m * reach_m; })) far[v] = 0;
   }
   leave_alone_what_nothing_holds(surface, far);
@@ -94,8 +96,9 @@ void differences(const TriMesh& surface, const Places& places, double shortest_m
 
 }  // namespace
 
-void smooth_unseen_patches(TriMesh& surface, const Grid& facets, double reach_m, const std::function<bool(const Vec3&)>& free) {
-  const Places places = places_of(surface, facets, reach_m);
+void smooth_unseen_patches(TriMesh& surface, const Grid& facets, double reach_m, const std::function<bool(const Vec3&)>& free,
+                          const std::optional<Plane>& support) {
+  const Places places = places_of(surface, facets, reach_m, support);
   if (places.vertices.empty()) return;
   Sparse moving;
   MatrixX still;
@@ -112,6 +115,7 @@ void smooth_unseen_patches(TriMesh& surface, const Grid& facets, double reach_m,
     for (std::size_t i = 0; i < places.vertices.size(); ++i) {
       const Vec3 was = from.row(static_cast<Index>(i)).transpose();
       Vec3 to = found.row(static_cast<Index>(i)).transpose();
+      if (support) to += std::max(0.0, support->normal.dot(support->point_m - to)) * support->normal;
       for (int k = 0; free && k < halvings && free(to); ++k) to = 0.5 * (was + to);
       if (!free || !free(to)) surface.vertices_m.row(places.vertices[i]) = to.transpose();
     }

@@ -16,6 +16,7 @@ namespace palpate::reconstruction {
 ///                 rim of what was seen the winding number has a part in where they are. Parts that no facet holds stay
 /// @param facets   points are facets' middles; cells at least `reach_m` wide
 /// @param free     says of a place that a sensor looked through it: no vertex moves there; may be empty
-void smooth_unseen_patches(TriMesh& surface, const Grid& facets, double reach_m, const std::function<bool(const Vec3&)>& free);
+void smooth_unseen_patches(TriMesh& surface, const Grid& facets, double reach_m, const std::function<bool(const Vec3&)>& free,
+                          const std::optional<Plane>& support = std::nullopt);
 
 }  // namespace palpate::reconstruction

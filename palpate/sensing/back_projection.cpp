@@ -91,7 +91,8 @@ struct NormalFitter {
   const Points& directions;
 
   // Fits 1/z = a x + b y + c; the plane's normal is (a, b, c) up to length, whatever the plane.
-  Vec3 at(int row, int column) const {
+  /// @param depth_m  if given: the plane's depth at the pixel
+  Vec3 at(int row, int column, double* depth_m = nullptr) const {
     const Vec3 nothing = Vec3::Constant(not_a_number);
     const int rows = int(invalid.rows()), columns = int(invalid.cols()), radius = options.normal_radius_px;
     const double z0 = frame.depth_m(row, column);
@@ -123,6 +124,7 @@ struct NormalFitter {
     scaled = scale.asDiagonal() * scaled * scale.asDiagonal();
     if (!(spread > 0) || std::abs(scaled.determinant()) < 1e-3 * std::pow(count, 3)) return nothing;  // all in a line
     Vec3 plane = scale.asDiagonal() * scaled.inverse() * (scale.asDiagonal() * right_hand_side);
+    if (depth_m && plane.z() > 0) *depth_m = 1 / plane.z();
     plane.z() -= plane.x() * ray.x() + plane.y() * ray.y();  // undo the centring
     if (!(plane.norm() > 0)) return nothing;
     plane.normalize();
@@ -230,7 +232,8 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
   for (int row = 0; row < invalid.rows(); row += options.stride_px)
     for (int column = 0; column < invalid.cols(); column += options.stride_px) {
       if (invalid(row, column)) continue;
-      const Vec3 normal = fit.at(row, column);
+      double smooth_m = frame.depth_m(row, column);
+      const Vec3 normal = fit.at(row, column, &smooth_m);
       if (!normal.allFinite()) continue;
       const Vec3 ray = directions.row(Eigen::Index(row) * invalid.cols() + column);
       const double stretch = ray.norm();  // range = stretch * depth
@@ -242,7 +245,7 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
       // A sample that belongs to a point beside the pixel's centre is off by the surface's slope times that distance.
       const double sideways_m = lateral != nullptr ? lateral(at) * z / frame.camera.fx_px : 0;
       const double sigma = std::hypot(axial_sigma_m(frame.noise, at), sideways_m * std::tan(incidence_rad), rounding_m);
-      hits.push_back({row, column, ray / stretch, normal, z * stretch, sigma * stretch});
+      hits.push_back({row, column, ray / stretch, normal, (options.smooth ? smooth_m : z) * stretch, sigma * stretch});
     }
 
   const auto count = Eigen::Index(hits.size());

@@ -21,6 +21,7 @@ struct BackProjectionOptions {
   int normal_radius_px = 3;          ///< half width of the window that normals are fitted in
   int min_normal_pixels = 6;         ///< fewer neighbours on the same surface: no normal, the pixel is dropped
   double max_incidence_rad = 1.4;    ///< pixels seen at a more grazing angle are dropped
+  bool smooth = false;  ///< ranges are those of the plane that the normal was fitted with: for shapes, not for a likelihood
 };
 
 /// @throws Error naming the option that is out of range.
