@@ -85,13 +85,15 @@ int remake(Session& session, const PaperArguments& arguments) {
                          {"threads", session.thread_count()},
                          {"scenes", nlohmann::json::array()},
                          {"studies", nlohmann::json::array()}};
-  // After every scene: a run that is stopped leaves what it has.
+  // After every seed: a run that is stopped leaves what it has.
   const auto keep = [&] {
+    told["scenes"] = nlohmann::json::array();
+    for (const SceneAnswers& each : answers) told["scenes"].push_back(json_of(each));
     io::write_file(fs::path(arguments.output) / "paper.json", told.dump(2) + "\n");
     io::write_file(fs::path(arguments.output) / "paper.html", paper_page(answers, study_answers, command, session.thread_count()));
   };
   for (const lab::PaperScene* scene : scenes) {
-    SceneAnswers of_scene{scene, {}};
+    if (Session::interrupted()) break;
     SharedModels shared;
     for (int k = 0; k < seeds && !Session::interrupted(); ++k) {
       TrialOptions options;
@@ -103,12 +105,10 @@ int remake(Session& session, const PaperArguments& arguments) {
       const TrialAnswer trial = run_trial(*scene, session.seed + static_cast<std::uint64_t>(k), options, &shared, session.progress());
       if (Session::interrupted()) break;
       session.say(line_of(*scene, trial));
-      of_scene.trials.push_back(trial);
+      if (k == 0) answers.push_back({scene, {}});
+      answers.back().trials.push_back(trial);
+      keep();
     }
-    if (of_scene.trials.empty()) break;
-    told["scenes"].push_back(json_of(of_scene));
-    answers.push_back(std::move(of_scene));
-    keep();
   }
   for (const Study* study : chosen_studies) {
     if (Session::interrupted()) break;
@@ -118,6 +118,7 @@ int remake(Session& session, const PaperArguments& arguments) {
     study_answers.push_back(std::move(answer));
     keep();
   }
+  if (answers.empty() && study_answers.empty()) return exit_numbers;  // stopped before anything was done
   session.say(fmt::format("written            {}", (fs::path(arguments.output) / "paper.html").string()));
   session.result(told);
   return Session::interrupted() ? exit_numbers : exit_done;

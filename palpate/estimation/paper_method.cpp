@@ -63,6 +63,12 @@ double aligned_squared_distance(const geometry::TriangleTree& vertices, Points p
 
 }  // namespace
 
+double slope(std::pair<double, double> behind, const std::pair<double, double>& here, std::pair<double, double> ahead) {
+  if (!std::isfinite(behind.second)) behind = here;
+  if (!std::isfinite(ahead.second)) ahead = here;
+  return ahead.first > behind.first ? (ahead.second - behind.second) / (ahead.first - behind.first) : 0;
+}
+
 struct PaperError::Impl {
   Unknowns unknowns;
   std::unique_ptr<ForwardModel> model;
@@ -184,7 +190,7 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
       behind(k) -= differences[width];
       ahead = inside(ahead);
       behind = inside(behind);
-      gradient(k) = (value(ahead) - value(behind)) / (ahead(k) - behind(k));
+      gradient(k) = slope({behind(k), value(behind)}, {x(k), here}, {ahead(k), value(ahead)});
     }
     // First step: a tenth in log E; afterwards Barzilai and Borwein's length, still along the gradient.
     if (rate < 0) {

@@ -4,6 +4,8 @@
 // derivatives, taken over wider differences where narrow ones show no way down. Mesh, solver and loads are those of `fit`, so what differs is the method.
 #pragma once
 
+#include <utility>
+
 #include "palpate/estimation/fit.hpp"
 
 namespace palpate::estimation {
@@ -15,6 +17,10 @@ inline constexpr std::size_t paper_samples = 10;
 /// @throws Error when no step has a point cloud or a depth image: the paper's method knows no other observation.
 Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
                                const FitOptions& options, const OnProgress& progress = {}, FitMemory* memory = nullptr);
+
+/// The numerical derivative of a function known at three places (place, value): where a side has no value (infinity: no
+/// equilibrium) the other one alone tells; 0 where neither does.
+double slope(std::pair<double, double> behind, const std::pair<double, double>& here, std::pair<double, double> ahead);
 
 /// Its error function (m^2, mean over points) at given parameters: for grid searches.
 class PaperError {

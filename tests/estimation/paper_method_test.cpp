@@ -45,6 +45,14 @@ TEST(PaperMethod, ReachesTheMinimumThatAGridSearchFinds) {
   EXPECT_TRUE(says(answer, "no_uncertainty"));
 }
 
+TEST(PaperMethod, TakesTheSlopeOfTheSideThatHasAnEquilibrium) {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  EXPECT_DOUBLE_EQ(slope({0.9, 1}, {1, 3}, {1.1, 7}), 30);
+  EXPECT_DOUBLE_EQ(slope({0.9, none}, {1, 3}, {1.5, 7}), 8);
+  EXPECT_DOUBLE_EQ(slope({0.5, 1}, {1, 3}, {1.1, none}), 4);
+  EXPECT_DOUBLE_EQ(slope({0.9, none}, {1, 3}, {1.1, none}), 0);
+}
+
 TEST(PaperMethod, WithoutASurfaceIsAnError) {
   Inputs inputs(2);
   inputs[0].push_back(ToolTravel{"finger", 0.001, 1e-4});
