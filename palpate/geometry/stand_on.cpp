@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/tet_quality.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/geometry/union_find.hpp"
 
@@ -19,6 +20,7 @@ namespace {
 
 constexpr double reach = 0.15;         // of the longest edge: faces that near the plane are laid on it
 constexpr double least_volume = 0.2;   // of an element, that it keeps
+constexpr double good_enough = 0.3;    // tet_quality: 17 degrees
 constexpr double outline_reach = 0.7;  // of the mean edge around a node: further it does not go out
 constexpr double beside = 0.5;         // of the longest edge: faces with a corner further beside the foot are not of it
 constexpr double sharp = 0.9;          // cosine between two pieces of the outline that meet at a corner
@@ -28,14 +30,22 @@ double signed_volume(const TetMesh& mesh, Index t) {
   return (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6;
 }
 
-/// Takes back half of a move, and half again, where it leaves an element too little of its volume.
-void keep_volumes(const Points& before, TetMesh& volume) {
+double quality(const TetMesh& mesh, Index t) {
+  const auto node = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(t, k))); };
+  return tet_quality(node(0), node(1), node(2), node(3));
+}
+
+/// Takes back half of a move, and half again, where it leaves an element too little of its volume, or makes one worse than
+/// `least_quality`.
+void keep_elements(const Points& before, TetMesh& volume, double least_quality) {
   constexpr int halvings = 6;  // then the rest
   const TetMesh old{before, volume.tetrahedra};
   for (int round = 0;; ++round) {
     std::set<Index> back;
     for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
-      if (signed_volume(volume, t) >= least_volume * signed_volume(old, t)) continue;
+      const double now = quality(volume, t);
+      const bool good = now >= least_quality || now >= quality(old, t);
+      if (good && signed_volume(volume, t) >= least_volume * signed_volume(old, t)) continue;
       for (int k = 0; k < 4; ++k) {
         const Index i = volume.tetrahedra(t, k);
         if (volume.nodes_m.row(i) != before.row(i)) back.insert(i);
@@ -64,8 +74,9 @@ Triangles boundary_of(const TetMesh& volume) {
   return faces;
 }
 
+/// @param least_quality  of elements, for which faces are rather left where they are
 /// @param may_lie  whether a node, at its place in the plane, may be laid on it, given the face's longest edge
-std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& volume,
+std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& volume, double least_quality,
                           const std::function<bool(const Vec3&, double)>& may_lie) {
   std::set<Index> laid;
   for (Index t = 0; t < faces.rows(); ++t) {
@@ -84,7 +95,7 @@ std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& v
     const Vec3 node = before.row(i);
     volume.nodes_m.row(i) -= plane.normal.dot(node - plane.point_m) * plane.normal.transpose();
   }
-  keep_volumes(before, volume);
+  keep_elements(before, volume, least_quality);
   return laid;
 }
 
@@ -175,7 +186,7 @@ std::vector<FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface)
 }
 
 void lay_on(const Plane& plane, TetMesh& volume) {
-  lay_faces(plane, boundary_of(volume), volume, [](const Vec3&, double) { return true; });
+  lay_faces(plane, boundary_of(volume), volume, good_enough, [](const Vec3&, double) { return true; });
 }
 
 void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume) {
@@ -186,7 +197,7 @@ void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume) {
   const TriangleTree foot(foot_of(plane, surface));
   const auto distance_m = [&](const Vec3& p) { return std::sqrt(foot.closest(p).squared_distance_m2); };
   const Triangles faces = boundary_of(volume);
-  const std::set<Index> laid = lay_faces(plane, faces, volume, [&](const Vec3& p, double edge_m) {
+  const std::set<Index> laid = lay_faces(plane, faces, volume, 0, [&](const Vec3& p, double edge_m) {
     return distance_m(p) < beside * edge_m;
   });
 
@@ -231,7 +242,7 @@ void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume) {
     const Vec3 node = volume.nodes_m.row(i);
     volume.nodes_m.row(i) -= plane.normal.dot(node - plane.point_m) * plane.normal.transpose();
   }
-  keep_volumes(before, volume);
+  keep_elements(before, volume, 0);
 }
 
 }  // namespace palpate::geometry

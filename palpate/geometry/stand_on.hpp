@@ -15,7 +15,8 @@ namespace palpate::geometry {
 /// element loses more than four fifths of its volume.
 void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume);
 
-/// Its first half alone, for surfaces of loose facets, whose foot has no outline.
+/// Its first half alone, for surfaces whose foot has no outline that could be trusted; no element becomes flatter than 17 degrees
+/// for it.
 void lay_on(const Plane& plane, TetMesh& volume);
 
 /// Where a volume must be fine enough to stand on a plane: over each foot of the surface in it, edges of an eighth of the foot's

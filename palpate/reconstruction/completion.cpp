@@ -250,7 +250,7 @@ class Completer {
 
 void complete(FusedViews& fused, const FuseOptions& options) {
   if (!options.free) return;
-  if (fused.around && options.completion != Completion::planar) {
+  if (fused.around) {
     fused.inside = hidden_field(fused, options);
     return;
   }

@@ -139,7 +139,7 @@ FusedViews fuse_views(const std::vector<PointCloud>& clouds, const FuseOptions& 
   }
   const double low_m = skirt_cells * out.cell_m;
   out.around = options.free && seen_from_all_around(facets, options.support, low_m);
-  if (options.support && out.around && options.completion != Completion::planar) {
+  if (options.support && out.around) {
     const auto strip = skirts(facets, *options.support, low_m, out.cell_m, options.free);
     facets.insert(facets.end(), strip.begin(), strip.end());
   }

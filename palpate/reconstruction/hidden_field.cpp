@@ -19,7 +19,8 @@ constexpr int most_cubes_across = 64;   // of the seen part's diagonal
 constexpr double close_cubes = 2.5;     // to a facet: its side is known there
 constexpr double before_facet = 0.5;    // of the distance, along the normal: beside its rim nothing is known
 constexpr double little = 0.3;          // of the field, either way from one half, is what other completions dare
-constexpr double drawn = 0.02;          // to the planar completion, within the root of one over this, in cubes
+constexpr double gently = 0.02;         // drawn to the planar completion, within the root of one over this, in cubes
+constexpr double firmly = 1;            // the same where it is asked for
 
 Cubes lay_cubes(const TriMesh& held, const FusedViews& fused, const FuseOptions& options) {
   const Vec3 up = options.support ? options.support->normal : Vec3(Vec3::UnitZ());
@@ -44,7 +45,7 @@ Cubes lay_cubes(const TriMesh& held, const FusedViews& fused, const FuseOptions&
 enum class Known : char { nothing, inside, outside };
 
 /// Fills in what is not known.
-VectorX relax(const Cubes& cubes, const std::vector<Known>& known, const VectorX& drawn_to, bool level_below) {
+VectorX relax(const Cubes& cubes, const std::vector<Known>& known, const VectorX& drawn_to, double drawn, bool level_below) {
   std::vector<Index> place(cubes.count(), -1);
   Index unknowns = 0;
   for (std::size_t k = 0; k < place.size(); ++k)
@@ -113,7 +114,7 @@ std::function<double(const Vec3&)> hidden_field(const FusedViews& fused, const F
     else if ((close && out > before_facet * far) || options.free(p)) known[k] = Known::outside;
     else drawn_to[static_cast<Index>(k)] = planar(p) > 0.5;
   });
-  VectorX field = relax(cubes, known, drawn_to, options.support.has_value());
+  VectorX field = relax(cubes, known, drawn_to, options.completion == Completion::planar ? firmly : gently, options.support.has_value());
   std::vector<char> solid(cubes.count()), core(cubes.count());
   for (std::size_t k = 0; k < solid.size(); ++k) solid[k] = field[static_cast<Index>(k)] > 0.5, core[k] = known[k] == Known::inside;
   const std::vector<char> whole = cubes.connected(solid, core);

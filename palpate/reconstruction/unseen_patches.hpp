@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "palpate/core/mesh.hpp"
 #include "palpate/reconstruction/facets.hpp"
@@ -16,6 +17,7 @@ namespace palpate::reconstruction {
 ///                 rim of what was seen the winding number has a part in where they are. Parts that no facet holds stay
 /// @param facets   points are facets' middles; cells at least `reach_m` wide
 /// @param free     says of a place that a sensor looked through it: no vertex moves there; may be empty
+/// @param support  where given: vertices on it stay, and none moves behind it
 void smooth_unseen_patches(TriMesh& surface, const Grid& facets, double reach_m, const std::function<bool(const Vec3&)>& free,
                           const std::optional<Plane>& support = std::nullopt);
 
