@@ -11,13 +11,12 @@
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/identify.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/report/mesh_picture.hpp"
-#include "palpate/sensing/free_space.hpp"
-#include "palpate/sensing/observe.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -43,19 +42,7 @@ reconstruction::BuiltObject build_from_recording(const Options& o, const reconst
   const Rest& rest = recording.rest;
   if (rest.volume) return reconstruction::build_object(*rest.volume, recording.supports);
   if (rest.surface) return reconstruction::build_object(*rest.surface, recording.supports, options, session.progress());
-  std::vector<PointCloud> clouds;
-  sensing::ObserveOptions smooth;
-  smooth.back_projection.smooth = true;
-  for (const DepthFrame& view : rest.views) {
-    Points normals;
-    const RayCloud rays = sensing::observe(view, recording.environment, smooth, &normals);
-    clouds.push_back(sensing::to_point_cloud(rays, normals));
-    clouds.back().pose_std_m = view.pose_std_m, clouds.back().pose_std_rad = view.pose_std_rad;
-  }
-  reconstruction::FuseOptions fuse;
-  if (!recording.environment.planes.empty()) fuse.support = recording.environment.planes.front();
-  fuse.free = sensing::FreeSpace(rest.views);
-  return reconstruction::build_object(clouds, fuse, recording.supports, options, session.progress());
+  return build_from_views(recording, options, reconstruction::Completion::mirrored, session.progress());
 }
 
 reconstruction::BuiltObject build(const Options& o, Session& session) {

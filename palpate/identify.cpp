@@ -138,26 +138,6 @@ std::optional<Plane> hiding_plane(const Recording& recording) {
   return std::nullopt;
 }
 
-reconstruction::BuiltObject build_from_views(const Recording& recording, const reconstruction::BuildOptions& options,
-                                             reconstruction::Completion completion, const OnProgress& progress) {
-  std::vector<PointCloud> clouds;
-  sensing::ObserveOptions smooth;
-  smooth.back_projection.smooth = true;
-  const std::vector<DepthFrame> images = sensing::images_at_rest(recording);
-  for (const DepthFrame& view : images) {
-    Points normals;
-    const RayCloud rays = sensing::observe(view, recording.environment, smooth, &normals);
-    clouds.push_back(sensing::to_point_cloud(rays, normals));
-    clouds.back().pose_std_m = view.pose_std_m, clouds.back().pose_std_rad = view.pose_std_rad;
-  }
-  reconstruction::FuseOptions fuse;
-  fuse.support = hiding_plane(recording);
-  fuse.free = sensing::FreeSpace(images);
-  fuse.completion = completion;
-  fuse.touched = touched_places(recording);
-  return reconstruction::build_object(clouds, fuse, recording.supports, options, progress);
-}
-
 /// How far the seen part of a surface that was fused from views is off; 0 for one that was given.
 double seen_std_m(const reconstruction::BuiltObject& built) {
   double sum = 0;
@@ -246,6 +226,32 @@ std::map<std::string, std::string> provenance(const Recording& recording, const 
 }
 
 }  // namespace
+
+reconstruction::BuiltObject build_from_views(const Recording& recording, const reconstruction::BuildOptions& options,
+                                             reconstruction::Completion completion, const OnProgress& progress) {
+  const std::vector<DepthFrame> images = sensing::images_at_rest(recording);
+  reconstruction::FuseOptions fuse;
+  fuse.support = hiding_plane(recording);
+  fuse.free = sensing::FreeSpace(images);
+  fuse.completion = completion;
+  fuse.touched = touched_places(recording);
+  const auto build = [&](bool smooth) {
+    sensing::ObserveOptions observing;
+    observing.back_projection.smooth = smooth;
+    std::vector<PointCloud> clouds;
+    for (const DepthFrame& view : images) {
+      Points normals;
+      const RayCloud rays = sensing::observe(view, recording.environment, observing, &normals);
+      clouds.push_back(sensing::to_point_cloud(rays, normals));
+      if (smooth) clouds.back().pose_std_m = view.pose_std_m, clouds.back().pose_std_rad = view.pose_std_rad;
+    }
+    return reconstruction::build_object(clouds, fuse, recording.supports, options, progress);
+  };
+  auto built = build(true);
+  // Of one side too much is made in any case: rims that noise curls in make the mirrored side smaller (bears that one camera
+  // saw share 0.76 of the volume of both then, else 0.74). And closest points of raw depths would draw views into each other.
+  return built.around ? std::move(built) : build(false);
+}
 
 Recording with_overrides(Recording recording, const IdentifyOptions& options) {
   ModelDefaults& model = recording.model;

@@ -13,7 +13,7 @@
 #include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/shape_error.hpp"
-#include "palpate/reconstruction/fuse_views.hpp"
+#include "palpate/reconstruction/build_object.hpp"
 
 namespace palpate {
 
@@ -47,6 +47,13 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options);
 /// planes of the environment or nothing near the object.
 /// @param masked_m  if given: one entry a step, some of what the masks took away near the object, for figures
 estimation::Inputs observe(const Recording& recording, std::vector<Points>* masked_m = nullptr);
+
+/// The object at rest out of the views of it, the recording's (rest.views) and those of the pushes before contact, closed on the
+/// table. Poses with a prior are corrected where the object was seen from all around.
+/// @throws Error as reconstruction::build_object.
+reconstruction::BuiltObject build_from_views(const Recording& recording, const reconstruction::BuildOptions& options = {},
+                                             reconstruction::Completion completion = reconstruction::Completion::mirrored,
+                                             const OnProgress& progress = {});
 
 /// Stage 2: the object as the solver sees it: volume mesh, element, simulated surface. Says the chosen element in the
 /// recording's model, and what was built (surface, volume, supports with the tolerance that their nodes need) in the recording.

@@ -20,7 +20,6 @@ namespace {
 
 constexpr double reach = 0.15;         // of the longest edge: faces that near the plane are laid on it
 constexpr double least_volume = 0.2;   // of an element, that it keeps
-constexpr double good_enough = 0.3;    // tet_quality: 17 degrees
 constexpr double outline_reach = 0.7;  // of the mean edge around a node: further it does not go out
 constexpr double beside = 0.5;         // of the longest edge: faces with a corner further beside the foot are not of it
 constexpr double sharp = 0.9;          // cosine between two pieces of the outline that meet at a corner
@@ -185,19 +184,19 @@ std::vector<FinerNear> finer_at_feet(const Plane& plane, const TriMesh& surface)
   return finer;
 }
 
-void lay_on(const Plane& plane, TetMesh& volume) {
-  lay_faces(plane, boundary_of(volume), volume, good_enough, [](const Vec3&, double) { return true; });
+void lay_on(const Plane& plane, TetMesh& volume, double least_quality) {
+  lay_faces(plane, boundary_of(volume), volume, least_quality, [](const Vec3&, double) { return true; });
 }
 
-void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume) {
+void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume, double least_quality) {
   const Outline outline = outline_of(plane, surface);
-  if (outline.pieces.empty()) return lay_on(plane, volume);
+  if (outline.pieces.empty()) return lay_on(plane, volume, least_quality);
   // A round object leaves the plane so slowly that faces beside its foot lie as near to the plane as those of the foot. One held
   // node too many on one side, and the object tilts under its load: only what can reach the outline is laid.
   const TriangleTree foot(foot_of(plane, surface));
   const auto distance_m = [&](const Vec3& p) { return std::sqrt(foot.closest(p).squared_distance_m2); };
   const Triangles faces = boundary_of(volume);
-  const std::set<Index> laid = lay_faces(plane, faces, volume, 0, [&](const Vec3& p, double edge_m) {
+  const std::set<Index> laid = lay_faces(plane, faces, volume, least_quality, [&](const Vec3& p, double edge_m) {
     return distance_m(p) < beside * edge_m;
   });
 
@@ -242,7 +241,7 @@ void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume) {
     const Vec3 node = volume.nodes_m.row(i);
     volume.nodes_m.row(i) -= plane.normal.dot(node - plane.point_m) * plane.normal.transpose();
   }
-  keep_elements(before, volume, 0);
+  keep_elements(before, volume, least_quality);
 }
 
 }  // namespace palpate::geometry

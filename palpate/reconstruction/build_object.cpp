@@ -140,8 +140,10 @@ double unseen_share(const BuiltObject& object) {
   return all > 0 ? unseen / all : 0;
 }
 
-/// Of a surface where it stands: known to its outline, or a few facets that noise moved.
-enum class Foot { outlined, rough };
+constexpr double good_enough = 0.3;  // tet_quality: 17 degrees
+
+/// Of a surface where it stands: given to its outline, an outline that noise moved, or loose facets.
+enum class Foot { given, found, loose };
 
 BuiltObject fill(const TriMesh& surface, Foot foot, const std::vector<Support>& supports, const BuildOptions& options,
                  const OnProgress& progress) {
@@ -155,14 +157,16 @@ BuiltObject fill(const TriMesh& surface, Foot foot, const std::vector<Support>& 
   BuiltObject out;
   out.model.surface = surface;
   out.model.volume = std::move(filled.mesh);
+  const auto stand = [&](const Plane& plane) {
+    if (foot == Foot::loose) geometry::lay_on(plane, out.model.volume);
+    else geometry::stand_on(plane, surface, out.model.volume, foot == Foot::found ? good_enough : 0);
+  };
   for (const Support& s : supports) {
     if (!is_plane(s.kind)) continue;
-    if (foot == Foot::rough) geometry::lay_on(s.plane, out.model.volume);
-    else geometry::stand_on(s.plane, surface, out.model.volume);
+    stand(s.plane);
   }
   for (const Plane& plane : options.pressed_faces) {
-    if (foot == Foot::rough) geometry::lay_on(plane, out.model.volume);
-    else geometry::stand_on(plane, surface, out.model.volume);
+    stand(plane);
   }
   out.model.embedding = geometry::embed(surface.vertices_m, out.model.volume);
   out.model.supports = supports;
@@ -184,7 +188,7 @@ BuiltObject fill(const TriMesh& surface, Foot foot, const std::vector<Support>& 
 
 BuiltObject build_object(const TriMesh& surface, const std::vector<Support>& supports, const BuildOptions& options,
                          const OnProgress& progress) {
-  return fill(surface, Foot::outlined, supports, options, progress);
+  return fill(surface, Foot::given, supports, options, progress);
 }
 
 BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions& fuse, const std::vector<Support>& supports,
@@ -215,7 +219,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   fine.free = fuse.free, fine.support = fuse.support;
   TriMesh skin;
   if (fused.inside) skin = fused_surface(fused, fine);
-  BuiltObject out = fill(fused.inside ? skin : fused.facets, Foot::rough, supports, options, progress);
+  BuiltObject out = fill(fused.inside ? skin : fused.facets, fused.inside ? Foot::found : Foot::loose, supports, options, progress);
   const double floating = drop_floating(supports, out.model.volume);
   if (floating > 0)
     warnings.push_back(std::to_string(static_cast<int>(100 * floating + 0.5)) +
@@ -223,6 +227,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   if (floating > 0) out.check = geometry::check_volume(out.model.volume);
   out.model.surface = geometry::boundary_surface(out.model.volume).surface;
   out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
+  out.around = fused.around;
   hand_on_uncertainty(out, fused);
   if (options.fine_surface) {
     const geometry::TriangleTree boundary(out.model.surface);

@@ -30,6 +30,7 @@ struct BuiltObject {
   /// carries it along.
   TriMesh fine_surface;
   SurfaceEmbedding fine_embedding;
+  bool around = false;     ///< of views: the object was seen from all sides, down to its support (FusedViews::around)
   std::vector<char> seen;  ///< a vertex of model.surface: 1 where a sensor saw it; empty where it was given
   std::vector<Pose>
       view_correction;  ///< applied to each view on the left before fusing; empty when poses were taken as known

@@ -14,6 +14,8 @@
 namespace palpate::reconstruction {
 namespace {
 
+constexpr double stands_within = 0.02;  // of the lattice's cell, of a support
+
 PointCloud middles_of(const TriMesh& facets) {
   PointCloud out;
   out.points_m.resize(facets.triangles.rows(), 3);
@@ -290,6 +292,13 @@ TriMesh fused_surface(const FusedViews& fused, const SurfaceOptions& options) {
   TriMesh out = all.triangles.rows() > 0 ? without_specks(all, options.belongs) : all;
   if (out.triangles.rows() == 0)
     throw Error("what was seen encloses nothing: there is no inside. Add views, or complete it with its support", "clouds");
+  if (fused.inside && options.support) {  // marching leaves the foot within a hair of the plane
+    const Plane& plane = *options.support;
+    for (Index v = 0; v < out.vertices_m.rows(); ++v) {
+      const double height_m = plane.normal.dot(Vec3(out.vertices_m.row(v)) - plane.point_m);
+      if (std::abs(height_m) < stands_within * cell) out.vertices_m.row(v) -= height_m * plane.normal.transpose();
+    }
+  }
   smooth_unseen_patches(out, field.facets(), field.known_within_m(), options.free, fused.inside ? options.support : std::nullopt);
   return out;
 }

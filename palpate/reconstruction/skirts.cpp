@@ -10,13 +10,39 @@ namespace {
 constexpr double step_cells = 0.8;
 constexpr double same_place_cells = 0.7;
 constexpr double steepest_normal = 0.8;  // along the plane's normal: flatter parts have no way down
-constexpr double smooth_cells = 2.5;     // over which the direction of a flank is averaged
+constexpr double smooth_cells = 4;       // over which a flank tells how it goes on
 
 PointCloud middles_of(const std::vector<Facet>& facets) {
   PointCloud out;
   out.points_m.resize(static_cast<Index>(facets.size()), 3), out.normals.resize(static_cast<Index>(facets.size()), 3);
   for (std::size_t i = 0; i < facets.size(); ++i)
     out.points_m.row(static_cast<Index>(i)) = facets[i].middle.transpose(), out.normals.row(static_cast<Index>(i)) = facets[i].normal.transpose();
+  return out;
+}
+
+/// How a flank goes on below a facet: its normal changes as it did above.
+struct Flank {
+  Vec3 normal = Vec3::Zero(), change_per_m = Vec3::Zero();
+  Vec3 normal_at(double below_m) const { return (normal + below_m * change_per_m).normalized(); }
+};
+
+Flank flank_at(const Facet& from, const Vec3& up, const Grid& facets, double reach_m) {
+  const Vec3 down = (up.dot(from.normal) * from.normal - up).normalized();
+  double w = 0, ws = 0, wss = 0;
+  Vec3 n = Vec3::Zero(), ns = Vec3::Zero();
+  facets.around(from.middle, 1, [&](Index i) {
+    const Vec3 d = facets.point(i) - from.middle;
+    const double r2 = d.squaredNorm() / (reach_m * reach_m);
+    if (r2 > 1 || facets.normal(i).dot(from.normal) < 0.3) return;
+    const double weight = (1 - r2) * (1 - r2), below = d.dot(down);
+    w += weight, ws += weight * below, wss += weight * below * below;
+    n += weight * facets.normal(i), ns += weight * below * facets.normal(i);
+  });
+  // A straight line through the normals; few of them, or all at one height, carry no change.
+  const double spread = wss - ws * ws / w + 0.002 * w * reach_m * reach_m;
+  Flank out;
+  out.change_per_m = (ns - ws / w * n) / spread;
+  out.normal = n / w - ws / w * out.change_per_m;
   return out;
 }
 
@@ -55,19 +81,17 @@ std::vector<Facet> skirts(const std::vector<Facet>& seen, const Plane& plane, do
   };
   for (const Facet& from : seen) {
     if (height(from.middle) > height_m) continue;
-    Vec3 normal = Vec3::Zero();
-    grid.around(from.middle, 1, [&](Index i) {
-      const double r2 = (grid.point(i) - from.middle).squaredNorm() / std::pow(smooth_cells * cell_m, 2);
-      if (r2 > 1 || grid.normal(i).dot(from.normal) < 0.5) return;
-      normal += (1 - r2) * grid.normal(i);
-    });
-    normal.normalize();
-    const double along = plane.normal.dot(normal);
-    if (std::abs(along) > steepest_normal) continue;
-    const Vec3 down = (along * normal - plane.normal).normalized();
-    Vec3 at = from.middle + step_cells * cell_m * down;
-    for (; height(at) > -0.5 * step_cells * cell_m && !covered(at, normal) && !(free && free(at)); at += step_cells * cell_m * down)
+    if (std::abs(plane.normal.dot(from.normal)) > steepest_normal) continue;
+    const Flank flank = flank_at(from, plane.normal, grid, smooth_cells * cell_m);
+    Vec3 at = from.middle;
+    for (double gone_m = step_cells * cell_m;; gone_m += step_cells * cell_m) {
+      const Vec3 halfway = flank.normal_at(gone_m - 0.5 * step_cells * cell_m), normal = flank.normal_at(gone_m);
+      const double along = plane.normal.dot(halfway);
+      if (std::abs(along) > steepest_normal) break;  // it has turned to the plane, or away from it
+      at += step_cells * cell_m * (along * halfway - plane.normal).normalized();
+      if (height(at) < -0.5 * step_cells * cell_m || covered(at, normal) || (free && free(at))) break;
       out.push_back({at, normal, from.area_m2, from.sigma_m});
+    }
   }
   return out;
 }
