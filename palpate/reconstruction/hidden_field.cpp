@@ -79,13 +79,13 @@ VectorX relax(const Cubes& cubes, const std::vector<Known>& known, const VectorX
   return out;
 }
 
-/// Between the middles of cubes; a cube that is not there counts as the nearest one below, and as outside elsewhere.
-double interpolated(const Cubes& cubes, const VectorX& values, const Vec3& p) {
+/// Between the middles of cubes. What lies below all of them is as the lowest ones (`level_below`), else outside, as it is beside them.
+double interpolated(const Cubes& cubes, const VectorX& values, const Vec3& p, bool level_below) {
   const Vec3 local = (cubes.axes.transpose() * p - cubes.low) / cubes.h - Vec3::Constant(0.5);
   const Vec3 low = local.array().floor(), share = local - low;
   double out = 0;
   for (int corner = 0; corner < 8; ++corner) {
-    const int x = int(low.x()) + (corner & 1), y = int(low.y()) + (corner >> 1 & 1), z = std::max(0, int(low.z()) + (corner >> 2));
+    const int x = int(low.x()) + (corner & 1), y = int(low.y()) + (corner >> 1 & 1), own = int(low.z()) + (corner >> 2), z = level_below ? std::max(0, own) : own;
     if (!cubes.holds(x, y, z)) continue;
     out += (corner & 1 ? share.x() : 1 - share.x()) * (corner & 2 ? share.y() : 1 - share.y()) * (corner & 4 ? share.z() : 1 - share.z()) *
            values[static_cast<Index>(cubes.at(x, y, z))];
@@ -103,15 +103,19 @@ std::function<double(const Vec3&)> hidden_field(const FusedViews& fused, const F
   const geometry::TriangleTree to_held(held);
   std::vector<Known> known(cubes.count(), Known::nothing);
   VectorX drawn_to = VectorX::Zero(static_cast<Index>(cubes.count()));
+  const double reach_m2 = std::pow(close_cubes * cubes.h, 2);
   cubes.each([&](int x, int y, int z) {
     const Vec3 p = cubes.middle(x, y, z);
     const std::size_t k = cubes.at(x, y, z);
-    const auto c = to_held.closest(p);
-    const Vec3 from = p - c.point_m;
-    const double far = from.norm(), out = from.dot(area_of(held, c.triangle).normalized());
-    const bool close = far < close_cubes * cubes.h;
-    if (close && out < -before_facet * far) known[k] = Known::inside;
-    else if ((close && out > before_facet * far) || options.free(p)) known[k] = Known::outside;
+    if (to_held.within(p, reach_m2)) {
+      const auto c = to_held.closest(p);
+      const Vec3 from = p - c.point_m;
+      const double far = from.norm(), out = from.dot(area_of(held, c.triangle).normalized());
+      if (out < -before_facet * far) known[k] = Known::inside;
+      else if (out > before_facet * far) known[k] = Known::outside;
+    }
+    if (known[k] != Known::nothing) return;
+    if (options.free(p)) known[k] = Known::outside;
     else drawn_to[static_cast<Index>(k)] = planar(p) > 0.5;
   });
   VectorX field = relax(cubes, known, drawn_to, options.completion == Completion::planar ? firmly : gently, options.support.has_value());
@@ -122,7 +126,9 @@ std::function<double(const Vec3&)> hidden_field(const FusedViews& fused, const F
     if (solid[k] && !whole[k]) field[static_cast<Index>(k)] = 0;
   if (options.completion == Completion::tapered) field.array() -= little;
   if (options.completion == Completion::hidden) field.array() += little;
-  return [cubes, values = std::make_shared<const VectorX>(std::move(field))](const Vec3& p) { return interpolated(cubes, *values, p); };
+  return [cubes, values = std::make_shared<const VectorX>(std::move(field)), level_below = options.support.has_value()](const Vec3& p) {
+    return interpolated(cubes, *values, p, level_below);
+  };
 }
 
 }  // namespace palpate::reconstruction
