@@ -247,10 +247,14 @@ reconstruction::BuiltObject build_from_views(const Recording& recording, const r
     }
     return reconstruction::build_object(clouds, fuse, recording.supports, options, progress);
   };
-  auto built = build(true);
+  std::optional<reconstruction::BuiltObject> built;
+  try {
+    built = build(true);
+  } catch (const Error&) {  // the raw points may still enclose something; if not, they say why
+  }
   // Of one side too much is made in any case: rims that noise curls in make the mirrored side smaller (bears that one camera
   // saw share 0.76 of the volume of both then, else 0.74). And closest points of raw depths would draw views into each other.
-  return built.around ? std::move(built) : build(false);
+  return built && built->around ? std::move(*built) : build(false);
 }
 
 Recording with_overrides(Recording recording, const IdentifyOptions& options) {
