@@ -9,7 +9,8 @@ namespace palpate::reconstruction {
 /// 1 close behind the facets that are held, 0 close before them and where a sensor looked through, harmonic between, level
 /// at the support and gently drawn to what the planar completion says: a skin that spans gaps, stands upright on the table, and
 /// takes what hides below an overhang for solid where no free space is near. What hangs together with no facet is outside.
-/// Of the other completions, `planar` is followed wherever nothing is known, `tapered` takes the space that little speaks for away, and `hidden` takes what little speaks against.
+/// Of the other completions, `planar` is followed wherever nothing is known, `tapered` leaves out what little speaks for, and
+/// `hidden` takes in what little speaks against.
 /// @returns a function of a place: inside where it is above one half
 std::function<double(const Vec3&)> hidden_field(const FusedViews& fused, const FuseOptions& options);
 
