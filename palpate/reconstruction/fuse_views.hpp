@@ -10,7 +10,7 @@
 
 namespace palpate::reconstruction {
 
-/// What is taken to be there where nobody looked.
+/// What is taken to be there where nobody looked. Of an object seen from all around, what hidden_field makes of each.
 enum class Completion {
   planar,    ///< nothing but what the support hides: the back is flat, as in the paper
   mirrored,  ///< what the mirror image of the front says, where that was seen
