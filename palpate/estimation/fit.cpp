@@ -241,11 +241,15 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     if (optimum.evaluation.usable) answer.parameters = parameters_so_far(optimum.unknowns);
     return answer;
   };
-  // Neighbouring pixels err together: count them as fewer, and fit once more with that weight.
+  // Neighbouring pixels err together. What they share within a frame alone is noise, which is integrated out; what else their means
+  // have in common makes them count as fewer. With that, once more.
   const auto weigh_neighbours = [&] {
-    const double weight = residuals.variance_inflation > 1.05 ? 1 / residuals.variance_inflation : 1;
-    if (weight == loss.surface_weight) return true;
-    loss.surface_weight = weight;
+    Loss next = loss;
+    if (!next.noise) next.noise = shared_noise(objective, loss);
+    const double inflation = residuals.variance_inflation / (next.noise ? next.noise->inflation : 1);
+    next.surface_weight = inflation > 1.05 ? 1 / inflation : 1;
+    if (next.weighs_like(loss)) return true;
+    loss = next;
     return optimise_again();
   };
   residuals = objective.summarise(loss);
@@ -367,7 +371,10 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   answer.fit.load_cases = model.load_cases() + load_cases_of_meshes;
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts, certificate});
   if (doubt != nullptr) answer.verdicts.push_back(partly_seen(*doubt));
-  answer.provenance["variance inflation of correlated points"] = std::to_string(1 / loss.surface_weight);
+  answer.provenance["variance inflation of correlated points"] = std::to_string((loss.noise ? loss.noise->inflation : 1) / loss.surface_weight);
+  if (loss.noise)
+    answer.provenance["noise that neighbours share"] = fmt::format("{:.2g} of a point's standard deviation over {:.1f} mm",
+                                                                   std::sqrt(loss.noise->correlation.share), 1e3 * loss.noise->correlation.length_m);
   if (certificate)
     answer.provenance["full solve of the hardest step"] =
         certificate->converged ? fmt::format("{:.1e} of its motion away from the answer", certificate->difference) : certificate->reason;

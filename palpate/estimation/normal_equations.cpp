@@ -61,6 +61,17 @@ double relevance(const TermRows& rows, const Loss& loss) {
 WeighedRows weigh(const TermRows& rows, const Loss& loss) {
   const double each = relevance(rows, loss);
   WeighedRows out;
+  out.each = each;
+  if (rows.shared_noise) {  // weights that stay: a quadratic form
+    out.weight = each * rows.shared_noise->weight();
+    for (Index i = 0; i < rows.residual.size(); ++i) {
+      const bool there = std::isfinite(rows.residual(i));
+      const double r = there ? rows.residual(i) : loss.tukey;  // a ray that passes by, of those that hit
+      out.cost += 0.5 * out.weight(i) * r * r;
+      if (!there) out.weight(i) = 0;
+    }
+    return out;
+  }
   if (!rows.robust) {
     out.weight = VectorX::Constant(rows.residual.size(), each);
     out.cost = 0.5 * each * rows.residual.squaredNorm();
@@ -84,12 +95,21 @@ WeighedRows weigh(const TermRows& rows, const Loss& loss) {
 }
 
 void add_rows(const TermRows& rows, const Loss& loss, const std::vector<int>& places, Evaluation& out) {
-  const auto [weight, cost, bend] = weigh(rows, loss);
-  (rows.robust ? out.robust_cost : out.cost) += cost;
+  auto [each, weight, cost, bend] = weigh(rows, loss);
   const VectorX finite = (weight.array() == 0).select(0, rows.residual);
   const MatrixX weighted = weight.asDiagonal() * rows.jacobian;
-  const MatrixX block = rows.jacobian.transpose() * weighted;
-  const VectorX slope = weighted.transpose() * finite;
+  MatrixX block = rows.jacobian.transpose() * weighted;
+  VectorX slope = weighted.transpose() * finite;
+  if (rows.shared_noise) {
+    const auto modes = rows.shared_noise->modes().transpose();
+    const MatrixX of_rows = modes * weighted;
+    const VectorX of_residual = modes * weight.cwiseProduct(finite);
+    const MatrixX shrunk = rows.shared_noise->shrunk(of_rows) / each;
+    block -= of_rows.transpose() * shrunk;
+    slope -= shrunk.transpose() * of_residual;
+    cost -= 0.5 * of_residual.dot(rows.shared_noise->shrunk(of_residual).col(0)) / each;
+  }
+  (rows.robust ? out.robust_cost : out.cost) += cost;
   for (std::size_t a = 0; a < places.size(); ++a) {
     out.gradient(places[a]) += slope(static_cast<Index>(a));
     for (std::size_t b = 0; b < places.size(); ++b) {

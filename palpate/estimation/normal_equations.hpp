@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "palpate/estimation/shared_noise.hpp"
 #include "palpate/estimation/terms/term.hpp"
 
 namespace palpate::estimation {
@@ -24,13 +25,15 @@ struct Loss {
   /// number of such rays, which no gradient knows of, and favours whatever makes the object look larger.
   std::vector<std::shared_ptr<const RaysOfStep>> rays;
   double surface_weight = 1;  ///< of rows with neighbours whose errors are correlated: 1 / variance inflation
+  /// Noise that neighbours share, once it was found; nullptr: none. Robust weights are then what they were there.
+  std::shared_ptr<const SharedNoises> noise = {};
 
   const RaysOfStep* rays_of(std::size_t step) const { return step < rays.size() ? rays[step].get() : nullptr; }
   bool counts(std::size_t step) const { return step % every == every / 2 && (steps.empty() || steps[step] != 0); }
   /// The same for rows of a step, whichever rays count.
   bool weighs_like(const Loss& other) const {
     return tukey == other.tukey && widening == other.widening && along_rays == other.along_rays &&
-           surface_weight == other.surface_weight;
+           surface_weight == other.surface_weight && noise == other.noise;
   }
 };
 
@@ -62,6 +65,7 @@ double tukey_information_factor(double cut);
 
 /// What the loss makes of some rows.
 struct WeighedRows {
+  double each = 1;  ///< what every square counts before the loss
   VectorX weight;   ///< a row: how often its square counts; nothing but outliers that weigh nothing may have a residual that is not finite
   double cost = 0;  ///< sum of rho
   /// Curvature of the loss over the weights, on average over the rows: below one where Tukey's loss bends less than its weights say.

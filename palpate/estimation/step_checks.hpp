@@ -31,7 +31,7 @@ std::optional<StepChange> object_motion(const Objective& objective, const Optimu
 /// the first.
 std::optional<StepChange> settling(const Objective& objective, const Optimum& optimum, double factor);
 
-/// Do means of neighbours (image or space cells) scatter more than independent errors would? Analysis of variance, in standard
+/// Do means of neighbours (image or space cells) scatter more than independent errors, and noise that is known to be shared, would? Analysis of variance, in standard
 /// normal deviates (Wilson and Hilferty 1931).
 struct Pattern {
   double deviate = 0;

@@ -94,7 +94,6 @@ SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows
   constexpr int narrow = 16, wide = 24;  // whole vector registers: three corners, own unknowns, residual
   if (rows.facets) {
     gather_facets(seen);
-    if (there.field != nullptr) append_modes(there);
   } else if (10 + count <= narrow) {
     gather<narrow>(seen);
   } else if (10 + count <= wide) {
@@ -102,6 +101,8 @@ SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows
   } else {
     gather<Eigen::Dynamic>(seen);
   }
+  if (rows.shared_noise) gather_noise(seen, weighed.each);
+  if (rows.facets && there.field != nullptr) append_modes(there);
   own_at_ = unknowns(own_);
 }
 
@@ -141,6 +142,64 @@ void SurfaceQuadratic::gather_facets(const Seen& seen) {
     own_block_ += own.transpose().lazyProduct(bent);
     own_slope_ += own.transpose().lazyProduct(sum.slope);
   }
+}
+
+/// What is integrated out takes from the form what its modes and the rows have in common.
+void SurfaceQuadratic::gather_noise(const Seen& seen, double each) {
+  noise_ = seen.rows.shared_noise;
+  noise_weight_ = each;
+  const SharedNoise::Modes& modes = noise_->modes();
+  const Index places = static_cast<Index>(modes.cols());
+  MatrixX of_own = MatrixX::Zero(places, seen.own_count);
+  VectorX of_residual = VectorX::Zero(places), own_row(seen.own_count);
+  std::vector<Eigen::Triplet<double>> entries;
+  // Rows of one triangle have most places in common: one entry for all of them.
+  std::vector<int> touched;
+  std::vector<Mat3> sums(static_cast<std::size_t>(places), Mat3::Zero());
+  std::vector<char> met(static_cast<std::size_t>(places), 0);
+  const std::vector<Index> order = seen.rows_by_triangle();
+  for (std::size_t from = 0; from < order.size();) {
+    const Index triangle = seen.triangle_of(order[from]);
+    for (; from < order.size() && seen.triangle_of(order[from]) == triangle; ++from) {
+      const Index i = order[from];
+      Mat3 per_corner;
+      if (seen.rows.facets) {
+        const FacetSlopes& facets = *seen.rows.facets;
+        per_corner = -facets.normal.row(triangle).transpose() * facets.share.row(i).head<3>();
+        own_row = facets.own.middleRows<FacetSlopes::shares>(FacetSlopes::shares * triangle).transpose() * facets.share.row(i).transpose();
+      } else {
+        per_corner = seen.rows.surface[static_cast<std::size_t>(i)].per_corner;
+        own_row = seen.rows.jacobian.row(i).segment(seen.own_first, seen.own_count).transpose();
+      }
+      for (SharedNoise::Modes::InnerIterator mode(modes, i); mode; ++mode) {
+        const auto place = static_cast<std::size_t>(mode.col());
+        const double share = seen.weight(i) * mode.value();
+        if (!met[place]) met[place] = 1, touched.push_back(static_cast<int>(place));
+        sums[place] += share * per_corner;
+        of_own.row(mode.col()) += share * own_row.transpose();
+        of_residual(mode.col()) += share * seen.rows.residual(i);
+      }
+    }
+    for (const int place : touched) {
+      for (int k = 0; k < 3; ++k) {
+        const int at = static_cast<int>(3 * seen.vertex[static_cast<std::size_t>(seen.pattern.triangles(triangle, k))]);
+        for (int axis = 0; axis < 3; ++axis) entries.emplace_back(place, at + axis, sums[static_cast<std::size_t>(place)](axis, k));
+      }
+      sums[static_cast<std::size_t>(place)].setZero();
+      met[static_cast<std::size_t>(place)] = 0;
+    }
+    touched.clear();
+  }
+  noise_surface_.resize(places, 3 * static_cast<Index>(seen_.size()));
+  noise_surface_.setFromTriplets(entries.begin(), entries.end());
+
+  const MatrixX own = shrunk(of_own);
+  const VectorX residual = shrunk(of_residual);
+  cost_ -= 0.5 * of_residual.dot(residual);
+  own_slope_ -= of_own.transpose() * residual;
+  own_block_ -= of_own.transpose() * own;
+  surface_slope_ -= noise_surface_.transpose() * residual;
+  cross_ -= noise_surface_.transpose() * own;
 }
 
 /// The rest surface's error moves every vertex along its normal: what the form says of vertices it says of the error's modes.
@@ -255,6 +314,7 @@ SurfaceQuadratic::RowMajor SurfaceQuadratic::times_blocks(const RowMajor& column
     few ? multiply<narrow>(columns, from, out) : multiply<wide>(columns, from, out);
     from += few ? narrow : wide;
   }
+  if (noise_) out -= noise_surface_.transpose() * shrunk(noise_surface_ * columns);
   return out;
 }
 

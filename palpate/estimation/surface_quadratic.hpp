@@ -52,11 +52,13 @@ class SurfaceQuadratic {
   template <int width>
   void gather(const Seen& seen);
   void gather_facets(const Seen& seen);
+  void gather_noise(const Seen& seen, double each);
   void append_modes(const StepPrediction& there);
   /// Columns `from` to `from + width` of the blocks times `columns`; beyond the last one they count as zero.
   template <int width>
   void multiply(const RowMajor& columns, Index from, RowMajor& out) const;
   RowMajor times_blocks(const RowMajor& columns) const;
+  MatrixX shrunk(const MatrixX& of_places) const { return noise_->shrunk(of_places) / noise_weight_; }
   /// The form of coordinates in place of vertices.
   struct InSpan {
     RowMajor block, cross;  ///< coordinates x coordinates, x own
@@ -82,6 +84,9 @@ class SurfaceQuadratic {
   RowMajor cross_;  ///< 3 seen x own
   MatrixX own_block_;
   VectorX surface_slope_, own_slope_;
+  std::shared_ptr<const SharedNoise> noise_;  ///< nullptr: none
+  double noise_weight_ = 1;                   ///< of the rows over those that it was made with
+  Eigen::SparseMatrix<double, Eigen::RowMajor> noise_surface_;  ///< places x 3 seen: what its modes and the rows have in common
   std::optional<SpanPlace> span_;  ///< of the surface then, without derivatives; nothing: there is no span
   std::optional<InSpan> in_span_;  ///< made when it is first of use
 };

@@ -147,6 +147,8 @@ TEST(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
                       best(1), mesh_e, mesh_nu, answer.fit.chi2_per_dof,
                       answer.provenance.at("variance inflation of correlated points").c_str(),
                       answer.provenance.at("posterior").c_str(), answer.fit.solves, drawn_s - started_s, fitted_s - drawn_s);
+          if (const auto shared = answer.provenance.find("noise that neighbours share"); shared != answer.provenance.end())
+            std::printf(" [%s]", shared->second.c_str());
           for (const auto& verdict : answer.verdicts) std::printf(" %s", verdict.code.c_str());
           std::printf("\n");
           std::fflush(stdout);

@@ -46,6 +46,7 @@ class CloudTerm : public Term {
     rows.sigma = sigma_m_;
     rows.cell = cell_;
     rows.observed_m.resize(points_m_.rows(), 3);
+    rows.met_m.resize(points_m_.rows(), 3);
     rows.robust = true;
     rows.unit = "m";
     if (view.surface_slopes) rows.surface.resize(static_cast<std::size_t>(points_m_.rows()));
@@ -70,6 +71,7 @@ class CloudTerm : public Term {
       field.subtract(rows.jacobian, i, triangle, hit.barycentric, normal / sigma_m_(i));
       if (pose_ >= 0) rows.jacobian.row(i).segment<6>(count) = frame.slope(normal / sigma_m_(i), points_m_.row(i));
       rows.observed_m.row(i) = point;
+      rows.met_m.row(i) = hit.point_m;
       if (view.surface_slopes)
         rows.surface[static_cast<std::size_t>(i)] = {hit.triangle, -normal / sigma_m_(i) * hit.barycentric.transpose()};
     }

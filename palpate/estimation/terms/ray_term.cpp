@@ -102,6 +102,7 @@ class RayTerm : public Term {
         }
         if (triangle >= 0) {
           residual_m = rays_.range_m(i) - bias_m - range_m;
+          rows.met_m.row(i) = (origin_m + range_m * direction).transpose();
           lever = measured - residual_m * Vec3(rays_.directions.row(i));
           if (scatter_ >= 0) {
             scattered = scatter(predicted, triangle, rays_.directions.row(i), range_m);
@@ -112,6 +113,7 @@ class RayTerm : public Term {
         Index& hint = hints_[static_cast<std::size_t>(i)];
         const auto hit = tree_of(sight, predicted.surface_m).closest(observed, hint);
         triangle = hint = hit.triangle;
+        rows.met_m.row(i) = hit.point_m.transpose();
         barycentric = hit.barycentric;
         const Vec3 apart = observed - hit.point_m;
         gradient = apart.norm() > 1e-9 ? Vec3(apart.normalized()) : face_normal(predicted.surface_m, hit.triangle);
@@ -220,6 +222,7 @@ class RayTerm : public Term {
     rows.residual.resize(count);
     rows.sigma = rays_.sigma_m;
     rows.observed_m.resize(count, 3);
+    rows.met_m.setZero(count, 3);
     if (view.along_rays) rows.facing = VectorX::Zero(count);
     rows.robust = true;
     rows.unit = "m";
@@ -260,6 +263,7 @@ class RayTerm : public Term {
       facets.triangle[static_cast<std::size_t>(i)] = hit->triangle;
       facets.share.row(i) << along * hit->barycentric.transpose(), along * cosine;
       rows.residual(i) = (measured_m - hit->range_m) / rays_.sigma_m(i);
+      rows.met_m.row(i) = (origin_m + hit->range_m * direction).transpose();
     }
     return rows;
   }

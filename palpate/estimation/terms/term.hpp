@@ -14,6 +14,7 @@
 #include "palpate/core/recording.hpp"
 #include "palpate/estimation/forward_model.hpp"
 #include "palpate/estimation/grazing.hpp"
+#include "palpate/estimation/shared_noise.hpp"
 #include "palpate/estimation/unknowns.hpp"
 
 namespace palpate::estimation {
@@ -73,11 +74,13 @@ struct TermRows {
   std::string unit = "1";     ///< of residual * sigma
   VectorX sigma;              ///< a row
   Points observed_m;          ///< at the fitted pose; empty for what is not a point
+  Points met_m;               ///< of a depth image or a cloud: what of the simulated surface it is compared with, where the residual is finite
   /// |cosine| between ray and surface normal over the least with which a ray counts, 0 where it passes by; empty: not along rays
   VectorX facing;
   std::vector<SurfaceSlope> surface;  ///< a row; empty: not asked for, or not the term's way
   std::optional<FacetSlopes> facets;  ///< in place of `surface` and `jacobian`, which are empty then
   std::vector<int> cell;      ///< group of neighbours whose errors may be correlated (image or space cell); empty = independent
+  std::shared_ptr<const SharedNoise> shared_noise = {};  ///< that the rows are weighed with
 };
 
 class Term {
