@@ -245,8 +245,13 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   // have in common makes them count as fewer. With that, once more.
   const auto weigh_neighbours = [&] {
     Loss next = loss;
-    if (!next.noise) next.noise = shared_noise(objective, loss);
-    const double inflation = residuals.variance_inflation / (next.noise ? next.noise->inflation : 1);
+    double inflation = residuals.variance_inflation;
+    if (!next.noise) {
+      const auto found = shared_noise(objective, loss);
+      if (found && found->terms.empty()) inflation = std::max(inflation, found->of_wide);
+      if (found && !found->terms.empty()) next.noise = found;
+    }
+    if (next.noise) inflation /= next.noise->of_cells;
     next.surface_weight = inflation > 1.05 ? 1 / inflation : 1;
     if (next.weighs_like(loss)) return true;
     loss = next;
@@ -371,7 +376,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   answer.fit.load_cases = model.load_cases() + load_cases_of_meshes;
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts, certificate});
   if (doubt != nullptr) answer.verdicts.push_back(partly_seen(*doubt));
-  answer.provenance["variance inflation of correlated points"] = std::to_string((loss.noise ? loss.noise->inflation : 1) / loss.surface_weight);
+  answer.provenance["variance inflation of correlated points"] = std::to_string((loss.noise ? loss.noise->of_cells : 1) / loss.surface_weight);
   if (loss.noise)
     answer.provenance["noise that neighbours share"] = fmt::format("{:.2g} of a point's standard deviation over {:.1f} mm",
                                                                    std::sqrt(loss.noise->correlation.share), 1e3 * loss.noise->correlation.length_m);

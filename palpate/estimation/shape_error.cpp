@@ -81,7 +81,7 @@ std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording
   const Inputs few = thinned(inputs, share);
   Loss weighed = loss;  // fewer neighbours, less that they share
   weighed.rays.clear();
-  weighed.surface_weight = std::min(1.0, loss.surface_weight / share / (loss.noise ? loss.noise->inflation : 1));
+  weighed.surface_weight = std::min(1.0, loss.surface_weight / share / (loss.noise ? loss.noise->of_wide : 1));
   weighed.noise = nullptr;
   const auto fitted = answer_of(recording, objective.model().object(), few, objective, optimum, weighed, options, optimiser, progress);
   if (!fitted) return std::nullopt;

@@ -13,7 +13,8 @@ namespace {
 
 constexpr double spacing = 0.8;      // of places, in correlation lengths: a smooth field is known from its values there
 constexpr double reach = 3;          // correlation lengths at which nothing is left to share
-constexpr Index most_modes = 600;    // of a frame: beyond, noise reaches so little far that means over cells know all of it
+constexpr Index most_places = 600;   // of a frame: beyond, noise reaches so little far that all that counts is wide against it
+constexpr Index most_entries = 30000000;  // of all frames' modes: 0.4 GB, and as much again in the forms made of them
 constexpr double certain = 4;        // standard deviations from chance, the highest of some twenty lengths
 constexpr double likely = 2;         // from where on it pays to look more closely
 constexpr double few_products = 6e6, many_products = 1e8;
@@ -245,24 +246,60 @@ void SharedNoise::add_cells(const TermRows& rows, double& sum, double& count) co
   }
 }
 
+namespace {
+
+/// The variance of a mean that is wide against the correlation's length, over that of points that err by themselves.
+double inflation_of_wide(const Objective& objective, const Loss& loss, const NoiseCorrelation& correlation) {
+  constexpr Index some = 300;  // points of a frame that are asked for their neighbours
+  double sum = 0, count = 0;
+  for (const auto& step : objective.last_rows()) {
+    for (const TermRows& rows : step) {
+      if (!holds_neighbours(rows)) continue;
+      const Frame frame = frame_of(rows, loss.tukey);
+      const float reach_m = static_cast<float>(reach * correlation.length_m);
+      const Index every = std::max<Index>(1, frame.size() / some);
+      for (Index i = every / 2; i < frame.size(); i += every) {
+        const float x = frame.at_m(i, 0);
+        for (Index j = frame.first_beyond(x - reach_m); j < frame.size() && frame.at_m(j, 0) < x + reach_m; ++j) {
+          const double d2 = static_cast<double>((frame.at_m.row(j) - frame.at_m.row(i)).squaredNorm());
+          sum += correlation.share * std::exp(-0.5 * d2 / (correlation.length_m * correlation.length_m));
+        }
+        sum += correlation.own;
+        count += 1;
+      }
+    }
+  }
+  return count > 0 ? std::max(1.0, sum / count / (correlation.own + correlation.share)) : 1;
+}
+
+}  // namespace
+
 std::shared_ptr<const SharedNoises> shared_noise(const Objective& objective, const Loss& loss) {
   const auto correlation = correlation_of_noise(objective, loss);
   if (!correlation) return nullptr;
   auto out = std::make_shared<SharedNoises>();
   out->correlation = *correlation;
+  out->of_wide = inflation_of_wide(objective, loss, *correlation);
   double sum = 0, count = 0;
+  Index entries = 0;
   for (const auto& step : objective.last_rows()) {
     auto& terms = out->terms.emplace_back();
     for (const TermRows& rows : step) {
       terms.emplace_back();
       if (!holds_neighbours(rows)) continue;
-      if (centres_of(rows, weight_of(rows, loss), correlation->length_m).size() > most_modes) return nullptr;
-      auto noise = std::make_shared<const SharedNoise>(rows, loss, *correlation);
+      std::shared_ptr<const SharedNoise> noise;
+      if (centres_of(rows, weight_of(rows, loss), correlation->length_m).size() <= most_places)
+        noise = std::make_shared<const SharedNoise>(rows, loss, *correlation);
+      if (noise) entries += static_cast<Index>(noise->modes().nonZeros());
+      if (!noise || entries > most_entries) {
+        out->terms.clear();
+        return out;
+      }
       noise->add_cells(rows, sum, count);
       terms.back() = std::move(noise);
     }
   }
-  if (count > 0) out->inflation = std::max(1.0, sum / count / (correlation->own + correlation->share));
+  if (count > 0) out->of_cells = std::max(1.0, sum / count / (correlation->own + correlation->share));
   return out;
 }
 

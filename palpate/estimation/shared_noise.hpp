@@ -62,15 +62,18 @@ class SharedNoise {
 /// The shared noise of all frames.
 struct SharedNoises {
   NoiseCorrelation correlation;
-  std::vector<std::vector<std::shared_ptr<const SharedNoise>>> terms;  ///< a step: its terms, nullptr where there is none
-  double inflation = 1;  ///< of the variance of cell means, that it explains
+  /// A step: its terms, nullptr where there is none. Empty: noise reaches so little far, or the recording is so long, that it is not
+  /// integrated out.
+  std::vector<std::vector<std::shared_ptr<const SharedNoise>>> terms;
+  double of_cells = 1;  ///< inflation of the variance of cell means, that it explains
+  double of_wide = 1;   ///< the same of means over all that is wide against its length: the most that it can do
 
   std::shared_ptr<const SharedNoise> of(std::size_t step, std::size_t term) const {
     return step < terms.size() && term < terms[step].size() ? terms[step][term] : nullptr;
   }
 };
 
-/// That of the last evaluation; nullptr where none is found, or where it reaches so little far that cell means know all of it.
+/// That of the last evaluation; nullptr where none is found.
 std::shared_ptr<const SharedNoises> shared_noise(const Objective& objective, const Loss& loss);
 
 }  // namespace palpate::estimation

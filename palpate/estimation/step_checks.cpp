@@ -191,7 +191,7 @@ Pattern residual_pattern(const Objective& objective, const Loss& loss) {
   Pattern out;
   if (cells < 10 || count < 2 * cells) return out;  // a cell of one point has no neighbours
   const double within = std::max(1.0, total / count);  // where residuals are smaller than sigma they say nothing about the sensor
-  const double ratio = between / cells / within / (loss.noise ? loss.noise->inflation : 1);
+  const double ratio = between / cells / within / (loss.noise ? loss.noise->of_cells : 1);
   out.inflation = std::max(1.0, ratio);
   out.deviate = (std::cbrt(ratio) - (1 - 2 / (9 * cells))) / std::sqrt(2 / (9 * cells));
   return out;

@@ -58,11 +58,11 @@ struct Scene {
   }
 };
 
-void add_field(PointCloud& cloud, std::uint64_t seed) {
+void add_field(PointCloud& cloud, std::uint64_t seed, double over_m = length_m) {
   lab::Random random(seed, 1);
   const double std_m = std::sqrt(share) * cloud.sigma_m(0);
-  const std::array<coverage::RandomField, 3> field{coverage::RandomField(std_m, length_m, random), coverage::RandomField(std_m, length_m, random),
-                                                   coverage::RandomField(std_m, length_m, random)};
+  const std::array<coverage::RandomField, 3> field{coverage::RandomField(std_m, over_m, random), coverage::RandomField(std_m, over_m, random),
+                                                   coverage::RandomField(std_m, over_m, random)};
   for (Index i = 0; i < cloud.points_m.rows(); ++i) {
     const Vec3 at = cloud.points_m.row(i);
     cloud.points_m.row(i) += Vec3(field[0].at(at), field[1].at(at), field[2].at(at)).transpose();
@@ -159,6 +159,23 @@ TEST(SharedNoise, IsIntegratedOutAsTheDenseCovarianceSays) {
   rows.shared_noise = nullptr;
   add_rows(rows, scene.loss, rows.unknowns, alone);
   EXPECT_LT(out.hessian(log_young, log_young), 0.9 * alone.hessian(log_young, log_young)) << "neighbours that err together say less";
+}
+
+TEST(SharedNoise, OfAShortLengthMakesPointsCountAsFewer) {
+  const double short_m = 3e-3;
+  const Scene scene([&](std::size_t frame, PointCloud& cloud) { add_field(cloud, 10 + frame, short_m); });
+  const auto found = shared_noise(*scene.objective, scene.loss);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(found->terms.empty()) << "a place for every point";
+  // Points on faces, that share with those around them: 2 pi l^2 of the block's surface, less at its edges.
+  const Vec3 size = block_size_m;
+  const double area_m2 = 2 * (size.x() * size.y() + size.y() * size.z() + size.z() * size.x());
+  const auto& [shared, over_m, own, deviate] = found->correlation;
+  const double neighbours = 1200 * 2 * EIGEN_PI * over_m * over_m / area_m2;
+  EXPECT_NEAR(found->of_wide, (own + shared * (1 + neighbours)) / (own + shared), 0.1) << over_m << " m, " << shared;
+  const auto wide = shared_noise(*Scene(of_its_own).objective, Loss{});
+  ASSERT_TRUE(wide);
+  EXPECT_GT(wide->of_wide, found->of_wide);
 }
 
 TEST(SharedNoise, IsInTheQuadraticFormOfTheSurface) {
