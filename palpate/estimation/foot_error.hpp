@@ -19,8 +19,8 @@ struct FootDoubt {
 };
 
 /// Of flanks that were followed down to a table, one standard deviation: what all of them lean in common by, and half of it towards
-/// one side. Six balls were off by 0.08 and 0.036 (docs/uncertainty.md).
-inline constexpr double foot_lean_std_rad = 0.08, foot_aside_std_rad = 0.04;
+/// one side. Six balls were off by 0.08 and 0.036, bears by more (docs/uncertainty.md).
+inline constexpr double foot_lean_std_rad = 0.1, foot_aside_std_rad = 0.05;
 
 /// A mesh whose nodes below the strip's upper end moved along the plane: outwards from the middle of the foot that is nearest by
 /// `lean_rad` at the distance of the foot's radius (of a disc of its area), and along `aside`, both times the depth in the strip.
