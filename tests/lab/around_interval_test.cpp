@@ -1,7 +1,7 @@
 // label: statistics
 // SPDX-License-Identifier: Apache-2.0
 // Balls that five views showed from all around, but for the centimetre above the table that they stand on: do the intervals hold the
-// truth? With a foot held where a coarse mesh left it, and with the surface taken for exact, two of two did not. PALPATE_LABS says how many.
+// truth? With a foot held where a coarse mesh left it, and with the surface taken for exact, two of two missed nu, and one E. PALPATE_LABS says how many.
 #include <gtest/gtest.h>
 
 #include <cstdio>
