@@ -174,6 +174,7 @@ reconstruction::BuildOptions fill_options(const Recording& recording) {
     if (tool.shape == ToolShape::platen) options.pressed_faces.push_back(tool.plane);
   if (recording.model.refine != "auto") return options;
   options.mesh.finer = finer_under_tools(recording);
+  options.finer_feet = true;
   for (const Support& support : recording.supports) {
     if (!recording.rest.surface || (support.kind != SupportKind::plane && support.kind != SupportKind::table)) continue;
     for (const auto& near : geometry::finer_at_feet(support.plane, *recording.rest.surface)) options.mesh.finer.push_back(near);
@@ -183,7 +184,7 @@ reconstruction::BuildOptions fill_options(const Recording& recording) {
 
 /// Volume mesh of a recording that gives a surface or views of one.
 void fill_with_tetrahedra(Recording& recording, reconstruction::Completion completion, std::vector<char>* seen,
-                          const OnProgress& progress) {
+                          double* strip_m, const OnProgress& progress) {
   if (!recording.rest.surface && recording.rest.views.empty()) {
     throw Error("give the object's shape as rest.volume_mesh, rest.surface_mesh or rest.views", "rest");
   }
@@ -191,8 +192,9 @@ void fill_with_tetrahedra(Recording& recording, reconstruction::Completion compl
   auto built = recording.rest.surface
                    ? build_from_surface(recording, options, progress)
                    : build_from_views(recording, options, completion, progress);
-  if (recording.rest.surface_std_m == 0) recording.rest.surface_std_m = seen_std_m(built);
+  if (recording.rest.surface_std_m == 0) recording.rest.surface_std_m = std::hypot(seen_std_m(built), built.slow_error_m);
   if (seen != nullptr) *seen = built.seen;
+  if (strip_m != nullptr) *strip_m = built.strip_m;
   for (const auto& warning : built.model.warnings) recording.warnings.push_back(warning);
   recording.supports = std::move(built.model.supports);
   recording.rest.surface = std::move(built.model.surface);
@@ -359,8 +361,9 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
 }
 
 estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress,
-                                                   reconstruction::Completion completion, std::vector<char>* seen) {
-  if (!recording.rest.volume) fill_with_tetrahedra(recording, completion, seen, progress);
+                                                   reconstruction::Completion completion, std::vector<char>* seen,
+                                                   double* strip_m) {
+  if (!recording.rest.volume) fill_with_tetrahedra(recording, completion, seen, strip_m, progress);
   const TetMesh& given = *recording.rest.volume;
   estimation::SimulatedObject object;
   object.material = recording.model.material;
@@ -431,6 +434,13 @@ estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share)
   return doubt;
 }
 
+std::optional<estimation::FootDoubt> foot_doubt(const Recording& built, double strip_m) {
+  if (!(strip_m > 0)) return std::nullopt;
+  for (const Support& support : built.supports)
+    if (support.kind == SupportKind::table || support.kind == SupportKind::plane) return estimation::FootDoubt{support.plane, strip_m, {}};
+  return std::nullopt;
+}
+
 Identified identify(const Recording& given, const IdentifyOptions& options, const OnProgress& progress) {
   Recording as_given = with_overrides(given, options);
   if (options.method == "paper") as_given.regions.clear();  // the paper fits one stiffness
@@ -444,9 +454,12 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
     recording = as_given;
     estimation::Inputs observed = all_observed;
     std::vector<char> seen;
-    object = build_simulated_object(recording, progress, completion, &seen);  // sec. IV-C: tetrahedral model
+    double strip_m = 0;
+    object = build_simulated_object(recording, progress, completion, &seen, &strip_m);  // sec. IV-C: tetrahedral model
     const double unseen = drop_unseen_side(recording, seen, observed);
     if (unseen > 0 && options.method != "paper" && !doubt) doubt = other_shapes(as_given, unseen);
+    const auto foot = foot_doubt(recording, strip_m);
+    if (foot && options.method != "paper" && !doubt) doubt.emplace().foot = foot;
     out.answer = options.method == "paper"  // sec. VI: error function and its minimum
                      ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
                      : estimation::fit_on_fine_mesh(recording, object, observed, options.fit, options.mesh_tolerance,

@@ -272,10 +272,12 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   look_around();
 
   // Before any finer mesh, so that all shapes have meshes alike.
-  if (doubt != nullptr && !doubt->effect && optimum.termination == Termination::converged) {
+  if (doubt != nullptr && !doubt->shapes.empty() && !doubt->effect && optimum.termination == Termination::converged) {
     doubt->effect = shape_effect(*doubt, recording, inputs, objective, optimum, loss, options, optimiser, progress);
     if (doubt->effect && doubt->effect->better) return as_far_as_known();
   }
+  if (doubt != nullptr && doubt->foot && !doubt->foot->effect && optimum.termination == Termination::converged)
+    doubt->foot->effect = foot_effect(*doubt->foot, recording, object, objective, optimum, loss, options, progress);
 
   // What the mesh does to the answer, and finer ones until that is little.
   const FinerModel* meshed = nullptr;  // the mesh that corrects the model; nullptr: its own
@@ -327,19 +329,25 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   }
   std::vector<Posterior> regions{posterior};
   for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));
-  const auto widen_by = [&](const char* name, const AnswerShift& shift) {
-    for (std::size_t r = 0; r < regions.size(); ++r)
-      widen(regions[r], shift.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
-    answer.budget.push_back({name, 100 * std::abs(shift.log_young), std::abs(shift.poisson)});
+  const auto widen_by = [&](const char* name, const std::vector<AnswerShift>& independent) {
+    BudgetEntry entry{name};
+    for (const AnswerShift& shift : independent) {
+      for (std::size_t r = 0; r < regions.size(); ++r)
+        widen(regions[r], shift.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
+      entry.young_modulus_percent = std::hypot(entry.young_modulus_percent, 100 * shift.log_young);
+      entry.poisson_shift = std::hypot(entry.poisson_shift, shift.poisson);
+    }
+    answer.budget.push_back(entry);
     std::stable_sort(answer.budget.begin(), answer.budget.end(),
                      [](const auto& a, const auto& b) { return a.young_modulus_percent > b.young_modulus_percent; });
   };
   if (mesh) {
     for (std::size_t r = 0; r < regions.size(); ++r)
       move(regions[r], mesh->of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
-    widen_by("mesh", mesh->times(mesh_left_over));
+    widen_by("mesh", {mesh->times(mesh_left_over)});
   }
-  if (doubt != nullptr && doubt->effect) widen_by("unseen side", doubt->effect->shift);
+  if (doubt != nullptr && doubt->effect) widen_by("unseen side", {doubt->effect->shift});
+  if (doubt != nullptr && doubt->foot && doubt->foot->effect) widen_by("foot", *doubt->foot->effect);
   const auto region_name = [&](std::size_t r) {
     return object.region_names.empty() ? std::string() : object.region_names[r];
   };
@@ -375,7 +383,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   answer.fit.solves = model.solves() + (correction ? correction->model().solves() : 0);
   answer.fit.load_cases = model.load_cases() + load_cases_of_meshes;
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts, certificate});
-  if (doubt != nullptr) answer.verdicts.push_back(partly_seen(*doubt));
+  if (doubt != nullptr && !doubt->shapes.empty()) answer.verdicts.push_back(partly_seen(*doubt));
   answer.provenance["variance inflation of correlated points"] = std::to_string((loss.noise ? loss.noise->of_cells : 1) / loss.surface_weight);
   if (loss.noise)
     answer.provenance["noise that neighbours share"] = fmt::format("{:.2g} of a point's standard deviation over {:.1f} mm",

@@ -81,9 +81,9 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
   const bool fixed = recording.model.poisson_fixed || !(covariance(1, 1) > 0);
   if (fixed) covariance(1, 0) = covariance(0, 1) = 0, covariance(1, 1) = 1 / known_exactly;
 
-  // The mesh's error comes back with every push, and none shows the unseen side. Its sign of correlation is not told, so it goes out of the diagonal.
+  // The mesh's error comes back with every push, and none shows the unseen side or the foot. Its sign of correlation is not told, so it goes out of the diagonal.
   for (const auto& entry : answer.budget) {
-    if (entry.input != "mesh" && entry.input != "unseen side") continue;
+    if (entry.input != "mesh" && entry.input != "unseen side" && entry.input != "foot") continue;
     known.uncured(0) += std::pow(entry.young_modulus_percent / 100, 2);
     known.uncured(1) += fixed ? 0 : entry.poisson_shift * entry.poisson_shift;
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/foot_error.hpp"
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/optimise.hpp"
 
@@ -24,10 +25,12 @@ struct ShapeEffect {
   std::optional<std::size_t> better;       ///< alternative that agrees better with the pushes; `shift` is about it
 };
 
+/// Of an object that was seen from one side: `shapes`. Of one that was seen from all around: `foot`.
 struct ShapeDoubt {
   std::vector<AlternativeShape> shapes;  ///< the farthest is about one and a half standard deviations from the one that is fitted
   double unseen_share = 0;               ///< of the object's surface, its foot left out
   std::optional<ShapeEffect> effect;     ///< filled by the first fit; later ones, on finer meshes, take it as it is
+  std::optional<FootDoubt> foot;
 };
 
 /// Fits all shapes to the same few of the points, from the optimum on. An alternative that is as likely and fits better takes the place of the one

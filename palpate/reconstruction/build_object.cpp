@@ -30,6 +30,8 @@ bool is_plane(SupportKind kind) {
   return kind == SupportKind::plane || kind == SupportKind::table || kind == SupportKind::wall;
 }
 
+bool stands_on(SupportKind kind) { return kind == SupportKind::plane || kind == SupportKind::table; }
+
 bool found_by_place(SupportKind kind) {
   return kind == SupportKind::plane || kind == SupportKind::box || kind == SupportKind::table || kind == SupportKind::wall;
 }
@@ -140,6 +142,30 @@ double unseen_share(const BuiltObject& object) {
   return all > 0 ? unseen / all : 0;
 }
 
+/// What the views' poses may still be off by, rms over their directions and places on the object.
+double left_by_poses_m(const registration::ViewsResult& aligned, const std::vector<PointCloud>& clouds) {
+  double square_m2 = 0;
+  for (std::size_t v = 0; v < clouds.size(); ++v) {
+    const auto at = 6 * static_cast<Index>(v);
+    const double wide_m2 = (clouds[v].points_m.rowwise() - aligned.centre_m[v].transpose()).rowwise().squaredNorm().mean();
+    square_m2 += aligned.covariance.block<3, 3>(at + 3, at + 3).trace() / 3;
+    square_m2 += aligned.covariance.block<3, 3>(at, at).trace() / 3 * wide_m2 * 2 / 3;  // of a lever, what is across it
+  }
+  return std::sqrt(square_m2 / static_cast<double>(clouds.size()));
+}
+
+/// How far the faces of the volume lie from the surface that it fills, one standard deviation as of its middle half: most of it, not
+/// its sharp edges.
+double faces_off_m(const TriMesh& skin, const TriMesh& boundary) {
+  const geometry::TriangleTree faces(boundary);
+  std::vector<double> off_m;
+  for (Index v = 0; v < skin.vertices_m.rows(); ++v) off_m.push_back(std::sqrt(faces.closest(skin.vertices_m.row(v)).squared_distance_m2));
+  if (off_m.empty()) return 0;
+  const auto middle = off_m.begin() + static_cast<std::ptrdiff_t>(off_m.size() / 2);
+  std::nth_element(off_m.begin(), middle, off_m.end());
+  return 1.48 * *middle;
+}
+
 constexpr double good_enough = 0.3;  // tet_quality: 17 degrees
 
 /// Of a surface where it stands: given to its outline, an outline that noise moved, or loose facets.
@@ -174,7 +200,8 @@ BuiltObject fill(const TriMesh& surface, Foot foot, const std::vector<Support>& 
   add_warnings(out.model, filled.warnings);
   const double edge = mean_edge(geometry::boundary_surface(out.model.volume).surface);
   for (Support& s : out.model.supports) {
-    if (is_plane(s.kind)) s.tolerance_m = std::max(s.tolerance_m, 1e-3 * edge);
+    // Where good elements leave nodes a hair above the plane, less than a surface from views is known to, they stand on it.
+    if (is_plane(s.kind)) s.tolerance_m = std::max(s.tolerance_m, (foot == Foot::found ? 0.03 : 1e-3) * edge);
     else if (found_by_place(s.kind)) s.tolerance_m = std::max(s.tolerance_m, 0.1 * edge);
   }
   out.check = geometry::check_volume(out.model.volume);
@@ -198,6 +225,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
       std::any_of(views.begin(), views.end(), [](const PointCloud& c) { return c.pose_std_m > 0 || c.pose_std_rad > 0; });
   std::vector<std::string> warnings;
   std::vector<Pose> correction;
+  double by_poses_m = 0;
   if (fuse.support) drop_support(clouds, *fuse.support);
   if (options.align_views && uncertain) {
     std::vector<std::size_t> filled;
@@ -206,6 +234,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
       if (clouds[v].points_m.rows() > 0) filled.push_back(v), moving.push_back(clouds[v]);
     if (moving.size() > 1) {
       const auto aligned = registration::align_views(moving);
+      if (aligned.converged) by_poses_m = left_by_poses_m(aligned, moving);
       correction.assign(clouds.size(), Pose::Identity());
       for (std::size_t k = 0; k < filled.size(); ++k) {
         correction[filled[k]] = aligned.correction[k];
@@ -219,7 +248,12 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   fine.free = fuse.free, fine.support = fuse.support;
   TriMesh skin;
   if (fused.inside) skin = fused_surface(fused, fine);
-  BuiltObject out = fill(fused.inside ? skin : fused.facets, fused.inside ? Foot::found : Foot::loose, supports, options, progress);
+  BuildOptions filling = options;
+  if (fused.inside && options.finer_feet)
+    for (const Support& s : supports)
+      if (stands_on(s.kind))
+        for (const auto& near : geometry::finer_at_feet(s.plane, skin)) filling.mesh.finer.push_back(near);
+  BuiltObject out = fill(fused.inside ? skin : fused.facets, fused.inside ? Foot::found : Foot::loose, supports, filling, progress);
   const double floating = drop_floating(supports, out.model.volume);
   if (floating > 0)
     warnings.push_back(std::to_string(static_cast<int>(100 * floating + 0.5)) +
@@ -228,7 +262,9 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   out.model.surface = geometry::boundary_surface(out.model.volume).surface;
   out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
   out.around = fused.around;
+  out.strip_m = fused.strip_m;
   hand_on_uncertainty(out, fused);
+  if (fused.inside) out.slow_error_m = std::hypot(by_poses_m, faces_off_m(skin, out.model.surface));
   if (options.fine_surface) {
     const geometry::TriangleTree boundary(out.model.surface);
     if (floating > 0)

@@ -11,6 +11,7 @@ namespace palpate::reconstruction {
 struct BuildOptions {
   geometry::TetrahedraliseOptions mesh;  ///< of a surface that has to be filled
   bool align_views = true;  ///< correct the poses of views that have a prior spread (PointCloud::pose_std_*), all at once
+  bool finer_feet = false;  ///< of views from all around: short edges where the object stands (geometry::finer_at_feet)
   bool fine_surface = false;  ///< of views: also make BuiltObject::fine_surface (half a second)
   /// Planes that platens press on: faces along them are laid flat as those on a support are; a platen moves what is in its plane.
   std::vector<Plane> pressed_faces = {};
@@ -30,6 +31,10 @@ struct BuiltObject {
   /// carries it along.
   TriMesh fine_surface;
   SurfaceEmbedding fine_embedding;
+  /// What neighbouring places of the seen part are off by together, one standard deviation: what the views' poses leave once they
+  /// were corrected by each other, and what flat faces of the volume are off the fused surface. Of views from all around; else 0.
+  double slow_error_m = 0;
+  double strip_m = 0;      ///< of views from all around: FusedViews::strip_m
   bool around = false;     ///< of views: the object was seen from all sides, down to its support (FusedViews::around)
   std::vector<char> seen;  ///< a vertex of model.surface: 1 where a sensor saw it; empty where it was given
   std::vector<Pose>

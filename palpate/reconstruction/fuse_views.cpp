@@ -82,6 +82,13 @@ std::vector<Facet> down_to(const Plane& plane, const std::vector<Facet>& facets,
   return out;
 }
 
+/// Of a strip that goes up from the plane: twice the mean of its facets'.
+double height_of(const std::vector<Facet>& strip, const Plane& plane) {
+  double sum = 0, area = 0;
+  for (const Facet& f : strip) sum += f.area_m2 * std::max(0.0, plane.normal.dot(f.middle - plane.point_m)), area += f.area_m2;
+  return area > 0 ? 2 * sum / area : 0;
+}
+
 void require(bool ok, const char* field, const char* bounds) {
   if (!ok) throw Error(bounds, std::string("FuseOptions: ") + field);
 }
@@ -141,6 +148,7 @@ FusedViews fuse_views(const std::vector<PointCloud>& clouds, const FuseOptions& 
   out.around = options.free && seen_from_all_around(facets, options.support, low_m);
   if (options.support && out.around) {
     const auto strip = skirts(facets, *options.support, low_m, out.cell_m, options.free);
+    out.strip_m = height_of(strip, *options.support);
     facets.insert(facets.end(), strip.begin(), strip.end());
   }
   out.held = static_cast<Index>(facets.size());

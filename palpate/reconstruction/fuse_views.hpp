@@ -41,6 +41,7 @@ struct FusedViews {
   TriMesh facets;              ///< one triangle a cell, outward, as large as the surface that it stands for; open
   Index seen = 0;              ///< that many facets come first and were seen; the others complete the object
   Index held = 0;              ///< so many lie on the surface: those seen, and the strip down to the support
+  double strip_m = 0;          ///< height above the support below which nothing was seen, where facets go on to it
   bool around = false;         ///< seen from all sides, down to the support, and free space is known
   /// Where it is given, a place is inside where this is above one half, and not where the facets' winding number is.
   std::function<double(const Vec3&)> inside;

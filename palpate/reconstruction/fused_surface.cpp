@@ -56,6 +56,18 @@ class Field {
 
   /// The same as if nobody had looked through anything.
   double by_facets(const Vec3& x) {
+    const auto d = goes_on(x);
+    if (!d) return reach_ * side(x);
+    // far from the surface, and beside its rims, only the winding number knows the side
+    if (std::abs(d->off_m) < 0.4 * reach_ && d->nearest_m < beside * reach_) return d->off_m;
+    return std::abs(d->off_m) * side(x);
+  }
+
+  /// From the surface as facets within reach go on, beside their rims too.
+  struct Distance {
+    double off_m, nearest_m;  ///< along their normals; of the nearest facet's middle
+  };
+  std::optional<Distance> goes_on(const Vec3& x) {
     near_.clear();
     Index nearest = -1;
     double least = reach_ * reach_;
@@ -65,7 +77,7 @@ class Field {
       near_.push_back({i, d2});
       if (d2 < least) least = d2, nearest = i;
     });
-    if (nearest < 0) return reach_ * side(x);
+    if (nearest < 0) return std::nullopt;
     Vec3 mean = Vec3::Zero();
     for (Near& n : near_) {
       // of a thin part the side that is nearer
@@ -82,10 +94,7 @@ class Field {
       sum += n.weight * 0.5 * (grid_.normal(n.facet) + mean).dot(x - grid_.point(n.facet));
       weights += n.weight;
     }
-    const double d = sum / weights;
-    // far from the surface, and beside its rims, only the winding number knows the side
-    if (std::abs(d) < 0.4 * reach_ && least < beside * beside * reach_ * reach_) return d;
-    return std::abs(d) * side(x);
+    return Distance{sum / weights, std::sqrt(least)};
   }
 
  private:
@@ -103,6 +112,39 @@ class Field {
   const SurfaceOptions& options_;
   std::vector<Near> near_;
 };
+
+/// Where the flank meets the plane: marching cuts a corner off every edge that two surfaces make, and of a foot it would leave
+/// too little. Vertices in the plane beside ones above it go to where the facets' surface passes the plane.
+void sharpen_foot(const Plane& plane, Field& field, double cell, TriMesh& surface) {
+  constexpr int steps = 4;
+  constexpr double least_slope = 0.2;  // of the distance from the flank, along the plane: flatter, it does not say where it ends
+  constexpr double farthest_cells = 1.5;
+  std::vector<char> above(static_cast<std::size_t>(surface.vertices_m.rows())), rim(above.size());
+  for (std::size_t i = 0; i < above.size(); ++i)
+    above[i] = plane.normal.dot(Vec3(surface.vertices_m.row(static_cast<Index>(i))) - plane.point_m) > 1e-9;
+  for (Index t = 0; t < surface.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k)
+      for (const int other : {(k + 1) % 3, (k + 2) % 3})
+        if (above[surface.triangles(t, other)] && !above[surface.triangles(t, k)]) rim[surface.triangles(t, k)] = 1;
+  const auto [u, v] = tangents(plane.normal);
+  const double h = 0.1 * cell;
+  for (std::size_t i = 0; i < rim.size(); ++i) {
+    if (!rim[i]) continue;
+    const Vec3 from = surface.vertices_m.row(static_cast<Index>(i));
+    Vec3 at = from;
+    bool known = true;
+    for (int step = 0; known && step < steps; ++step) {
+      const auto here = field.goes_on(at), beside_u = field.goes_on(at + h * u), beside_v = field.goes_on(at + h * v);
+      known = here && beside_u && beside_v;
+      if (!known) break;
+      const Vec3 gradient = ((beside_u->off_m - here->off_m) * u + (beside_v->off_m - here->off_m) * v) / h;
+      known = gradient.norm() > least_slope;
+      if (known) at -= here->off_m / gradient.squaredNorm() * gradient;
+      known = known && (at - from).norm() < farthest_cells * cell;
+    }
+    if (known) surface.vertices_m.row(static_cast<Index>(i)) = at.transpose();
+  }
+}
 
 /// A point of the lattice in half cells: all even (corner of a cube) or all odd (its middle).
 using Place = Cell;
@@ -298,6 +340,7 @@ TriMesh fused_surface(const FusedViews& fused, const SurfaceOptions& options) {
       const double height_m = plane.normal.dot(Vec3(out.vertices_m.row(v)) - plane.point_m);
       if (std::abs(height_m) < stands_within * cell) out.vertices_m.row(v) -= height_m * plane.normal.transpose();
     }
+    sharpen_foot(plane, field, cell, out);
   }
   smooth_unseen_patches(out, field.facets(), field.known_within_m(), options.free, fused.inside ? options.support : std::nullopt);
   return out;

@@ -10,6 +10,7 @@ namespace {
 constexpr double step_cells = 0.8;
 constexpr double same_place_cells = 0.7;
 constexpr double steepest_normal = 0.8;  // along the plane's normal: flatter parts have no way down
+constexpr double least_upright = 0.95;   // the same of a flank on its way down: flatter, it would run along the plane
 constexpr double smooth_cells = 4;       // over which a flank tells how it goes on
 
 PointCloud middles_of(const std::vector<Facet>& facets) {
@@ -87,7 +88,7 @@ std::vector<Facet> skirts(const std::vector<Facet>& seen, const Plane& plane, do
     for (double gone_m = step_cells * cell_m;; gone_m += step_cells * cell_m) {
       const Vec3 halfway = flank.normal_at(gone_m - 0.5 * step_cells * cell_m), normal = flank.normal_at(gone_m);
       const double along = plane.normal.dot(halfway);
-      if (std::abs(along) > steepest_normal) break;  // it has turned to the plane, or away from it
+      if (std::abs(along) > least_upright) break;  // it has turned to the plane, or away from it
       at += step_cells * cell_m * (along * halfway - plane.normal).normalized();
       if (height(at) < -0.5 * step_cells * cell_m || covered(at, normal) || (free && free(at))) break;
       out.push_back({at, normal, from.area_m2, from.sigma_m});
