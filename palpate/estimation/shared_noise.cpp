@@ -79,7 +79,7 @@ struct Compared {
   Products within, across;
 
   explicit Compared(double longest_m) : within{longest_m}, across{longest_m} {}
-  /// @param from  all points of the frames, or some of them
+  /// @param every  of so many points one is asked for its neighbours
   void add(const std::array<Frame, 2>& pair, Index every) {
     for (const std::size_t k : {0, 1}) {
       for (Index i = every / 2; i < pair[k].size(); i += every) {
@@ -88,7 +88,7 @@ struct Compared {
       }
     }
   }
-  /// What a shared part that falls over `length_m` explains, over all but the `without` shortest bins.
+  /// What a shared part that falls over `length_m` explains of the points that lie further apart than `beyond_m`.
   struct Explained {
     double with = 0, alone = 0;
   };
