@@ -164,6 +164,7 @@ void sample(benchmark::State& state) {
     before.memory() = now.memory();
   }
   state.counters["E_error_percent"] = 100 * error;
+  state.counters["facets"] = double(scene.object.surface.rest().triangles.rows());
   state.counters["steps_evaluated"] = evaluated;
   state.counters["iterations"] = iterations;
 }

@@ -9,7 +9,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
-#include "palpate/geometry/perspective_grid.hpp"
+#include "palpate/geometry/ray_bundle.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -44,7 +44,7 @@ class RayTerm : public Term {
 
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const override {
     if (view.along_rays && view.surface_slopes && scatter_ < 0) return facet_rows(predicted, unknowns, view);
-    Sight sight = look(predicted.surface_m, unknowns, view.along_rays);
+    Sight sight = look(predicted.surface_m, unknowns, view);
     const RigidMap &frame = sight.frame, &camera = sight.camera;
     const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
     const Index count = static_cast<Index>(predicted.columns.size());
@@ -185,16 +185,19 @@ class RayTerm : public Term {
   struct Sight {
     RigidMap frame, camera;
     Mat3 rotation;
-    std::optional<geometry::PerspectiveGrid> grid = {};  ///< nothing: the tree is asked
-    const geometry::TriangleTree* tree = nullptr;        ///< once somebody asked
+    std::optional<std::vector<geometry::RayHit>> hits = {};  ///< a ray that counts; nothing: the tree is asked
+    const geometry::TriangleTree* tree = nullptr;            ///< once somebody asked
     Vec3 place(const Vec3& seen_m) const { return frame.apply(camera.apply(seen_m)); }
   };
-  Sight look(const Points& surface_m, const VectorX& unknowns, bool along_rays) const {
+  Sight look(const Points& surface_m, const VectorX& unknowns, const TermView& view) const {
     Sight out{frame_pose(unknowns, pose_, pivot_m_), camera_pose(unknowns), {}};
     out.rotation = out.frame.rotation() * out.camera.rotation();
-    if (!along_rays || !one_eye_) return out;
-    out.grid.emplace(surface_m, rest_.triangles, out.place(rays_.origins_m.row(0)));
-    if (!out.grid->in_view()) out.grid.reset();
+    if (!view.along_rays || !one_eye_) return out;
+    std::vector<char> skipped;
+    if (view.chosen != nullptr)
+      for (const char choice : *view.chosen) skipped.push_back(choice != counts_in);
+    if (!bundle_) bundle_.emplace(rays_.directions);
+    out.hits = bundle_->meet(surface_m, rest_.triangles, out.place(rays_.origins_m.row(0)), out.rotation, skipped);
     return out;
   }
   const geometry::TriangleTree& tree_of(Sight& sight, const Points& surface_m) const {
@@ -206,7 +209,10 @@ class RayTerm : public Term {
     return *sight.tree;
   }
   std::optional<geometry::RayHit> cast(Sight& sight, const Points& surface_m, Index i, const Vec3& origin_m, const Vec3& direction) const {
-    if (sight.grid) return sight.grid->cast(direction);
+    if (sight.hits) {
+      const geometry::RayHit& hit = (*sight.hits)[static_cast<std::size_t>(i)];
+      return hit.triangle < 0 ? std::nullopt : std::optional(hit);
+    }
     Index& hint = hints_[static_cast<std::size_t>(i)];
     const auto hit = tree_of(sight, surface_m).cast(origin_m, direction, endless, hint);
     if (hit) hint = hit->triangle;
@@ -231,7 +237,7 @@ class RayTerm : public Term {
   }
   /// Rows by triangle: within one the gradient has one direction, and what moves the rays moves them as its corners.
   TermRows facet_rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const {
-    Sight sight = look(predicted.surface_m, unknowns, true);
+    Sight sight = look(predicted.surface_m, unknowns, view);
     const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
     const Index count = static_cast<Index>(rays_.range_m.size()), triangles = static_cast<Index>(rest_.triangles.rows());
     TermRows rows = blank_rows(predicted, view);
@@ -359,6 +365,7 @@ class RayTerm : public Term {
   bool one_eye_ = false;  // all rays start at one point
   std::shared_ptr<const geometry::TriangleTree> rest_tree_;
   const TriMesh& rest_;
+  mutable std::optional<geometry::RayBundle> bundle_;   // of rays of one eye
   mutable std::optional<geometry::TriangleTree> tree_;  // rays of one eye need none
   mutable std::vector<Index> hints_;
   mutable std::vector<int> cell_;  // made when it is first of use
