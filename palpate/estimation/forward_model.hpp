@@ -36,13 +36,15 @@ struct SpanPlace {
     return span == other && loads == others;
   }
   VectorX moved_m() const;  ///< 3v
+  /// No vertex is further than this from where other coordinates along the same fields put it.
+  double at_most_from_m(const VectorX& other) const;
 };
 
 /// One column of every derivative below is one unknown.
 struct StepPrediction {
   bool converged = false;
   std::string reason;
-  Points surface_m;           ///< simulated surface vertices, base frame
+  Points surface_m;           ///< simulated surface vertices, base frame; empty where coordinates in `in_span` were enough
   std::vector<int> columns;   ///< unknowns that the step depends on
   MatrixX d_surface;          ///< 3v x columns; empty after ForwardModel::predict_in_span where `in_span` says the same
   std::optional<SpanPlace> in_span;  ///< what surface and d_surface say; nothing: they are no such sum
@@ -61,6 +63,9 @@ struct StepPrediction {
   const Points& markers_m() const { return field != nullptr ? material_m : surface_m; }
   const MatrixX& d_markers() const { return d_material.size() > 0 ? d_material : d_surface; }
 };
+
+/// What of a step's surface is made where it is a sum of fields.
+enum class SurfacePart { coordinates, place, derivatives };
 
 /// A load of known force: what of it acts and where.
 struct ActingForce {
@@ -122,8 +127,11 @@ class ForwardModel {
   StepPrediction predict(std::size_t s, const VectorX& unknowns, bool derivatives = true);
 
   /// The same with StepPrediction::in_span, where the surface is a sum of a linear body's fields: where nothing turns the body or
-  /// lets it slide, once nu's range was solved for. @param d_surface  false: then without it, at a fraction of the time
-  StepPrediction predict_in_span(std::size_t s, const VectorX& unknowns, bool d_surface);
+  /// lets it slide, once nu's range was solved for. Where it is not, all is there as `predict` has it.
+  /// @param part  of the surface what is wanted beside the coordinates: each more costs several times as much
+  StepPrediction predict_in_span(std::size_t s, const VectorX& unknowns, SurfacePart part);
+  /// Adds the surface to a prediction that was made with coordinates alone, at the same unknowns.
+  void add_surface(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const;
 
   /// Elements whose volume is gone at these unknowns; solves the step in full where the prediction cannot rule them out.
   int inverted_elements(std::size_t s, const VectorX& unknowns);
@@ -188,7 +196,7 @@ class ForwardModel {
   struct Memory;        // of a step: where it was last solved
   using SolvedAtPtr = std::shared_ptr<const SolvedAt>;
 
-  enum class Wanted { surface, derivatives, in_span };
+  enum class Wanted { surface, derivatives, in_span, coordinates };
   StepPrediction unchanged(std::size_t s, const VectorX& unknowns, Wanted wanted);
   std::optional<SpanPlace> place_in_span(std::size_t s, const Body& body, const Coefficients& c, const VectorX& unknowns) const;
   int unit_load_cases() const;

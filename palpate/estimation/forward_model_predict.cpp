@@ -29,9 +29,10 @@ StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, boo
   return out;
 }
 
-StepPrediction ForwardModel::predict_in_span(std::size_t s, const VectorX& unknowns, bool d_surface) {
+StepPrediction ForwardModel::predict_in_span(std::size_t s, const VectorX& unknowns, SurfacePart part) {
   if (!linear_ || !changes_.empty()) return predict(s, unknowns);
-  if (!d_surface) return unchanged(s, unknowns, Wanted::in_span);
+  if (part == SurfacePart::coordinates) return unchanged(s, unknowns, Wanted::coordinates);
+  if (part == SurfacePart::place) return unchanged(s, unknowns, Wanted::in_span);
   StepPrediction out = predict(s, unknowns);
   const Body& body = body_of(push(s), worker_of(s));
   out.in_span = place_in_span(s, body, coefficients(s, body, unknowns), unknowns);
@@ -44,6 +45,10 @@ StepPrediction ForwardModel::predict_in_span(std::size_t s, const VectorX& unkno
   return out;
 }
 
+void ForwardModel::add_surface(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const {
+  place_surface(s, unknowns, predicted.in_span->moved_m(), predicted);
+}
+
 StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, Wanted wanted) {
   const bool derivatives = wanted != Wanted::surface;
   const std::size_t worker = worker_of(s);
@@ -54,10 +59,10 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   StepPrediction out;
   fem::ResponseState at;
   if (linear_) {
-    if (wanted == Wanted::in_span) out.in_span = place_in_span(s, body, c, unknowns);
+    if (wanted == Wanted::in_span || wanted == Wanted::coordinates) out.in_span = place_in_span(s, body, c, unknowns);
     if (out.in_span) {
       at = body.response->readings(query(c, unknowns, derivatives));
-      at.watched_m = out.in_span->moved_m();
+      if (wanted == Wanted::in_span) at.watched_m = out.in_span->moved_m();
     } else {
       at = body.response->at(query(c, unknowns, derivatives));
     }
@@ -71,7 +76,12 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   if (!at.converged) return out;
 
   slide(s, body, unknowns, c.columns, derivatives, at);
-  place_surface(s, unknowns, at.watched_m, out);
+  if (out.in_span && wanted == Wanted::coordinates) {
+    out.field = field_;
+    out.field_unknown = field_unknown_;
+  } else {
+    place_surface(s, unknowns, at.watched_m, out);
+  }
   if (!derivatives) return out;
 
   out.columns = parameter_columns();

@@ -17,6 +17,17 @@ VectorX SpanPlace::moved_m() const {
   return moved_m;
 }
 
+double SpanPlace::at_most_from_m(const VectorX& other) const {
+  double sum = 0;
+  Index row = 0;
+  for (Index load : loads) {
+    const Index count = span->count_of(load);
+    sum += (at - other).segment(row, count).cwiseAbs().dot(span->reach_m.segment(span->first[static_cast<std::size_t>(load)], count));
+    row += count;
+  }
+  return sum;
+}
+
 /// Nothing where the surface is not such a sum: a clamp turns it, or it slides.
 std::optional<SpanPlace> ForwardModel::place_in_span(std::size_t s, const Body& body, const Coefficients& c,
                                                      const VectorX& unknowns) const {

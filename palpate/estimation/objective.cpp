@@ -47,7 +47,7 @@ Evaluation Objective::evaluate(const VectorX& unknowns, const Loss& loss, const 
       for (std::size_t s = model_.first_step_of(worker); s < model_.first_step_of(worker + 1) && !stop; ++s) {
         if (terms_[s].empty() || !loss.counts(s)) continue;
         if (anchored) {
-          predictions_[s] = model_.predict_in_span(s, unknowns, anchors_[s].terms.empty());
+          predictions_[s] = model_.predict_in_span(s, unknowns, anchors_[s].terms.empty() ? part_for_rows(s, loss) : SurfacePart::coordinates);
           normals[s] = follow(s, unknowns, loss);
         } else if (reuse_ > 0 && find_kept(s, unknowns, loss)) {
           if (rows_wanted_) rows_[s] = kept_[s].back().rows;

@@ -123,6 +123,9 @@ class Objective {
   StepNormal moved_along(const KeptStep& kept, const VectorX& unknowns) const;
   void prepare_anchors();
   bool stays_in_span(std::size_t s) const;
+  SurfacePart part_for_rows(std::size_t s, const Loss& loss) const;
+  void complete(std::size_t s, const VectorX& unknowns, const Loss& loss);
+  double moved_since(std::size_t s, const Anchor& anchor, const VectorX& unknowns, double enough);
   StepNormal follow(std::size_t s, const VectorX& unknowns, const Loss& loss);
   Anchor anchor_of(const std::vector<TermRows>& rows, const StepPrediction& there, const VectorX& unknowns, const Loss& loss) const;
   StepNormal normal_around(Anchor& anchor, std::size_t s, const VectorX& unknowns, const Loss& loss);

@@ -92,12 +92,49 @@ Loss Objective::choose_rays(const VectorX& unknowns, const Loss& loss) {
   for (std::size_t s = 0; s < model_.step_count(); ++s) {
     if (terms_[s].empty() || !loss.counts(s) || loss.rays_of(s) != nullptr) continue;
     ++steps_evaluated_;
-    rows_[s] = rows_of(s, model_.predict(s, unknowns), unknowns, loss, true);
+    rows_[s] = rows_of(s, model_.predict_in_span(s, unknowns, part_for_rows(s, loss)), unknowns, loss, true);
     anchors_[s] = {};
     anchors_[s].loss = loss;
     anchors_[s].last = unknowns;
   }
   return with_chosen_rays(loss);
+}
+
+/// What of the surface the step's rows are made of.
+SurfacePart Objective::part_for_rows(std::size_t s, const Loss& loss) const {
+  const bool slopes = std::any_of(terms_[s].begin(), terms_[s].end(), [&](const auto& term) {
+    return term->needs_surface_derivatives() || (!loss.along_rays && term->looks_at_surface());
+  });
+  return slopes ? SurfacePart::derivatives : SurfacePart::place;
+}
+
+/// So that the last prediction of a step holds what its rows are made of.
+void Objective::complete(std::size_t s, const VectorX& unknowns, const Loss& loss) {
+  StepPrediction& here = predictions_[s];
+  if (here.d_surface.rows() > 0) return;
+  if (part_for_rows(s, loss) == SurfacePart::derivatives) {
+    here = model_.predict_in_span(s, unknowns, SurfacePart::derivatives);
+  } else if (here.surface_m.rows() == 0) {
+    model_.add_surface(s, unknowns, here);
+  }
+}
+
+/// How far what the rows look at has moved since they were made, in standard deviations of a point; where that is no more than
+/// `enough`, coordinates say so as a rule, and it may be too much.
+double Objective::moved_since(std::size_t s, const Anchor& anchor, const VectorX& unknowns, double enough) {
+  const auto furthest = [&](auto moved_m) {
+    double moved = 0;
+    for (std::size_t t = 0; t < anchor.terms.size(); ++t)
+      if (anchor.terms[t]) moved = std::max(moved, moved_m(*anchor.terms[t]) / terms_[s][t]->typical_sigma());
+    return moved;
+  };
+  StepPrediction& here = predictions_[s];
+  if (here.surface_m.rows() == 0) {
+    const double at_most = furthest([&](const SurfaceQuadratic& term) { return term.moved_at_most_m(here, unknowns, unknowns_); });
+    if (at_most <= enough) return at_most;
+    model_.add_surface(s, unknowns, here);
+  }
+  return furthest([&](const SurfaceQuadratic& term) { return term.moved_m(here, unknowns, unknowns_); });
 }
 
 /// True where the step's terms need no more of its prediction than it holds.
@@ -117,9 +154,7 @@ Objective::StepNormal Objective::follow(std::size_t s, const VectorX& unknowns, 
   const bool same_rays = anchor.loss.rays_of(s) == loss.rays_of(s);
   double moved = std::numeric_limits<double>::infinity();  // in standard deviations of a point
   if (!anchor.terms.empty() && anchor.loss.weighs_like(loss)) {
-    moved = 0;
-    for (std::size_t t = 0; t < anchor.terms.size(); ++t)
-      if (anchor.terms[t]) moved = std::max(moved, anchor.terms[t]->moved_m(here, unknowns, unknowns_) / terms_[s][t]->typical_sigma());
+    moved = moved_since(s, anchor, unknowns, same_rays ? 0.5 * reuse_ * anchor.patience : 0);
   } else if (anchor.terms.empty() && !same_rays && anchor.last.size() == unknowns.size() && anchor.last == unknowns &&
              anchor.loss.weighs_like(loss)) {
     moved = 0;  // rays were cast just here
@@ -130,10 +165,11 @@ Objective::StepNormal Objective::follow(std::size_t s, const VectorX& unknowns, 
       for (std::size_t i = 0; i < chosen.size(); ++i)
         if (chosen[i] != counts_in) rows_[s][t].residual(static_cast<Index>(i)) = std::numeric_limits<double>::infinity();
     }
+    complete(s, unknowns, loss);
     anchor = anchor_of(rows_[s], here, unknowns, loss);
   } else if (!same_rays || !(moved <= 0.5 * reuse_ * anchor.patience)) {
     ++steps_evaluated_;
-    if (here.d_surface.rows() == 0) predictions_[s] = model_.predict_in_span(s, unknowns, true);
+    complete(s, unknowns, loss);
     std::vector<TermRows> rows = rows_of(s, here, unknowns, loss, true);
     Anchor fresh = anchor_of(rows, here, unknowns, loss);
     if (!rows_wanted_) return normal_around(fresh, s, unknowns, loss);
@@ -143,7 +179,7 @@ Objective::StepNormal Objective::follow(std::size_t s, const VectorX& unknowns, 
     rows_[s] = std::move(rows);
   }
   if (anchor.last.size() != unknowns.size() || anchor.last != unknowns) {
-    if (!stays_in_span(s)) predictions_[s] = model_.predict_in_span(s, unknowns, true);
+    if (!stays_in_span(s)) predictions_[s] = model_.predict_in_span(s, unknowns, SurfacePart::derivatives);
     anchor.said = normal_around(anchor, s, unknowns, loss);
     anchor.last = unknowns;
   }

@@ -2,6 +2,7 @@
 #include "palpate/estimation/surface_quadratic.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 
 namespace palpate::estimation {
@@ -273,19 +274,29 @@ bool SurfaceQuadratic::renumber(const std::vector<int>& moved) {
   return std::none_of(own_.begin(), own_.end(), [](int unknown) { return unknown < 0; });
 }
 
-double SurfaceQuadratic::moved_m(const StepPrediction& there, const VectorX& unknowns, const Unknowns& list) const {
-  double of_frame_m = 0;
+/// How far the term's own unknowns have moved a point at most.
+double SurfaceQuadratic::of_frame_m(const VectorX& unknowns, const Unknowns& list) const {
+  double sum_m = 0;
   for (std::size_t k = 0; k < own_.size(); ++k) {
     const double change = std::abs(unknowns(own_[k]) - own_at_(static_cast<Index>(k)));
     const std::string& unit = list[own_[k]].unit;
-    of_frame_m += unit == "m" ? change : unit == "rad" ? radius_m_ * change : 0;
+    sum_m += unit == "m" ? change : unit == "rad" ? radius_m_ * change : 0;
   }
+  return sum_m;
+}
+
+double SurfaceQuadratic::moved_m(const StepPrediction& there, const VectorX& unknowns, const Unknowns& list) const {
   double furthest2_m2 = 0;
   for (Index v = 0; v < seen_there_m_.rows(); ++v) {
     const Vec3 now_m = there.surface_m.row(seen_[static_cast<std::size_t>(v)]);
     furthest2_m2 = std::max(furthest2_m2, (now_m - seen_there_m_.row(v).transpose()).squaredNorm());
   }
-  return std::sqrt(furthest2_m2) + of_frame_m;
+  return std::sqrt(furthest2_m2) + of_frame_m(unknowns, list);
+}
+
+double SurfaceQuadratic::moved_at_most_m(const StepPrediction& there, const VectorX& unknowns, const Unknowns& list) const {
+  if (!shares_span(there) || there.field != nullptr) return std::numeric_limits<double>::infinity();
+  return there.in_span->at_most_from_m(span_->at) + of_frame_m(unknowns, list);
 }
 
 template <int width>

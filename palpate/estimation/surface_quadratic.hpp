@@ -35,6 +35,8 @@ class SurfaceQuadratic {
 
   /// How far a vertex or a point of the frame has moved at most since, m.
   double moved_m(const StepPrediction& there, const VectorX& unknowns, const Unknowns& list) const;
+  /// No less than that, of a prediction's coordinates, which may be all of the surface that it has; infinite where they do not tell.
+  double moved_at_most_m(const StepPrediction& there, const VectorX& unknowns, const Unknowns& list) const;
 
   /// True where the prediction's coordinates (StepPrediction::in_span) are those that the rows were made with: its d_surface may
   /// be empty.
@@ -49,6 +51,7 @@ class SurfaceQuadratic {
  private:
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   struct Seen;
+  double of_frame_m(const VectorX& unknowns, const Unknowns& list) const;
   template <int width>
   void gather(const Seen& seen);
   void gather_facets(const Seen& seen);

@@ -40,6 +40,10 @@ ResponseSpan span_of(const std::vector<MatrixX>& coefficients, Index rows, doubl
   out.fields.resize(rows, out.first.back());
   for (Index load = 0; load < loads; ++load)
     out.fields.middleCols(out.first[static_cast<std::size_t>(load)], out.count_of(load)) = fields[static_cast<std::size_t>(load)];
+  out.reach_m = VectorX::Zero(out.fields.cols());
+  for (Index field = 0; field < out.fields.cols(); ++field)
+    for (Index row = 0; row + 3 <= rows; row += 3)
+      out.reach_m(field) = std::max(out.reach_m(field), out.fields.col(field).segment<3>(row).norm());
   return out;
 }
 

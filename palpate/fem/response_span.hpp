@@ -11,6 +11,7 @@ namespace palpate::fem {
 
 struct ResponseSpan {
   MatrixX fields;               ///< rows x fields, m at E = 1: those of unit load 0 (forces first, then motions), of unit load 1, ...
+  VectorX reach_m;              ///< a field: length of the longest three of its rows that belong together, a vertex's
   std::vector<Index> first;     ///< a unit load: its first field; one more at the end
   std::vector<MatrixX> share;   ///< a unit load: its fields x terms of the polynomial in z = -log(1 - 2 nu)
   double middle = 0, half = 1;  ///< of the polynomial's range of z

@@ -50,7 +50,7 @@ struct Scene {
 TEST(SpanPlace, IsWhereTheSurfaceGoes) {
   Scene scene;
   for (const VectorX& at : {scene.here, scene.there}) {
-    const StepPrediction all = scene.model->predict(1, at), few = scene.model->predict_in_span(1, at, false);
+    const StepPrediction all = scene.model->predict(1, at), few = scene.model->predict_in_span(1, at, SurfacePart::place);
     ASSERT_TRUE(few.in_span);
     EXPECT_EQ(few.d_surface.rows(), 0) << "nothing is saved";
     EXPECT_EQ(few.columns, all.columns);
@@ -71,7 +71,7 @@ TEST(SpanPlace, IsNotSaidOfABodyThatAClampTurns) {
   Recording recording = uncertain_push();
   recording.supports[0].pose_std_m = recording.supports[0].pose_std_rad = 1e-3;
   Scene scene(recording);
-  const StepPrediction turned = scene.model->predict_in_span(1, scene.there, false);
+  const StepPrediction turned = scene.model->predict_in_span(1, scene.there, SurfacePart::place);
   EXPECT_FALSE(turned.in_span);
   EXPECT_EQ(turned.d_surface, scene.model->predict(1, scene.there).d_surface);
 }
@@ -80,10 +80,10 @@ TEST(SurfaceQuadratic, SaysTheSameOfFieldsAsOfVertices) {
   Scene scene;
   const Loss loss;
   const SurfacePattern pattern(scene.model->object().surface.rest());
-  const StepPrediction then = scene.model->predict_in_span(1, scene.here, true);
+  const StepPrediction then = scene.model->predict_in_span(1, scene.here, SurfacePart::derivatives);
   const std::vector<TermRows> rows = scene.objective->rows_of(1, then, scene.here, loss, true);
   SurfaceQuadratic form(pattern, rows[0], loss, then, scene.here);
-  const StepPrediction all = scene.model->predict(1, scene.there), few = scene.model->predict_in_span(1, scene.there, false);
+  const StepPrediction all = scene.model->predict(1, scene.there), few = scene.model->predict_in_span(1, scene.there, SurfacePart::place);
   EXPECT_FALSE(form.shares_span(all));
   ASSERT_TRUE(form.shares_span(few));
   const auto ask = [&](const StepPrediction& now) {
@@ -106,11 +106,11 @@ TEST(SurfaceQuadratic, SaysTheSameOfFieldsAsOfVertices) {
 TEST(SurfaceQuadratic, KnowsFieldsOfAnotherBodyFromItsOwn) {
   Scene scene, other;
   const SurfacePattern pattern(scene.model->object().surface.rest());
-  const StepPrediction then = scene.model->predict_in_span(1, scene.here, true);
+  const StepPrediction then = scene.model->predict_in_span(1, scene.here, SurfacePart::derivatives);
   const std::vector<TermRows> rows = scene.objective->rows_of(1, then, scene.here, {}, true);
   const SurfaceQuadratic form(pattern, rows[0], {}, then, scene.here);
-  EXPECT_TRUE(form.shares_span(scene.model->predict_in_span(1, scene.there, false)));
-  EXPECT_FALSE(form.shares_span(other.model->predict_in_span(1, scene.there, false)));
+  EXPECT_TRUE(form.shares_span(scene.model->predict_in_span(1, scene.there, SurfacePart::place)));
+  EXPECT_FALSE(form.shares_span(other.model->predict_in_span(1, scene.there, SurfacePart::place)));
 }
 
 }  // namespace

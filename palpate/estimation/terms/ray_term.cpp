@@ -43,7 +43,7 @@ class RayTerm : public Term {
   }
 
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const override {
-    if (view.along_rays && view.surface_slopes && scatter_ < 0) return facet_rows(predicted, unknowns, view);
+    if (view.along_rays && view.surface_slopes && !needs_surface_derivatives()) return facet_rows(predicted, unknowns, view);
     Sight sight = look(predicted.surface_m, unknowns, view);
     const RigidMap &frame = sight.frame, &camera = sight.camera;
     const double bias_m = bias_ >= 0 ? unknowns(bias_) : 0;
@@ -169,6 +169,7 @@ class RayTerm : public Term {
     return own;
   }
   double typical_sigma() const override { return typical_; }
+  bool needs_surface_derivatives() const override { return scatter_ >= 0; }
 
  private:
   /// What every frame of the camera errs by: a motion along and about the camera's axes, turning about the object's middle.

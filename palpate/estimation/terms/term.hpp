@@ -92,6 +92,8 @@ class Term {
   virtual std::vector<int> own_unknowns() const { return {}; }
   /// False: rows hang on the prediction's readings alone (forces, travel).
   virtual bool looks_at_surface() const { return true; }
+  /// False: rows with TermView::surface_slopes are made of the surface alone, without its derivatives.
+  virtual bool needs_surface_derivatives() const { return looks_at_surface(); }
   /// False for what tells of nuisances alone: by itself it is no observation of the object.
   virtual bool is_about_object() const { return true; }
   /// Standard deviation that residuals are divided by, a typical one (for the annealing of the robust loss).
