@@ -30,7 +30,9 @@ struct SurfaceQuadratic::Seen {
 
   Index triangle_of(Index row) const {
     const auto i = static_cast<std::size_t>(row);
-    return rows.facets ? rows.facets->triangle[i] : rows.surface[i].triangle;
+    if (!rows.facets) return rows.surface[i].triangle;
+    const Index facet = rows.facets->facet[i];
+    return facet < 0 ? facet : rows.facets->triangle[static_cast<std::size_t>(facet)];
   }
   bool counts(Index row) const { return weight(row) != 0 && triangle_of(row) >= 0; }
 
@@ -64,13 +66,20 @@ SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows
   Seen seen{pattern, rows, weighed.weight, first, count, {}, {}};
   seen.vertex.assign(static_cast<std::size_t>(pattern.vertices), unseen);
   seen.edge.assign(pattern.edges.size(), unseen);
-  for (Index i = 0; i < weighed.weight.size(); ++i) {
-    if (!seen.counts(i)) continue;
-    const Index triangle = seen.triangle_of(i);
+  const auto note = [&](Index triangle) {
     for (int k = 0; k < 3; ++k) {
       seen.vertex[static_cast<std::size_t>(pattern.triangles(triangle, k))] = 0;
       seen.edge[pattern.edges_of[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)]] = 0;
     }
+  };
+  std::vector<FacetSum> sums;
+  if (rows.facets) {
+    sums = summed_by_facet(rows, weighed.weight);
+    for (std::size_t f = 0; f < sums.size(); ++f)
+      if (sums[f].any) note(rows.facets->triangle[f]);
+  } else {
+    for (Index i = 0; i < weighed.weight.size(); ++i)
+      if (seen.counts(i)) note(seen.triangle_of(i));
   }
   for (std::size_t v = 0; v < seen.vertex.size(); ++v) {
     if (seen.vertex[v] == unseen) continue;
@@ -94,7 +103,7 @@ SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows
   own_slope_ = VectorX::Zero(count);
   constexpr int narrow = 16, wide = 24;  // whole vector registers: three corners, own unknowns, residual
   if (rows.facets) {
-    gather_facets(seen);
+    gather_facets(seen, sums);
   } else if (10 + count <= narrow) {
     gather<narrow>(seen);
   } else if (10 + count <= wide) {
@@ -107,41 +116,62 @@ SurfaceQuadratic::SurfaceQuadratic(const SurfacePattern& pattern, const TermRows
   own_at_ = unknowns(own_);
 }
 
-void SurfaceQuadratic::gather_facets(const Seen& seen) {
-  const FacetSlopes& facets = *seen.rows.facets;
+std::vector<SurfaceQuadratic::FacetSum> SurfaceQuadratic::summed_by_facet(const TermRows& rows, const VectorX& weight) {
   constexpr Index shares = FacetSlopes::shares;
-  struct Sum {
-    Eigen::Matrix<double, shares, shares> block = Eigen::Matrix<double, shares, shares>::Zero();
-    Eigen::Matrix<double, shares, 1> slope = Eigen::Matrix<double, shares, 1>::Zero();
-    bool any = false;
-  };
-  std::vector<Sum> sums(static_cast<std::size_t>(seen.pattern.triangles.rows()));
-  for (Index i = 0; i < seen.weight.size(); ++i) {
-    if (!seen.counts(i)) continue;
-    Sum& sum = sums[static_cast<std::size_t>(seen.triangle_of(i))];
-    const Eigen::Matrix<double, shares, 1> share = facets.share.row(i), weighed = seen.weight(i) * share;
+  std::vector<FacetSum> sums(rows.facets->triangle.size());
+  for (Index i = 0; i < weight.size(); ++i) {
+    const Index facet = rows.facets->facet[static_cast<std::size_t>(i)];
+    if (facet < 0 || weight(i) == 0) continue;
+    FacetSum& sum = sums[static_cast<std::size_t>(facet)];
+    const Eigen::Matrix<double, shares, 1> share = rows.facets->share.row(i), weighed = weight(i) * share;
     sum.block.noalias() += weighed * share.transpose();
-    sum.slope += seen.rows.residual(i) * weighed;
+    sum.slope += rows.residual(i) * weighed;
     sum.any = true;
   }
-  RowMajor bent(shares, seen.own_count);
-  for (Index triangle = 0; triangle < seen.pattern.triangles.rows(); ++triangle) {
-    const Sum& sum = sums[static_cast<std::size_t>(triangle)];
-    if (!sum.any) continue;
-    const Vec3 normal = facets.normal.row(triangle);
-    const Mat3 outer = normal * normal.transpose();
-    const auto own = facets.own.middleRows<shares>(shares * triangle);
-    bent = sum.block.lazyProduct(own);
-    for (Index k = 0; k < 3; ++k) {
-      const Index at = seen.vertex[static_cast<std::size_t>(seen.pattern.triangles(triangle, k))];
-      const std::size_t edge = seen.pattern.edges_of[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)];
-      vertex_blocks_[static_cast<std::size_t>(at)] += sum.block(k, k) * outer;
-      edge_blocks_[static_cast<std::size_t>(seen.edge[edge])] += sum.block(k, (k + 1) % 3) * outer;
-      cross_.middleRows<3>(3 * at) -= normal.lazyProduct(bent.row(k));
-      surface_slope_.segment<3>(3 * at) -= sum.slope(k) * normal;
+  return sums;
+}
+
+void SurfaceQuadratic::gather_facets(const Seen& seen, const std::vector<FacetSum>& sums) {
+  const FacetSlopes& facets = *seen.rows.facets;
+  constexpr Index shares = FacetSlopes::shares;
+  // The compiler writes out products of sizes that it knows, which take half the time.
+  const auto gather = [&]<int width>() {
+    using Rows = Eigen::Matrix<double, shares, width, Eigen::RowMajor>;
+    using Corner = Eigen::Matrix<double, 3, width, Eigen::RowMajor>;
+    const Index count = seen.own_count;
+    Rows bent(shares, count);
+    Eigen::Matrix<double, width, width> own_block = Eigen::Matrix<double, width, width>::Zero(count, count);
+    Eigen::Matrix<double, width, 1> own_slope = Eigen::Matrix<double, width, 1>::Zero(count);
+    for (std::size_t facet = 0; facet < sums.size(); ++facet) {
+      const FacetSum& sum = sums[facet];
+      if (!sum.any) continue;
+      const Index triangle = facets.triangle[facet];
+      const Vec3 normal = facets.normal.row(static_cast<Index>(facet));
+      const Mat3 outer = normal * normal.transpose();
+      const Eigen::Map<const Rows> own(facets.own.data() + static_cast<Index>(facet) * shares * count, shares, count);
+      bent = sum.block.lazyProduct(own);
+      for (Index k = 0; k < 3; ++k) {
+        const Index at = seen.vertex[static_cast<std::size_t>(seen.pattern.triangles(triangle, k))];
+        const std::size_t edge = seen.pattern.edges_of[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)];
+        vertex_blocks_[static_cast<std::size_t>(at)] += sum.block(k, k) * outer;
+        edge_blocks_[static_cast<std::size_t>(seen.edge[edge])] += sum.block(k, (k + 1) % 3) * outer;
+        Eigen::Map<Corner> cross(cross_.data() + 3 * at * count, 3, count);
+        cross -= normal.lazyProduct(bent.row(k));
+        surface_slope_.segment<3>(3 * at) -= sum.slope(k) * normal;
+      }
+      own_block += own.transpose().lazyProduct(bent);
+      own_slope += own.transpose().lazyProduct(sum.slope);
     }
-    own_block_ += own.transpose().lazyProduct(bent);
-    own_slope_ += own.transpose().lazyProduct(sum.slope);
+    own_block_ += own_block;
+    own_slope_ += own_slope;
+  };
+  constexpr int frame = 6;  // a pose; the camera's is another
+  if (seen.own_count == frame) {
+    gather.template operator()<frame>();
+  } else if (seen.own_count == 2 * frame) {
+    gather.template operator()<2 * frame>();
+  } else {
+    gather.template operator()<Eigen::Dynamic>();
   }
 }
 
@@ -166,8 +196,9 @@ void SurfaceQuadratic::gather_noise(const Seen& seen, double each) {
       Mat3 per_corner;
       if (seen.rows.facets) {
         const FacetSlopes& facets = *seen.rows.facets;
-        per_corner = -facets.normal.row(triangle).transpose() * facets.share.row(i).head<3>();
-        own_row = facets.own.middleRows<FacetSlopes::shares>(FacetSlopes::shares * triangle).transpose() * facets.share.row(i).transpose();
+        const Index facet = facets.facet[static_cast<std::size_t>(i)];
+        per_corner = -facets.normal.row(facet).transpose() * facets.share.row(i).head<3>();
+        own_row = facets.own.middleRows<FacetSlopes::shares>(FacetSlopes::shares * facet).transpose() * facets.share.row(i).transpose();
       } else {
         per_corner = seen.rows.surface[static_cast<std::size_t>(i)].per_corner;
         own_row = seen.rows.jacobian.row(i).segment(seen.own_first, seen.own_count).transpose();

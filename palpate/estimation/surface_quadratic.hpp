@@ -54,7 +54,14 @@ class SurfaceQuadratic {
   double of_frame_m(const VectorX& unknowns, const Unknowns& list) const;
   template <int width>
   void gather(const Seen& seen);
-  void gather_facets(const Seen& seen);
+  /// What the rows of one facet say.
+  struct FacetSum {
+    Eigen::Matrix<double, FacetSlopes::shares, FacetSlopes::shares> block = decltype(block)::Zero();
+    Eigen::Matrix<double, FacetSlopes::shares, 1> slope = decltype(slope)::Zero();
+    bool any = false;  ///< row that counts
+  };
+  static std::vector<FacetSum> summed_by_facet(const TermRows& rows, const VectorX& weight);
+  void gather_facets(const Seen& seen, const std::vector<FacetSum>& sums);
   void gather_noise(const Seen& seen, double each);
   void append_modes(const StepPrediction& there);
   /// Columns `from` to `from + width` of the blocks times `columns`; beyond the last one they count as zero.

@@ -67,6 +67,34 @@ TEST(SpanPlace, IsWhereTheSurfaceGoes) {
   }
 }
 
+TEST(SpanPlace, SurfaceMayComeLater) {
+  Scene scene;
+  StepPrediction later = scene.model->predict_in_span(1, scene.there, SurfacePart::coordinates);
+  const StepPrediction at_once = scene.model->predict_in_span(1, scene.there, SurfacePart::place);
+  ASSERT_TRUE(later.in_span);
+  EXPECT_EQ(later.surface_m.rows(), 0) << "nothing is saved";
+  EXPECT_EQ(later.columns, at_once.columns);
+  EXPECT_EQ(later.travel_m, at_once.travel_m);
+  EXPECT_EQ(later.in_span->at, at_once.in_span->at);
+  EXPECT_EQ(later.field, at_once.field);
+  scene.model->add_surface(1, scene.there, later);
+  EXPECT_EQ(later.surface_m, at_once.surface_m);
+  EXPECT_EQ(later.material_m, at_once.material_m);
+}
+
+TEST(SpanPlace, NoVertexMovesFurtherThanCoordinatesSay) {
+  Scene scene;
+  const StepPrediction from = scene.model->predict_in_span(1, scene.here, SurfacePart::place);
+  for (const double share : {1.0, 0.3, 1e-3}) {
+    const StepPrediction to = scene.model->predict_in_span(1, scene.here + share * (scene.there - scene.here), SurfacePart::place);
+    const double furthest_m = (to.surface_m - from.surface_m).rowwise().norm().maxCoeff();
+    const double at_most_m = to.in_span->at_most_from_m(from.in_span->at);
+    EXPECT_GE(at_most_m, furthest_m * (1 - 1e-12));
+    EXPECT_LT(at_most_m, 10 * furthest_m) << "of no use";
+  }
+  EXPECT_EQ(from.in_span->at_most_from_m(from.in_span->at), 0);
+}
+
 TEST(SpanPlace, IsNotSaidOfABodyThatAClampTurns) {
   Recording recording = uncertain_push();
   recording.supports[0].pose_std_m = recording.supports[0].pose_std_rad = 1e-3;
@@ -101,6 +129,24 @@ TEST(SurfaceQuadratic, SaysTheSameOfFieldsAsOfVertices) {
     const VectorX expected = of_vertices.curvature.col(k);
     EXPECT_LT((of_fields.curvature.col(k) - expected).norm(), 1e-5 * expected.norm() + 1e-12) << scene.unknowns[k].name;
   }
+}
+
+TEST(SurfaceQuadratic, BoundsByCoordinatesHowFarTheSurfaceHasMoved) {
+  Scene scene, other;
+  const SurfacePattern pattern(scene.model->object().surface.rest());
+  const StepPrediction then = scene.model->predict_in_span(1, scene.here, SurfacePart::place);
+  const std::vector<TermRows> rows = scene.objective->rows_of(1, scene.model->predict(1, scene.here), scene.here, {}, true);
+  const SurfaceQuadratic form(pattern, rows[0], {}, then, scene.here);
+  const StepPrediction whole = scene.model->predict_in_span(1, scene.there, SurfacePart::place);
+  const StepPrediction few = scene.model->predict_in_span(1, scene.there, SurfacePart::coordinates);
+  const double moved_m = form.moved_m(whole, scene.there, scene.unknowns);
+  const double at_most_m = form.moved_at_most_m(few, scene.there, scene.unknowns);
+  EXPECT_GT(moved_m, 0);
+  EXPECT_GE(at_most_m, moved_m * (1 - 1e-12));
+  EXPECT_LT(at_most_m, 10 * moved_m);
+  EXPECT_EQ(form.moved_at_most_m(then, scene.here, scene.unknowns), 0);
+  const StepPrediction elsewhere = other.model->predict_in_span(1, scene.there, SurfacePart::coordinates);
+  EXPECT_TRUE(std::isinf(form.moved_at_most_m(elsewhere, scene.there, scene.unknowns)));
 }
 
 TEST(SurfaceQuadratic, KnowsFieldsOfAnotherBodyFromItsOwn) {

@@ -246,7 +246,7 @@ TEST_P(TermContract, ItsRowsAsAQuadraticOfTheSurfaceSayTheSame) {
   const VectorX at = away_from_rest(unknowns);
   const StepPrediction predicted = model.predict(test.step, at);
   const TermRows rows = term->rows(predicted, at, {test.along_rays, nullptr, true});
-  const std::size_t said = rows.facets ? rows.facets->triangle.size() : rows.surface.size();
+  const std::size_t said = rows.facets ? rows.facets->facet.size() : rows.surface.size();
   ASSERT_EQ(said, sees_surface ? static_cast<std::size_t>(rows.residual.size()) : 0u);
   if (!sees_surface) return;
 

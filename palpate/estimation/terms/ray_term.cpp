@@ -243,11 +243,12 @@ class RayTerm : public Term {
     const Index count = static_cast<Index>(rays_.range_m.size()), triangles = static_cast<Index>(rest_.triangles.rows());
     TermRows rows = blank_rows(predicted, view);
     FacetSlopes& facets = rows.facets.emplace();
-    facets.triangle.assign(static_cast<std::size_t>(count), -1);
-    facets.share.setZero(count, FacetSlopes::shares);
-    facets.normal.resize(triangles, 3);
-    facets.own.setZero(triangles * FacetSlopes::shares, static_cast<Index>(own_unknowns().size()));
-    std::vector<char> met(static_cast<std::size_t>(triangles), 0);
+    const Index most = std::min(count, triangles);
+    facets.facet.assign(static_cast<std::size_t>(count), -1);
+    facets.share.resize(count, FacetSlopes::shares);
+    facets.normal.resize(most, 3);
+    facets.own.resize(most * FacetSlopes::shares, static_cast<Index>(own_unknowns().size()));
+    std::vector<Index> facet_of(static_cast<std::size_t>(triangles), -1);
     const Vec3 eye_m = sight.place(rays_.origins_m.row(0));
     for (Index i = 0; i < count; ++i) {
       const Vec3 origin_m = one_eye_ ? eye_m : sight.place(rays_.origins_m.row(i));
@@ -259,27 +260,29 @@ class RayTerm : public Term {
       if (view.chosen != nullptr && !chosen) continue;
       const auto hit = cast(sight, predicted.surface_m, i, origin_m, direction);
       if (!hit) continue;  // the ray passes the object by; nearest points jump from edge to edge: no quadratic form holds them
-      if (!met[static_cast<std::size_t>(hit->triangle)]) {
-        met[static_cast<std::size_t>(hit->triangle)] = 1;
-        add_facet(predicted.surface_m, hit->triangle, sight, facets);
-      }
-      const double cosine = facets.normal.row(hit->triangle).dot(direction);
+      Index& facet = facet_of[static_cast<std::size_t>(hit->triangle)];
+      if (facet < 0) facet = add_facet(predicted.surface_m, hit->triangle, sight, facets);
+      const double cosine = facets.normal.row(facet).dot(direction);
       rows.facing(i) = std::abs(cosine) / least_cosine_;
       if (!chosen && !(rows.facing(i) > 1)) continue;
       const double along = 1 / (std::copysign(std::max(std::abs(cosine), steepest_cosine), cosine) * rays_.sigma_m(i));
-      facets.triangle[static_cast<std::size_t>(i)] = hit->triangle;
+      facets.facet[static_cast<std::size_t>(i)] = facet;
       facets.share.row(i) << along * hit->barycentric.transpose(), along * cosine;
       rows.residual(i) = (measured_m - hit->range_m) / rays_.sigma_m(i);
       rows.met_m.row(i) = (origin_m + hit->range_m * direction).transpose();
     }
     return rows;
   }
-  void add_facet(const Points& surface_m, Index triangle, const Sight& sight, FacetSlopes& facets) const {
+  /// @returns its number
+  Index add_facet(const Points& surface_m, Index triangle, const Sight& sight, FacetSlopes& facets) const {
+    const Index facet = static_cast<Index>(facets.triangle.size());
     const Vec3 normal = face_normal(surface_m, triangle);
     const Mat3 back = sight.frame.rotation().transpose();
-    facets.normal.row(triangle) = normal.transpose();
+    facets.triangle.push_back(triangle);
+    facets.normal.row(facet) = normal.transpose();
+    facets.own.middleRows<FacetSlopes::shares>(FacetSlopes::shares * facet).setZero();
     for (Index k = 0; k < 3; ++k) {
-      auto own = facets.own.row(FacetSlopes::shares * triangle + k);
+      auto own = facets.own.row(FacetSlopes::shares * facet + k);
       const Vec3 corner_m = surface_m.row(rest_.triangles(triangle, k));
       const Vec3 in_frame_m = back * (corner_m - sight.frame.apply(Vec3::Zero()));
       if (pose_ >= 0) own.head<6>() = sight.frame.slope(normal, in_frame_m);
@@ -289,7 +292,8 @@ class RayTerm : public Term {
       auto of_axes = own.segment<6>(pose_ >= 0 ? 6 : 0);
       of_axes << of_base.head<3>() * R_base_camera_, of_base.tail<3>() * R_base_camera_;
     }
-    if (bias_ >= 0) facets.own(FacetSlopes::shares * triangle + 3, facets.own.cols() - 1) = -1;
+    if (bias_ >= 0) facets.own(FacetSlopes::shares * facet + 3, facets.own.cols() - 1) = -1;
+    return facet;
   }
   /// Where the surface comes nearest to a ray that counts and just misses it: its depth goes on as that of the outline. As an outlier
   /// it would hold the fit where the outline stood when the rays were chosen, at a sharp edge above all.

@@ -55,14 +55,15 @@ struct SurfaceSlope {
 };
 
 /// The same where all that rows of one triangle differ in is a few shares, as for rays: where on it they end and how steeply. Row i changes
-/// by the sum over k of share(i, k) (own(4 t + k) . change of the term's own unknowns - normal(t) . motion of corner k), t being its
-/// triangle. The fourth share has no corner. The rest surface's error moves vertices and is no own unknown.
+/// by the sum over k of share(i, k) (own(4 f + k) . change of the term's own unknowns - normal(f) . motion of corner k), f being its
+/// facet: the number of its triangle among those that are met. The fourth share has no corner. The rest surface's error moves vertices and is no own unknown.
 struct FacetSlopes {
   static constexpr Index shares = 4;
-  std::vector<Index> triangle;  ///< a row; -1: it meets none
-  Eigen::Matrix<double, Eigen::Dynamic, shares, Eigen::RowMajor> share;
-  Points normal;                                                            ///< a triangle; of those that no row meets nothing is said
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> own;  ///< triangles * shares x own unknowns
+  std::vector<Index> facet;     ///< a row; -1: it meets none
+  std::vector<Index> triangle;  ///< a facet. A surface has many that no row meets: of them nothing is kept
+  Eigen::Matrix<double, Eigen::Dynamic, shares, Eigen::RowMajor> share;  ///< a row; of those without a facet nothing is said
+  Points normal;                                                            ///< a facet, and spare rows
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> own;  ///< facets * shares x own unknowns, and spare rows
 };
 
 /// Rows of one term: residual = (observed - predicted) / sigma, jacobian = d residual / d unknowns.
