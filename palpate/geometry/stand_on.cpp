@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/geometry/make_room.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/tet_quality.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
@@ -29,11 +30,6 @@ double signed_volume(const TetMesh& mesh, Index t) {
   return (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6;
 }
 
-double quality(const TetMesh& mesh, Index t) {
-  const auto node = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(t, k))); };
-  return tet_quality(node(0), node(1), node(2), node(3));
-}
-
 /// Takes back half of a move, and half again, where it leaves an element too little of its volume, or makes one worse than
 /// `least_quality`.
 void keep_elements(const Points& before, TetMesh& volume, double least_quality) {
@@ -42,8 +38,8 @@ void keep_elements(const Points& before, TetMesh& volume, double least_quality) 
   for (int round = 0;; ++round) {
     std::set<Index> back;
     for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
-      const double now = quality(volume, t);
-      const bool good = now >= least_quality || now >= quality(old, t);
+      const double now = tet_quality(volume, t);
+      const bool good = now >= least_quality || now >= tet_quality(old, t);
       if (good && signed_volume(volume, t) >= least_volume * signed_volume(old, t)) continue;
       for (int k = 0; k < 4; ++k) {
         const Index i = volume.tetrahedra(t, k);
@@ -56,6 +52,12 @@ void keep_elements(const Points& before, TetMesh& volume, double least_quality) 
       else volume.nodes_m.row(i) = before.row(i);
     }
   }
+}
+
+/// After a move of boundary nodes. Without a wish for good elements only what would turn over is taken back.
+void settle(const Triangles& faces, const Points& before, TetMesh& volume, double least_quality) {
+  if (least_quality > 0) make_room(faces, before, least_quality, volume);
+  keep_elements(before, volume, least_quality);
 }
 
 /// Boundary triangles in the volume's numbering.
@@ -94,7 +96,7 @@ std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& v
     const Vec3 node = before.row(i);
     volume.nodes_m.row(i) -= plane.normal.dot(node - plane.point_m) * plane.normal.transpose();
   }
-  keep_elements(before, volume, least_quality);
+  settle(faces, before, volume, least_quality);
   return laid;
 }
 
@@ -241,7 +243,7 @@ void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume, doubl
     const Vec3 node = volume.nodes_m.row(i);
     volume.nodes_m.row(i) -= plane.normal.dot(node - plane.point_m) * plane.normal.transpose();
   }
-  keep_elements(before, volume, least_quality);
+  settle(faces, before, volume, least_quality);
 }
 
 }  // namespace palpate::geometry

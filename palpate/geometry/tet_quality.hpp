@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "palpate/core/math.hpp"
+#include "palpate/core/mesh.hpp"
 
 namespace palpate::geometry {
 
@@ -27,6 +28,10 @@ inline double tet_quality(const Vec3& a, const Vec3& b, const Vec3& c, const Vec
   const double high = std::max({c0, c1, c2, c3, c4, c5}), low = std::min({c0, c1, c2, c3, c4, c5});
   const double sharp = high > 0 ? std::sqrt(std::max(0.0, 1 - high * high)) : 1.0;
   return std::min(sharp, low < 0 ? 1 + low : 1.0);
+}
+inline double tet_quality(const TetMesh& mesh, Index t) {
+  const auto node = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(t, k))); };
+  return tet_quality(node(0), node(1), node(2), node(3));
 }
 
 }  // namespace palpate::geometry

@@ -114,7 +114,7 @@ class Field {
 };
 
 /// Where the flank meets the plane: marching cuts a corner off every edge that two surfaces make, and of a foot it would leave
-/// too little. Vertices in the plane beside ones above it go to where the facets' surface passes the plane.
+/// too little. Vertices in the plane beside ones above it, and those, go along the plane to where the facets' surface is.
 void sharpen_foot(const Plane& plane, Field& field, double cell, TriMesh& surface) {
   constexpr int steps = 4;
   constexpr double least_slope = 0.2;  // of the distance from the flank, along the plane: flatter, it does not say where it ends
@@ -125,7 +125,8 @@ void sharpen_foot(const Plane& plane, Field& field, double cell, TriMesh& surfac
   for (Index t = 0; t < surface.triangles.rows(); ++t)
     for (int k = 0; k < 3; ++k)
       for (const int other : {(k + 1) % 3, (k + 2) % 3})
-        if (above[surface.triangles(t, other)] && !above[surface.triangles(t, k)]) rim[surface.triangles(t, k)] = 1;
+        if (above[surface.triangles(t, other)] && !above[surface.triangles(t, k)])
+          rim[surface.triangles(t, k)] = rim[surface.triangles(t, other)] = 1;
   const auto [u, v] = tangents(plane.normal);
   const double h = 0.1 * cell;
   for (std::size_t i = 0; i < rim.size(); ++i) {

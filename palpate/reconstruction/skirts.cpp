@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/reconstruction/flank.hpp"
+
 namespace palpate::reconstruction {
 namespace {
 
@@ -18,32 +20,6 @@ PointCloud middles_of(const std::vector<Facet>& facets) {
   out.points_m.resize(static_cast<Index>(facets.size()), 3), out.normals.resize(static_cast<Index>(facets.size()), 3);
   for (std::size_t i = 0; i < facets.size(); ++i)
     out.points_m.row(static_cast<Index>(i)) = facets[i].middle.transpose(), out.normals.row(static_cast<Index>(i)) = facets[i].normal.transpose();
-  return out;
-}
-
-/// How a flank goes on below a facet: its normal changes as it did above.
-struct Flank {
-  Vec3 normal = Vec3::Zero(), change_per_m = Vec3::Zero();
-  Vec3 normal_at(double below_m) const { return (normal + below_m * change_per_m).normalized(); }
-};
-
-Flank flank_at(const Facet& from, const Vec3& up, const Grid& facets, double reach_m) {
-  const Vec3 down = (up.dot(from.normal) * from.normal - up).normalized();
-  double w = 0, ws = 0, wss = 0;
-  Vec3 n = Vec3::Zero(), ns = Vec3::Zero();
-  facets.around(from.middle, 1, [&](Index i) {
-    const Vec3 d = facets.point(i) - from.middle;
-    const double r2 = d.squaredNorm() / (reach_m * reach_m);
-    if (r2 > 1 || facets.normal(i).dot(from.normal) < 0.3) return;
-    const double weight = (1 - r2) * (1 - r2), below = d.dot(down);
-    w += weight, ws += weight * below, wss += weight * below * below;
-    n += weight * facets.normal(i), ns += weight * below * facets.normal(i);
-  });
-  // A straight line through the normals; few of them, or all at one height, carry no change.
-  const double spread = wss - ws * ws / w + 0.002 * w * reach_m * reach_m;
-  Flank out;
-  out.change_per_m = (ns - ws / w * n) / spread;
-  out.normal = n / w - ws / w * out.change_per_m;
   return out;
 }
 
@@ -83,8 +59,8 @@ std::vector<Facet> skirts(const std::vector<Facet>& seen, const Plane& plane, do
   for (const Facet& from : seen) {
     if (height(from.middle) > height_m) continue;
     if (std::abs(plane.normal.dot(from.normal)) > steepest_normal) continue;
-    const Flank flank = flank_at(from, plane.normal, grid, smooth_cells * cell_m);
-    Vec3 at = from.middle;
+    const Flank flank = flank_below(from, plane.normal, grid, cell_m, smooth_cells);
+    Vec3 at = flank.at_m;
     for (double gone_m = step_cells * cell_m;; gone_m += step_cells * cell_m) {
       const Vec3 halfway = flank.normal_at(gone_m - 0.5 * step_cells * cell_m), normal = flank.normal_at(gone_m);
       const double along = plane.normal.dot(halfway);

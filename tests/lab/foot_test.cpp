@@ -75,7 +75,7 @@ TEST_P(BuiltFoot, IsWhereTheTrueOneIs) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Objects, BuiltFoot, testing::Values(Bars{"ball", 0.12, 0.0015}, Bars{"cube", 0.06, 0.0025}, Bars{"bear", 0.25, 0.006}),
+INSTANTIATE_TEST_SUITE_P(Objects, BuiltFoot, testing::Values(Bars{"ball", 0.12, 0.0015}, Bars{"cube", 0.06, 0.002}, Bars{"bear", 0.2, 0.004}),
                          [](const auto& bars) { return std::string(bars.param.object); });
 
 }  // namespace
