@@ -15,8 +15,8 @@ struct Flank {
 };
 
 /// The arc that continues what the facets around one show: their middles and normals together, weighed by their distance, say where
-/// the surface lies, how it leans and how it bends, each way along it. How much bending is believed follows from their scatter:
-/// round a cell or two its normals are known to a few hundredths, and a flank may turn by a radian over what is looked at.
+/// the surface lies, how it leans and how it bends each way along it. Bending has a prior, about none, give or take one radian over the
+/// reach; how much it counts follows from the facets' scatter. Of a ball's bending it hides less than a hundredth.
 /// @param up  unit vector, not along the facet's normal
 /// @param reach_cells  how far away a facet still counts
 Flank flank_below(const Facet& from, const Vec3& up, const Grid& facets, double cell_m, double reach_cells);
