@@ -139,12 +139,12 @@ std::optional<Plane> hiding_plane(const Recording& recording) {
 }
 
 /// How far the seen part of a surface that was fused from views is off; 0 for one that was given.
-double seen_std_m(const reconstruction::BuiltObject& built) {
+double seen_std_m(const reconstruction::SeenVertices& surface) {
   double sum = 0;
   int count = 0;
-  for (std::size_t v = 0; v < built.seen.size(); ++v) {
-    if (built.seen[v] == 0) continue;
-    sum += std::pow(built.surface_sigma_m(static_cast<Index>(v)), 2);
+  for (std::size_t v = 0; v < surface.seen.size(); ++v) {
+    if (surface.seen[v] == 0) continue;
+    sum += std::pow(surface.sigma_m(static_cast<Index>(v)), 2);
     ++count;
   }
   return count > 0 ? std::sqrt(sum / count) : 0;
@@ -188,16 +188,21 @@ void fill_with_tetrahedra(Recording& recording, reconstruction::Completion compl
   if (!recording.rest.surface && recording.rest.views.empty()) {
     throw Error("give the object's shape as rest.volume_mesh, rest.surface_mesh or rest.views", "rest");
   }
-  const reconstruction::BuildOptions options = fill_options(recording);
+  reconstruction::BuildOptions options = fill_options(recording);
+  options.fine_surface = true;
   auto built = recording.rest.surface
                    ? build_from_surface(recording, options, progress)
                    : build_from_views(recording, options, completion, progress);
-  if (recording.rest.surface_std_m == 0) recording.rest.surface_std_m = std::hypot(seen_std_m(built), built.slow_error_m);
-  if (seen != nullptr) *seen = built.seen;
+  // Sensors see what was fused, and not the flat faces of the tetrahedra that fill it: of a bear they were 1.5 mm off. Where
+  // the object was seen from all around they are finer, and what they are off by is in slow_error_m.
+  const bool fine = !built.around && built.fine_surface.triangles.rows() > 0;
+  const reconstruction::SeenVertices& of_surface = fine ? built.of_fine_surface : built.of_surface;
+  if (recording.rest.surface_std_m == 0) recording.rest.surface_std_m = std::hypot(seen_std_m(of_surface), built.slow_error_m);
+  if (seen != nullptr) *seen = of_surface.seen;
   if (strip_m != nullptr) *strip_m = built.strip_m;
   for (const auto& warning : built.model.warnings) recording.warnings.push_back(warning);
   recording.supports = std::move(built.model.supports);
-  recording.rest.surface = std::move(built.model.surface);
+  recording.rest.surface = std::move(fine ? built.fine_surface : built.model.surface);
   recording.rest.volume = std::move(built.model.volume);
   recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
 }
@@ -393,7 +398,7 @@ double drop_unseen_side(const Recording& built, const std::vector<char>& seen, e
   if (seen.empty()) return 0;
   const double unseen = estimation::unseen_share(*built.rest.surface, seen, hiding_plane(built));
   if (unseen <= most_unseen) return 0;
-  estimation::drop_unseen(*built.rest.surface, seen, observed);
+  estimation::drop_unseen(*built.rest.surface, seen, hiding_plane(built), observed);
   return unseen;
 }
 
@@ -420,14 +425,49 @@ estimation::FillAnew fill_anew(const Recording& given, const Recording& built) {
   };
 }
 
+namespace {
+
+/// What a view of it did not show, of an object as build_simulated_object left it.
+std::optional<estimation::UnseenSide> unseen_side(const Recording& given, const Recording& built, const std::vector<char>& seen) {
+  const TriMesh& surface = *built.rest.surface;
+  estimation::UnseenSide side;
+  side.seen.vertices_m = surface.vertices_m;
+  std::vector<Index> kept;
+  for (Index t = 0; t < surface.triangles.rows(); ++t) {
+    const auto shown = [&](int k) { return seen[static_cast<std::size_t>(surface.triangles(t, k))] != 0; };
+    if (shown(0) || shown(1) || shown(2)) kept.push_back(t);
+  }
+  side.seen.triangles = surface.triangles(kept, Eigen::all);
+  if (const auto plane = hiding_plane(built)) side.up = plane->normal;
+  const Vec3 middle = surface.vertices_m.colwise().mean().transpose();
+  Vec3 toward = Vec3::Zero();
+  for (const DepthFrame& view : sensing::images_at_rest(given)) toward += (view.T_base_camera.translation() - middle).normalized();
+  toward -= toward.dot(side.up) * side.up;
+  side.toward = toward.norm() > 1e-6 ? Vec3(toward.normalized()) : Vec3(side.up.unitOrthogonal());
+  for (const auto& touch : touched_places(given)) side.touched_m.push_back(touch.point_m);
+  if (kept.empty()) return std::nullopt;
+  return side;
+}
+
+}  // namespace
+
 estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share) {
   estimation::ShapeDoubt doubt;
   doubt.unseen_share = unseen_share;
-  for (const auto completion : {reconstruction::Completion::tapered, reconstruction::Completion::planar, reconstruction::Completion::hidden}) {
+  const std::pair<reconstruction::Completion, double> others[] = {
+      {reconstruction::Completion::planar, 1}, {reconstruction::Completion::tapered, 0.3}, {reconstruction::Completion::hidden, 0.1}};
+  for (const auto& [completion, likelihood] : others) {
     Recording recording = given;
     try {
-      auto object = build_simulated_object(recording, {}, completion);
-      doubt.shapes.push_back({std::move(recording), std::move(object), completion == reconstruction::Completion::planar});
+      std::vector<char> seen;
+      auto object = build_simulated_object(recording, {}, completion, &seen);
+      auto side = unseen_side(given, recording, seen);
+      const bool known = std::any_of(doubt.shapes.begin(), doubt.shapes.end(), [&](const auto& other) {
+        return other.recording.rest.surface->vertices_m.rows() == recording.rest.surface->vertices_m.rows() &&
+               other.recording.rest.surface->vertices_m == recording.rest.surface->vertices_m;
+      });
+      if (known) continue;
+      doubt.shapes.push_back({std::move(recording), std::move(object), completion == reconstruction::Completion::planar, likelihood, std::move(side)});
     } catch (const Error&) {  // such a shape falls apart or encloses nothing: it is none that may stand there
     }
   }
@@ -458,6 +498,7 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
     object = build_simulated_object(recording, progress, completion, &seen, &strip_m);  // sec. IV-C: tetrahedral model
     const double unseen = drop_unseen_side(recording, seen, observed);
     if (unseen > 0 && options.method != "paper" && !doubt) doubt = other_shapes(as_given, unseen);
+    if (unseen > 0 && doubt) doubt->side = unseen_side(as_given, recording, seen);
     const auto foot = foot_doubt(recording, strip_m);
     if (foot && options.method != "paper" && !doubt) doubt.emplace().foot = foot;
     out.answer = options.method == "paper"  // sec. VI: error function and its minimum

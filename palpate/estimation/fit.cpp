@@ -284,6 +284,14 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   std::unique_ptr<MeshCorrection> correction;
   std::optional<AnswerShift> mesh;
   int load_cases_of_meshes = 0;
+  // No mesh need be finer than what else is known of E.
+  const auto young_stds_known = [&] {
+    std::vector<double> out = young_stds(covariance, moving, unknowns.ratio_count());
+    if (doubt == nullptr || !doubt->effect) return out;
+    for (std::size_t r = 0; r < out.size(); ++r)
+      for (const AnswerShift& shift : doubt->effect->shifts) out[r] = std::hypot(out[r], shift.of_region(static_cast<Index>(r)).log_young);
+    return out;
+  };
   while (finer != nullptr && optimum.termination == Termination::converged) {
     const auto shown_by = [&](const FinerModel& by, std::shared_ptr<ForwardModel::Solved>* solved) {
       auto shift = mesh_shift(meshed ? meshed->recording : recording, meshed ? meshed->object : object, objective, optimum, loss,
@@ -294,7 +302,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     mesh = shown_by(*finer, memory != nullptr ? &memory->finer : nullptr);
     if (!mesh || !options.take_finer) break;
     const FinerMesh* better =
-        options.take_finer({*mesh, young_stds(covariance, moving, unknowns.ratio_count()),
+        options.take_finer({*mesh, young_stds_known(),
                             [&](const FinerModel& by) { return shown_by(by, nullptr); }});
     if (better == nullptr) break;
     bool corrected = MeshCorrection::applies_to(model);
@@ -346,7 +354,11 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
       move(regions[r], mesh->of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
     widen_by("mesh", {mesh->times(mesh_left_over)});
   }
-  if (doubt != nullptr && doubt->effect) widen_by("unseen side", {doubt->effect->shift});
+  if (doubt != nullptr && doubt->effect) {
+    for (std::size_t r = 0; r < regions.size(); ++r)
+      move(regions[r], doubt->effect->move.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
+    widen_by("unseen side", doubt->effect->shifts);
+  }
   if (doubt != nullptr && doubt->foot && doubt->foot->effect) widen_by("foot", *doubt->foot->effect);
   const auto region_name = [&](std::size_t r) {
     return object.region_names.empty() ? std::string() : object.region_names[r];

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/estimation/shape_error.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <string>
 
@@ -11,10 +13,11 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr double deviations = 1.5;     // that the farthest alternative lies away: errors of 18 labs were 0.6 of its change, rms
 constexpr Index rays_a_frame = 1500;   // the same few for every shape: only how the answers differ counts
 constexpr double strange_pull = 3;     // of what a push's instruments are off by
-constexpr double clearly_better = 10;  // in half of chi-square
+constexpr double worse = 0.1;          // of chi-square: such a shape is ruled out
+constexpr double clearly_better = 10;  // in half of chi-square, ...
+constexpr double clearly_better_share = 0.03;  // ... and as a share of it: what no shape accounts for is some per cent itself
 
 Inputs thinned(const Inputs& all, double& share) {
   Inputs few = all;
@@ -37,38 +40,82 @@ Inputs thinned(const Inputs& all, double& share) {
 }
 
 struct Answer {
-  VectorX parameters;  ///< log E of the first region, nu, log E of the others over the first
+  VectorX fitted;      ///< to the shape as it was put there: log E of the first region, nu, log E of the others over the first
+  VectorX parameters;  ///< where its unseen side leans as the pushes have it
+  MatrixX widening;    ///< of their covariance, by how far that is not known
   double cost = 0;
   bool strange = false;  ///< wants an instrument to be off by more than it is
 };
+
+/// @param change  of the parameters
+AnswerShift shift_of(const VectorX& change) {
+  AnswerShift out;
+  out.log_young = change(log_young);
+  out.poisson = change(poisson);
+  out.region_log_young = change.tail(change.size() - first_ratio).array() + change(log_young);
+  return out;
+}
 
 bool about_instruments(const std::string& name) {
   return name.starts_with("travel_zero") || name.starts_with("travel_offset") || name.starts_with("force_tare") || name.starts_with("force_scale");
 }
 
-std::optional<Answer> answer_of(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const Objective& objective, const Optimum& optimum,
-                                 const Loss& loss, const FitOptions& options, const OptimiseOptions& optimiser,
-                                 const OnProgress& progress) {
-  Unknowns unknowns;
-  ForwardModel model(recording, object, unknowns, statics_options(recording, object, options));
-  Objective other(model, inputs, unknowns);
-  const Unknowns& known = objective.unknowns();
-  for (int k : {log_young, poisson}) unknowns[k] = known[k];
-  // the rest surface's error has modes of its own on each shape
-  std::map<std::string, int> place;
-  for (int k = 0; k < known.size(); ++k)
-    if (known[k].name.rfind("rest_surface[", 0) != 0) place[known[k].name] = k;
-  VectorX start = unknowns.prior_mean();
-  for (int k = 0; k < unknowns.size(); ++k)
-    if (const auto it = place.find(unknowns[k].name); it != place.end()) start(k) = optimum.unknowns(it->second);
+/// A fit of one shape to few of the rays, and what leaning its unseen side does to it. A lean changes what it does itself (a thin
+/// back gives way by the cube of its thickness): it is looked for again where the first step led.
+std::optional<Answer> answer_of(const Recording& recording, SimulatedObject object, const std::optional<UnseenSide>& side,
+                                const Inputs& inputs, const Objective& objective, const Optimum& optimum, const Loss& loss,
+                                const FitOptions& options, const OptimiseOptions& optimiser, double most_cost, const OnProgress& progress) {
+  constexpr int most_rounds = 2;
+  constexpr double settled = 0.3;  // standard deviations of a mode
   OptimiseOptions quiet = optimiser;
   quiet.on_accepted = {};
-  const Optimum found = optimise(other, start, loss, quiet, progress);
-  if (found.termination != Termination::converged || !found.evaluation.usable) return std::nullopt;
-  Answer answer{found.unknowns.head(unknowns.parameter_count()), found.evaluation.cost};
-  for (int k = 0; k < unknowns.size(); ++k)
-    answer.strange = answer.strange || (about_instruments(unknowns[k].name) &&
-                                        std::abs(found.unknowns(k) - unknowns[k].prior_mean) > strange_pull * unknowns[k].prior_std);
+  const Unknowns& known = objective.unknowns();
+  const TetMesh as_put = object.mesh;
+  std::optional<Answer> answer;
+  VectorX amounts = VectorX::Zero(unseen_mode_count), last;
+  for (int round = 0; round < most_rounds; ++round) {
+    Unknowns unknowns;
+    if (round > 0) object.mesh = with_unseen_moved(as_put, *side, amounts);
+    ForwardModel model(recording, object, unknowns, statics_options(recording, object, options));
+    Objective other(model, inputs, unknowns);
+    for (int k : {log_young, poisson}) unknowns[k] = known[k];
+    // the rest surface's error has modes of its own on each shape
+    std::map<std::string, int> place;
+    for (int k = 0; k < known.size(); ++k)
+      if (known[k].name.rfind("rest_surface[", 0) != 0) place[known[k].name] = k;
+    VectorX start = unknowns.prior_mean();
+    for (int k = 0; k < unknowns.size(); ++k)
+      if (const auto it = place.find(unknowns[k].name); it != place.end()) start(k) = optimum.unknowns(it->second);
+    if (last.size() == start.size()) start = last;
+    Optimum found = optimise(other, start, loss, quiet, progress);
+    if (found.termination != Termination::converged || !found.evaluation.usable) return answer;
+    VectorX at = found.unknowns;
+    double cost = found.evaluation.cost + 0.5 * amounts.squaredNorm();  // a shape that leans is less likely
+    MatrixX widening = MatrixX::Zero(unknowns.parameter_count(), unknowns.parameter_count());
+    bool moves = false;
+    if (side) {
+      other.set_reuse(0);
+      found.evaluation = other.evaluate(found.unknowns, loss);
+      if (const auto modes = unseen_modes(*side, amounts, recording, object, other, found, loss, tukey_information_factor(loss.tukey), options)) {
+        at += modes->change;
+        cost -= modes->gain;
+        widening = modes->widening;
+        moves = (modes->amounts - amounts).cwiseAbs().maxCoeff() > settled;
+        amounts = modes->amounts;
+      }
+    }
+    if (!answer) answer.emplace().fitted = found.unknowns.head(unknowns.parameter_count());
+    answer->parameters = at.head(unknowns.parameter_count());
+    answer->parameters(poisson) = std::clamp(answer->parameters(poisson), unknowns[poisson].lower, unknowns[poisson].upper);
+    answer->widening = widening;
+    answer->cost = cost;
+    answer->strange = false;
+    for (int k = 0; k < unknowns.size(); ++k)
+      answer->strange = answer->strange || (about_instruments(unknowns[k].name) &&
+                                            std::abs(at(k) - unknowns[k].prior_mean) > strange_pull * unknowns[k].prior_std);
+    last = found.unknowns;
+    if (!moves || answer->strange || answer->cost > most_cost) break;
+  }
   return answer;
 }
 
@@ -83,43 +130,56 @@ std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording
   weighed.rays.clear();
   weighed.surface_weight = std::min(1.0, loss.surface_weight / share / (loss.noise ? loss.noise->of_wide : 1));
   weighed.noise = nullptr;
-  const auto fitted = answer_of(recording, objective.model().object(), few, objective, optimum, weighed, options, optimiser, progress);
+  const auto fitted = answer_of(recording, objective.model().object(), doubt.side, few, objective, optimum, weighed, options, optimiser, std::numeric_limits<double>::infinity(), progress);
   if (!fitted) return std::nullopt;
   std::vector<std::optional<Answer>> alternatives(doubt.shapes.size());
   for (std::size_t s = 0; s < doubt.shapes.size(); ++s) {
     if (progress && !progress("unseen side", static_cast<double>(s) / static_cast<double>(doubt.shapes.size()))) return std::nullopt;
     try {
-      alternatives[s] = answer_of(doubt.shapes[s].recording, doubt.shapes[s].object, few, objective, optimum, weighed, options, optimiser, {});
+      alternatives[s] = answer_of(doubt.shapes[s].recording, doubt.shapes[s].object, doubt.shapes[s].side, few, objective, optimum, weighed, options, optimiser, (1 + worse) * fitted->cost, {});
     } catch (const Error&) {  // it is not held, or a tool does not reach it: no such shape was pushed
     }
   }
-  Answer best = *fitted;
+  if (std::none_of(alternatives.begin(), alternatives.end(), [](const auto& there) { return there.has_value(); })) return std::nullopt;
+
+  // Of shapes that were as likely beforehand the pushes may say which one it is.
   std::optional<std::size_t> better;
+  const Answer* best = &*fitted;
   for (std::size_t s = 0; s < alternatives.size(); ++s) {
     if (!doubt.shapes[s].as_likely || !alternatives[s] || alternatives[s]->strange) continue;
-    if (alternatives[s]->cost < best.cost - clearly_better) best = *alternatives[s], better = s;
+    const double clearly = std::max(clearly_better, clearly_better_share * best->cost);
+    if (alternatives[s]->cost < best->cost - clearly) best = &*alternatives[s], better = s;
   }
-  const VectorX here = best.parameters;
-  std::optional<ShapeEffect> out;
-  double softest = here(log_young), stiffest = softest;
-  VectorX most = VectorX::Zero(here.size());
-  if (better) alternatives.push_back(fitted);
-  for (const auto& there : alternatives) {
-    if (!there) continue;
-    if (!out) out.emplace();
-    if (there->strange && !best.strange) continue;
-    const VectorX moved = there->parameters - here;
-    softest = std::min(softest, there->parameters(log_young)), stiffest = std::max(stiffest, there->parameters(log_young));
-    if (std::abs(moved(log_young)) > std::abs(most(log_young))) most = moved;
+  // The others stay, as far as they agree with what was measured: a mean over models, each with what it does not know itself.
+  std::vector<std::pair<const Answer*, double>> shapes;
+  const auto consider = [&](const Answer& shape, double likely) {
+    const double worse_by = (shape.cost - best->cost) / best->cost;
+    if (&shape != best && ((shape.strange && !best->strange) || worse_by > worse)) return;
+    shapes.emplace_back(&shape, likely * std::min(1.0, std::exp(-worse_by / clearly_better_share)));
+  };
+  consider(*fitted, 1);
+  for (std::size_t s = 0; s < alternatives.size(); ++s)
+    if (alternatives[s]) consider(*alternatives[s], doubt.shapes[s].likelihood);
+  double all = 0;
+  VectorX mean = VectorX::Zero(best->parameters.size());
+  for (const auto& [shape, weight] : shapes) all += weight, mean += weight * shape->parameters;
+  mean /= all;
+  MatrixX spread = MatrixX::Zero(mean.size(), mean.size());
+  ShapeEffect out;
+  out.better = better;
+  out.softest_pa = std::numeric_limits<double>::infinity();
+  for (const auto& [shape, weight] : shapes) {
+    const VectorX off = shape->parameters - mean;
+    spread += weight / all * (shape->widening + off * off.transpose());
+    out.softest_pa = std::min(out.softest_pa, std::exp(shape->parameters(log_young)));
+    out.stiffest_pa = std::max(out.stiffest_pa, std::exp(shape->parameters(log_young)));
   }
-  if (!out) return out;
-  out->better = better;
-  most /= deviations;
-  out->shift.log_young = most(log_young);
-  out->shift.poisson = most(poisson);
-  out->shift.region_log_young = most.tail(most.size() - first_ratio).array() + most(log_young);
-  out->softest_pa = std::exp(softest);
-  out->stiffest_pa = std::exp(stiffest);
+  out.move = shift_of(mean - best->fitted);
+  const Eigen::SelfAdjointEigenSolver<MatrixX> parts(spread);
+  for (Index k = 0; k < mean.size(); ++k) {
+    const double variance = parts.eigenvalues()(k);
+    if (variance > 0) out.shifts.push_back(shift_of(std::sqrt(variance) * parts.eigenvectors().col(k)));
+  }
   return out;
 }
 

@@ -27,9 +27,28 @@ double unseen_share(const TriMesh& surface, const std::vector<char>& seen, const
   return all > 0 ? unseen / all : 0;
 }
 
-void drop_unseen(const TriMesh& surface, const std::vector<char>& seen, Inputs& inputs) {
-  const geometry::TriangleTree tree(surface);
+void drop_unseen(const TriMesh& surface, const std::vector<char>& seen, const std::optional<Plane>& plane, Inputs& inputs) {
+  // What was seen and what is guessed meet in a rim that is neither: rays within some facets of it have been 0.9 deviations off.
+  constexpr double edges_of_rim = 3;
+  const double size_m = (surface.vertices_m.colwise().maxCoeff() - surface.vertices_m.colwise().minCoeff()).norm();
+  TriMesh guessed{surface.vertices_m, {}};
+  std::vector<Index> unseen;
+  double edge_m = 0;
+  for (Index t = 0; t < surface.triangles.rows(); ++t) {
+    bool was_seen = false, on_plane = plane.has_value();
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 a = surface.vertices_m.row(surface.triangles(t, k)), b = surface.vertices_m.row(surface.triangles(t, (k + 1) % 3));
+      edge_m += (b - a).norm() / static_cast<double>(3 * surface.triangles.rows());
+      was_seen = was_seen || seen[static_cast<std::size_t>(surface.triangles(t, k))] != 0;
+      on_plane = on_plane && std::abs(plane->normal.dot(a - plane->point_m)) < 0.01 * size_m;
+    }
+    if (!was_seen && !on_plane) unseen.push_back(t);
+  }
+  if (unseen.empty()) return;
+  guessed.triangles = surface.triangles(unseen, Eigen::all);
+  const geometry::TriangleTree tree(surface), rim(guessed);
   const auto shown = [&](const Vec3& point_m) {
+    if (rim.within(point_m, std::pow(edges_of_rim * edge_m, 2))) return false;
     const auto row = surface.triangles.row(tree.closest(point_m).triangle);
     return seen[static_cast<std::size_t>(row(0))] != 0 || seen[static_cast<std::size_t>(row(1))] != 0 ||
            seen[static_cast<std::size_t>(row(2))] != 0;

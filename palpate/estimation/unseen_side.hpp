@@ -14,7 +14,8 @@ namespace palpate::estimation {
 /// @param seen  a vertex: 1 where a view showed it
 double unseen_share(const TriMesh& surface, const std::vector<char>& seen, const std::optional<Plane>& plane);
 
-/// Takes out the rays that show what no view of the object at rest showed: a guess is nothing to compare with.
-void drop_unseen(const TriMesh& surface, const std::vector<char>& seen, Inputs& inputs);
+/// Takes out the rays that show what no view of the object at rest showed: a guess is nothing to compare with. Neither is the rim
+/// between the two.
+void drop_unseen(const TriMesh& surface, const std::vector<char>& seen, const std::optional<Plane>& plane, Inputs& inputs);
 
 }  // namespace palpate::estimation

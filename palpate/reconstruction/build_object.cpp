@@ -113,20 +113,18 @@ double drop_floating(const std::vector<Support>& supports, TetMesh& volume) {
   return 1 - left / all;
 }
 
-void hand_on_uncertainty(BuiltObject& out, const FusedViews& fused) {
-  TriMesh seen = fused.facets;
-  seen.triangles.conservativeResize(fused.seen, 3);
-  const geometry::TriangleTree to_seen(seen);
-  const Points& v = out.model.surface.vertices_m;
-  out.surface_sigma_m.resize(v.rows());
-  out.seen.resize(static_cast<std::size_t>(v.rows()));
-  for (Index i = 0; i < v.rows(); ++i) {
-    const auto c = to_seen.closest(v.row(i).transpose());
+SeenVertices seen_vertices(const Points& vertices_m, const FusedViews& fused, const geometry::TriangleTree& to_seen) {
+  SeenVertices out;
+  out.sigma_m.resize(vertices_m.rows());
+  out.seen.resize(static_cast<std::size_t>(vertices_m.rows()));
+  for (Index i = 0; i < vertices_m.rows(); ++i) {
+    const auto c = to_seen.closest(vertices_m.row(i).transpose());
     const double far = std::sqrt(c.squared_distance_m2);
     // facets lie loosely beside each other: within a cell of one the surface was seen
     out.seen[static_cast<std::size_t>(i)] = far < fused.cell_m;
-    out.surface_sigma_m[i] = std::hypot(fused.sigma_m[c.triangle], far < fused.cell_m ? 0 : 0.5 * far);
+    out.sigma_m[i] = std::hypot(fused.sigma_m[c.triangle], far < fused.cell_m ? 0 : 0.5 * far);
   }
+  return out;
 }
 
 /// Of the surface's area, where no corner of a triangle was seen.
@@ -136,7 +134,7 @@ double unseen_share(const BuiltObject& object) {
   for (Index t = 0; t < surface.triangles.rows(); ++t) {
     const double area = area_of(surface, t).norm();
     all += area;
-    const auto was_seen = [&](int k) { return object.seen[static_cast<std::size_t>(surface.triangles(t, k))] != 0; };
+    const auto was_seen = [&](int k) { return object.of_surface.seen[static_cast<std::size_t>(surface.triangles(t, k))] != 0; };
     if (!was_seen(0) && !was_seen(1) && !was_seen(2)) unseen += area;
   }
   return all > 0 ? unseen / all : 0;
@@ -263,7 +261,10 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
   out.around = fused.around;
   out.strip_m = fused.strip_m;
-  hand_on_uncertainty(out, fused);
+  TriMesh seen = fused.facets;
+  seen.triangles.conservativeResize(fused.seen, 3);
+  const geometry::TriangleTree to_seen(seen);
+  out.of_surface = seen_vertices(out.model.surface.vertices_m, fused, to_seen);
   if (fused.inside) out.slow_error_m = std::hypot(by_poses_m, faces_off_m(skin, out.model.surface));
   if (options.fine_surface) {
     const geometry::TriangleTree boundary(out.model.surface);
@@ -271,6 +272,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
       fine.belongs = [&](const Vec3& p) { return boundary.within(p, std::pow(2 * fused.cell_m, 2)); };
     out.fine_surface = fused.inside && floating == 0 ? std::move(skin) : fused_surface(fused, fine);
     out.fine_embedding = geometry::embed(out.fine_surface.vertices_m, out.model.volume);
+    out.of_fine_surface = seen_vertices(out.fine_surface.vertices_m, fused, to_seen);
   }
   out.view_correction = std::move(correction);
   if (fused.inside) {

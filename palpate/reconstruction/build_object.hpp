@@ -17,26 +17,31 @@ struct BuildOptions {
   std::vector<Plane> pressed_faces = {};
 };
 
+/// What sensors saw of a surface's vertices.
+struct SeenVertices {
+  std::vector<char> seen;  ///< 1 where a sensor saw it
+  /// How far the surface may be off along its normal, one standard deviation. Where nothing was seen: half of the distance to the
+  /// nearest part that was, for the completion may be anywhere up to there.
+  VectorX sigma_m;
+};
+
 struct BuiltObject {
   ObjectModel model;
   geometry::VolumeCheck check;         ///< of model.volume
   std::optional<double> volume_error;  ///< as in geometry::Tetrahedralisation; empty for a given volume
   double surface_rms_m = 0;            ///< between given surface and boundary of the volume
   double hausdorff_m = 0;
-  /// How far the surface may be off along its normal, one standard deviation a vertex of model.surface; empty where the
-  /// surface was given. Where nothing was seen: half of the distance to the nearest part that was, for the completion may be
-  /// anywhere up to there.
-  VectorX surface_sigma_m;
+  SeenVertices of_surface;  ///< of model.surface; empty where it was given
   /// Watertight, finer than the boundary of the volume and nearer to what was seen (see fused_surface), and how the volume
   /// carries it along.
   TriMesh fine_surface;
   SurfaceEmbedding fine_embedding;
+  SeenVertices of_fine_surface;
   /// What neighbouring places of the seen part are off by together, one standard deviation: what the views' poses leave once they
   /// were corrected by each other, and what flat faces of the volume are off the fused surface. Of views from all around; else 0.
   double slow_error_m = 0;
   double strip_m = 0;      ///< of views from all around: FusedViews::strip_m
   bool around = false;     ///< of views: the object was seen from all sides, down to its support (FusedViews::around)
-  std::vector<char> seen;  ///< a vertex of model.surface: 1 where a sensor saw it; empty where it was given
   std::vector<Pose>
       view_correction;  ///< applied to each view on the left before fusing; empty when poses were taken as known
 };

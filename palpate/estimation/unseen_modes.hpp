@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The part of an object that no view showed, as something to be estimated: how far it leans away from where it was put, with a prior.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/optimise.hpp"
+
+namespace palpate::estimation {
+
+struct UnseenSide {
+  TriMesh seen;                   ///< triangles of the surface at rest that a view showed
+  Vec3 toward = Vec3::UnitX();    ///< along the support, to where the object was seen from
+  Vec3 up = Vec3::UnitZ();        ///< out of the support
+  std::vector<Vec3> touched_m;    ///< where tools met it: the surface is known there as well
+};
+
+/// What the unseen part may do: each moves it along the support in proportion to the distance from the nearest place that was seen
+/// or touched,
+/// so that the seen part stays and what stands on the support stays on it.
+inline constexpr int unseen_mode_count = 6;
+
+/// One standard deviation of each: metres of motion a metre of that distance. Completions of 12 bears, with the true shape beside
+/// them, were off by 0.03 to 0.25 in one mode or the other (docs/uncertainty.md).
+inline constexpr double unseen_lean_std = 0.25;
+
+/// @param amounts  of each mode, in standard deviations; halved until no element turns inside out, and handed back like that
+TetMesh with_unseen_moved(const TetMesh& mesh, const UnseenSide& side, VectorX& amounts);
+
+/// What the modes do to an optimum: one step of Gauss and Newton with them among the unknowns.
+struct UnseenModes {
+  VectorX change;      ///< of all unknowns of the objective
+  VectorX amounts;     ///< of the modes at the end of that step, in standard deviations
+  MatrixX widening;    ///< what the modes add to the covariance of the parameters (log E of the first region, nu, ratios)
+  double gain = 0;     ///< by which the cost falls
+};
+
+/// Changes of the surface are those of small strains at the optimum's nu. The objective's last evaluation must be the optimum's,
+/// every step's.
+/// @param amounts  of the modes, that `object` was moved by: their prior is about zero
+/// @param factor   as in Evaluation::information
+/// @returns nothing where a moved body cannot be solved for
+std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& amounts, const Recording& recording, const SimulatedObject& object,
+                                        const Objective& objective, const Optimum& optimum, const Loss& loss, double factor,
+                                        const FitOptions& options);
+
+}  // namespace palpate::estimation

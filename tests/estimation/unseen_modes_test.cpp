@@ -1,0 +1,161 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// A block held at one end and seen from above, whose underside is not where it was put: what was seen stays, what was not may lean
+// away, E moves to where the pushes have it, and the interval holds what they do not say.
+#include "palpate/estimation/unseen_modes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/estimation/shape_error.hpp"
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+constexpr double true_pa = 2e4;
+
+SimulatedObject block_from(double underside_m) {
+  TetMesh mesh = kuhn_block(6, 3, 2, block_size_m);
+  const double depth = 1 - underside_m / block_size_m.z();
+  mesh.nodes_m.col(2) = (underside_m + depth * mesh.nodes_m.col(2).array()).matrix();
+  return simulated(fem::to_quadratic(mesh), "linear");
+}
+
+/// Held at x = 0, seen from above.
+UnseenSide underside(const SimulatedObject& block) {
+  UnseenSide side;
+  side.up = Vec3::UnitX();
+  side.toward = Vec3::UnitZ();
+  const TriMesh surface = block.surface.rest();
+  side.seen.vertices_m = surface.vertices_m;
+  std::vector<Index> top;
+  for (Index t = 0; t < surface.triangles.rows(); ++t) {
+    bool above = true;
+    for (int k = 0; k < 3; ++k) above = above && surface.vertices_m(surface.triangles(t, k), 2) > 0.999 * block_size_m.z();
+    if (above) top.push_back(t);
+  }
+  side.seen.triangles = surface.triangles(top, Eigen::all);
+  return side;
+}
+
+struct Seen {
+  Recording recording = pushed_block_recording();
+  Inputs inputs;
+};
+
+Seen seen_from_above(double sigma_m) {
+  Seen out;
+  out.recording.model.poisson_fixed = 0.3;
+  PushedBlock truth;
+  truth.material = "linear";
+  truth.points = 4000;
+  truth.sigma_m = sigma_m;
+  out.inputs = clouds_of(truth, out.recording);
+  for (auto& step : out.inputs) {
+    auto& cloud = std::get<PointCloud>(step[0]);
+    Index kept = 0;
+    for (Index i = 0; i < cloud.points_m.rows(); ++i)
+      if (cloud.points_m(i, 2) > 0.8 * block_size_m.z()) cloud.points_m.row(kept++) = cloud.points_m.row(i).eval();
+    cloud.points_m.conservativeResize(kept, 3);
+  }
+  return out;
+}
+
+FitOptions quick() {
+  FitOptions options;
+  options.cross_checks = options.stresses = false;
+  return options;
+}
+
+/// Beside the block as it is, a shape that changes nothing: what is in the interval is of the leans alone.
+ShapeDoubt doubt_of(const Recording& recording, const SimulatedObject& block) {
+  ShapeDoubt doubt;
+  doubt.unseen_share = 0.5;
+  doubt.side = underside(block);
+  doubt.shapes.push_back({recording, block, false, 1, doubt.side});
+  return doubt;
+}
+
+TEST(UnseenModes, LeaveWhatWasSeenAndStayAlongTheSupport) {
+  const SimulatedObject block = block_from(0);
+  const UnseenSide side = underside(block);
+  for (int m = 0; m < unseen_mode_count; ++m) {
+    VectorX amounts = VectorX::Unit(unseen_mode_count, m);
+    const Points motion = with_unseen_moved(block.mesh, side, amounts).nodes_m - block.mesh.nodes_m;
+    EXPECT_EQ(amounts, VectorX(VectorX::Unit(unseen_mode_count, m)));
+    double most_m = 0;
+    for (Index i = 0; i < motion.rows(); ++i) {
+      const double depth_m = block_size_m.z() - block.mesh.nodes_m(i, 2);
+      EXPECT_LT(std::abs(motion(i, 0)), 1e-15);
+      EXPECT_LT(motion.row(i).norm(), unseen_lean_std * depth_m + 1e-12);
+      most_m = std::max(most_m, motion.row(i).norm());
+    }
+    EXPECT_NEAR(most_m, unseen_lean_std * block_size_m.z(), 1e-12) << m;
+  }
+}
+
+TEST(UnseenModes, ATouchedPlaceIsKnown) {
+  const SimulatedObject block = block_from(0);
+  UnseenSide side = underside(block);
+  side.touched_m = {Vec3(0.5 * block_size_m.x(), 0.5 * block_size_m.y(), 0)};
+  VectorX amounts = VectorX::Unit(unseen_mode_count, 0);
+  const Points motion = with_unseen_moved(block.mesh, side, amounts).nodes_m - block.mesh.nodes_m;
+  for (Index i = 0; i < motion.rows(); ++i)
+    EXPECT_LE(motion.row(i).norm(), unseen_lean_std * (Vec3(block.mesh.nodes_m.row(i)) - side.touched_m[0]).norm() + 1e-12);
+}
+
+TEST(UnseenModes, NoElementTurnsInsideOut) {
+  const SimulatedObject block = block_from(0);
+  VectorX amounts = 5 * VectorX::Unit(unseen_mode_count, 0);
+  amounts(0) = -5;  // the underside above the top
+  const TetMesh moved = with_unseen_moved(block.mesh, underside(block), amounts);
+  EXPECT_GT(amounts(0), -4);
+  EXPECT_LT(amounts(0), 0);
+  for (Index t = 0; t < moved.tetrahedra.rows(); ++t) {
+    const auto node = [&](int k) { return Vec3(moved.nodes_m.row(moved.tetrahedra(t, k))); };
+    EXPECT_GT((node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)), 0);
+  }
+}
+
+TEST(UnseenModes, TheIntervalHoldsTheTruthWhereTheUndersideIsWrong) {
+  const Seen data = seen_from_above(6e-4);
+  for (const double underside_m : {-0.002, 0.002}) {
+    const SimulatedObject block = block_from(underside_m);
+    const auto without = fit(data.recording, block, data.inputs, quick());
+    const auto& certain = parameter(without, "young_modulus");
+    EXPECT_TRUE(certain.upper_95 < true_pa || certain.lower_95 > true_pa);
+    ShapeDoubt doubt = doubt_of(data.recording, block);
+    const auto with = fit(data.recording, block, data.inputs, quick(), {}, nullptr, nullptr, &doubt);
+    const auto& young = parameter(with, "young_modulus");
+    ASSERT_TRUE(doubt.effect);
+    EXPECT_LT(young.lower_95, true_pa);
+    EXPECT_GT(young.upper_95, true_pa);
+  }
+}
+
+TEST(UnseenModes, AMillimetreDoesWhatAFitWithThatMillimetreSays) {
+  const Seen data = seen_from_above(2e-3);
+  const SimulatedObject block = block_from(0);
+  ShapeDoubt doubt = doubt_of(data.recording, block);
+  fit(data.recording, block, data.inputs, quick(), {}, nullptr, nullptr, &doubt);
+  ASSERT_TRUE(doubt.effect);
+  constexpr double little = 0.1;
+  double log_young[2];
+  for (const int sign : {-1, 1}) {
+    SimulatedObject leant = block;
+    VectorX amounts = sign * little * VectorX::Unit(unseen_mode_count, 0);
+    leant.mesh = with_unseen_moved(block.mesh, underside(block), amounts);
+    log_young[sign > 0] = std::log(parameter(fit(data.recording, leant, data.inputs, quick()), "young_modulus").value);
+  }
+  const double per_deviation = (log_young[1] - log_young[0]) / (2 * little);
+  EXPECT_LT(per_deviation, -0.3);  // thicker, so less E will do
+  double leans = 0;
+  for (const AnswerShift& shift : doubt.effect->shifts) leans = std::hypot(leans, shift.log_young);
+  // the pushes say a little of it, and other modes add a little
+  EXPECT_NEAR(leans, std::abs(per_deviation), 0.3 * std::abs(per_deviation));
+}
+
+}  // namespace
+}  // namespace palpate::estimation
