@@ -163,6 +163,7 @@ std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& a
   const Index free = static_cast<Index>(moving.size());
   const auto inverse = [](const MatrixX& m) { return MatrixX(m.ldlt().solve(MatrixX::Identity(m.rows(), m.cols()))); };
   const MatrixX without = inverse(information(moving, moving));
+  const MatrixX effect = -without * information(moving, places);  // of one standard deviation of a mode
   moving.insert(moving.end(), places.begin(), places.end());
   const MatrixX with = inverse(information(moving, moving));
   const VectorX change = -with * gradient(moving);
@@ -178,7 +179,7 @@ std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& a
   for (Index a = 0; a < free; ++a)
     for (Index b = 0; b < free; ++b) {
       const int i = moving[static_cast<std::size_t>(a)], j = moving[static_cast<std::size_t>(b)];
-      if (i < parameters && j < parameters) out.widening(i, j) = with(a, b) - without(a, b);
+      if (i < parameters && j < parameters) out.widening(i, j) = with(a, b) - without(a, b) + std::pow(unseen_rough_share, 2) * effect.row(a).dot(effect.row(b));
     }
   return out;
 }

@@ -22,9 +22,13 @@ struct UnseenSide {
 /// so that the seen part stays and what stands on the support stays on it.
 inline constexpr int unseen_mode_count = 6;
 
-/// One standard deviation of each: metres of motion a metre of that distance. Completions of 12 bears, with the true shape beside
-/// them, were off by 0.03 to 0.25 in one mode or the other (docs/uncertainty.md).
+/// One standard deviation of each: metres of motion a metre of that distance. All six together are 0.4 rms; completions of 12 bears,
+/// 12 cubes and 6 animals and balls each were off by 0.4, 0.2, 0.6 and 0.3 of that distance.
 inline constexpr double unseen_lean_std = 0.25;
+
+/// Of what the modes may do to E and nu before the pushes have said anything, this share stays: most of what those completions were off
+/// by is rougher than six modes, and no push tells of it.
+inline constexpr double unseen_rough_share = 0.5;
 
 /// @param amounts  of each mode, in standard deviations; halved until no element turns inside out, and handed back like that
 TetMesh with_unseen_moved(const TetMesh& mesh, const UnseenSide& side, VectorX& amounts);
@@ -33,7 +37,7 @@ TetMesh with_unseen_moved(const TetMesh& mesh, const UnseenSide& side, VectorX& 
 struct UnseenModes {
   VectorX change;      ///< of all unknowns of the objective
   VectorX amounts;     ///< of the modes at the end of that step, in standard deviations
-  MatrixX widening;    ///< what the modes add to the covariance of the parameters (log E of the first region, nu, ratios)
+  MatrixX widening;    ///< what the unseen side adds to the covariance of the parameters (log E of the first region, nu, ratios)
   double gain = 0;     ///< by which the cost falls
 };
 

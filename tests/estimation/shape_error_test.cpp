@@ -1,7 +1,7 @@
 // label: unit
 // SPDX-License-Identifier: Apache-2.0
 // Two blocks that look alike from above, one thinner than the other: which one was bent is for the pushes to say, what the other would
-// have done to E is in the interval, and a shape that only fits if the tool never travelled was not pushed.
+// have done to E is in the interval as far as it agrees, and a shape that only fits if the tool never travelled was not pushed.
 #include "palpate/estimation/shape_error.hpp"
 
 #include <gtest/gtest.h>
@@ -77,6 +77,12 @@ ShapeDoubt doubt_of(const Seen& seen, double underside_m, bool as_likely) {
   return doubt;
 }
 
+double spread(const ShapeEffect& effect) {
+  double sum = 0;
+  for (const AnswerShift& shift : effect.shifts) sum = std::hypot(sum, shift.log_young);
+  return sum;
+}
+
 TEST(ShapeError, ThePushesChooseBetweenShapesThatWereAsLikely) {
   const Seen data = seen();
   for (const double fitted_m : {0.0, 0.01}) {
@@ -86,16 +92,26 @@ TEST(ShapeError, ThePushesChooseBetweenShapesThatWereAsLikely) {
     EXPECT_EQ(doubt.effect->better.has_value(), fitted_m > 0);
     EXPECT_NEAR(doubt.effect->softest_pa, 2e4, 1e3);  // of the block as it is
     EXPECT_GT(doubt.effect->stiffest_pa, 5e4);        // of the thin one
-    EXPECT_NEAR(doubt.effect->shift.log_young, 2.0 / 3 * std::log(doubt.effect->stiffest_pa / doubt.effect->softest_pa), 0.01);
+    // the mean of two values so far apart, from the one that agrees better, and how far they are from it
+    const double apart = std::log(doubt.effect->stiffest_pa / doubt.effect->softest_pa), moved = doubt.effect->move.log_young;
+    EXPECT_GT(moved, 0);
+    EXPECT_LT(moved, 0.2 * apart);  // chi-square tells
+    EXPECT_NEAR(std::pow(spread(*doubt.effect), 2), moved * (apart - moved), 1e-6);
     if (fitted_m == 0) {
-      EXPECT_GT(parameter(answer, "young_modulus").upper_95, 5e4);
+      EXPECT_LT(parameter(answer, "young_modulus").lower_95, 2e4);
+      EXPECT_GT(parameter(answer, "young_modulus").upper_95, 2e4);
     }
   }
-  ShapeDoubt less_likely = doubt_of(data, 0, false);
-  fit_beside(less_likely, data, 0.01);
-  ASSERT_TRUE(less_likely.effect);
-  EXPECT_FALSE(less_likely.effect->better);
-  EXPECT_LT(less_likely.effect->shift.log_young, -0.4);
+}
+
+TEST(ShapeError, AShapeThatIsLessLikelyBeforehandCountsLess) {
+  const Seen data = seen();
+  ShapeDoubt doubt = doubt_of(data, 0, false);
+  fit_beside(doubt, data, 0.01);
+  ASSERT_TRUE(doubt.effect);
+  EXPECT_FALSE(doubt.effect->better);
+  const double apart = std::log(doubt.effect->softest_pa / doubt.effect->stiffest_pa);
+  EXPECT_NEAR(doubt.effect->move.log_young, 0.3 / 1.3 * apart, 1e-9);
 }
 
 TEST(ShapeError, AShapeThatContradictsTheTravelIsRuledOut) {
@@ -103,13 +119,14 @@ TEST(ShapeError, AShapeThatContradictsTheTravelIsRuledOut) {
   ShapeDoubt doubt = doubt_of(data, 0.01, false);
   fit_beside(doubt, data, 0);
   ASSERT_TRUE(doubt.effect);
-  EXPECT_EQ(doubt.effect->shift.log_young, 0);
+  EXPECT_EQ(doubt.effect->move.log_young, 0);
+  EXPECT_EQ(spread(*doubt.effect), 0);
   EXPECT_EQ(doubt.effect->softest_pa, doubt.effect->stiffest_pa);
   // unless the fitted one does too
-  ShapeDoubt other = doubt_of(data, 0.02, false);
+  ShapeDoubt other = doubt_of(data, 0.0105, false);
   fit_beside(other, data, 0.01);
   ASSERT_TRUE(other.effect);
-  EXPECT_GT(other.effect->shift.log_young, 0.1);
+  EXPECT_GT(other.effect->move.log_young, 0.001);
 }
 
 }  // namespace

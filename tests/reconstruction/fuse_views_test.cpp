@@ -105,8 +105,8 @@ TEST(FuseViews, views_from_poses_that_are_a_little_wrong_close_up) {
   EXPECT_LT(after, 0.0004);
   EXPECT_LT(after, 0.5 * before);
   ASSERT_EQ(aligned.view_correction.size(), 4U);
-  EXPECT_EQ(aligned.surface_sigma_m.size(), aligned.model.surface.vertices_m.rows());
-  EXPECT_LT(aligned.surface_sigma_m.minCoeff(), 0.0005);
+  EXPECT_EQ(aligned.of_surface.sigma_m.size(), aligned.model.surface.vertices_m.rows());
+  EXPECT_LT(aligned.of_surface.sigma_m.minCoeff(), 0.0005);
 }
 
 TEST(FuseViews, one_view_from_above_is_completed_down_to_the_table) {
@@ -128,13 +128,13 @@ TEST(FuseViews, one_view_from_above_is_completed_down_to_the_table) {
   const Points& v = built.model.surface.vertices_m;
   for (Index i = 0; i < v.rows(); ++i) {
     if (v(i, 2) > 0.08) {
-      EXPECT_TRUE(built.seen[i]);
-      EXPECT_LT(built.surface_sigma_m[i], 0.0005);
+      EXPECT_TRUE(built.of_surface.seen[i]);
+      EXPECT_LT(built.of_surface.sigma_m[i], 0.0005);
     }
     if (v(i, 2) < 0.01 && v.row(i).head<2>().norm() > 0.045) {
-      EXPECT_FALSE(built.seen[i]);
-      EXPECT_GT(built.surface_sigma_m[i], 0.01);
-      EXPECT_LT(built.surface_sigma_m[i], 0.04);
+      EXPECT_FALSE(built.of_surface.seen[i]);
+      EXPECT_GT(built.of_surface.sigma_m[i], 0.01);
+      EXPECT_LT(built.of_surface.sigma_m[i], 0.04);
     }
   }
 }
