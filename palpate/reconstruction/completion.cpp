@@ -91,7 +91,7 @@ class Completer {
       out.swap(next), open.swap(still_open);
     }
     if (options_.completion == Completion::mirrored) close_grooves(hidden, open, out);
-    for (const Touch& touch : options_.touched) reach_to(touch, anchored, out);
+    for (const Touch& touch : options_.touched) reach_to(touch, hidden, anchored, out);
     out = cubes_.connected(out, planar);
     std::size_t changed = before - static_cast<std::size_t>(std::count(planar.begin(), planar.end(), 1));
     for (std::size_t k = 0; k < out.size(); ++k) changed += out[k] != planar[k];
@@ -161,7 +161,7 @@ class Completer {
   }
 
   /// Where a tool met the object there is its skin: nothing before it, and all behind it as far as the rest.
-  void reach_to(const Touch& touch, const std::vector<char>& anchored, std::vector<char>& solid) const {
+  void reach_to(const Touch& touch, const std::vector<char>& hidden, const std::vector<char>& anchored, std::vector<char>& solid) const {
     double depth = 0;
     for (double d = 0.5 * cubes_.h; d < behind_m_ && depth == 0; d += 0.5 * cubes_.h) {
       const auto k = cubes_.of(touch.point_m + d * touch.inward);
@@ -172,9 +172,11 @@ class Completer {
       const Vec3 from = cubes_.middle(x, y, z) - touch.point_m;
       const double along = from.dot(touch.inward), aside = (from - along * touch.inward).norm();
       const std::size_t k = cubes_.at(x, y, z);
-      if (aside > touch_margin * touch.radius_m || along > depth || anchored[k]) return;
-      if (along > 0) solid[k] = 1;
-      else if (along > -2 * touch.radius_m) solid[k] = 0;
+      if (along > depth || anchored[k]) return;
+      const double wide = touch_margin * touch.radius_m;
+      // Skins bulge: what reaches out to the tool widens inwards, for a pillar of the tool's width would give way by itself.
+      if (along > 0 && (aside < wide || (aside < wide + along && hidden[k]))) solid[k] = 1;
+      else if (along <= 0 && along > -2 * touch.radius_m && aside < wide) solid[k] = 0;
     });
   }
 

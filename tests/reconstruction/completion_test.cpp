@@ -141,6 +141,8 @@ TEST(Completion, ReachesToWhereAToolMetTheUnseenSide) {
   const geometry::Solid solid(built.model.surface);
   EXPECT_TRUE(solid.inside(seen.fuse.touched[0].point_m + 0.005 * inward));
   EXPECT_FALSE(solid.inside(seen.fuse.touched[0].point_m - 0.008 * inward));
+  // not as a pillar of the tool's width, which would give way by itself
+  for (const double side : {-1.0, 1.0}) EXPECT_TRUE(solid.inside(seen.fuse.touched[0].point_m + 0.02 * inward + 0.03 * side * Vec3::UnitY()));
 }
 
 TEST(Completion, WithoutFreeSpaceNothingIsGuessed) {
