@@ -76,8 +76,14 @@ std::optional<Answer> answer_of(const Recording& recording, SimulatedObject obje
   for (int round = 0; round < most_rounds; ++round) {
     Unknowns unknowns;
     if (round > 0) object.mesh = with_unseen_moved(as_put, *side, amounts);
-    ForwardModel model(recording, object, unknowns, statics_options(recording, object, options));
-    Objective other(model, inputs, unknowns);
+    std::optional<ForwardModel> model;
+    try {
+      model.emplace(recording, object, unknowns, statics_options(recording, object, options));
+    } catch (const Error&) {  // so it cannot lean as far; as it was put, it can be solved for
+      if (answer) return answer;
+      throw;
+    }
+    Objective other(*model, inputs, unknowns);
     for (int k : {log_young, poisson}) unknowns[k] = known[k];
     // the rest surface's error has modes of its own on each shape
     std::map<std::string, int> place;

@@ -38,14 +38,25 @@ std::vector<Eigen::Matrix<double, 3, unseen_mode_count>> motions(const TetMesh& 
     for (const Vec3& touch : side.touched_m) far_m = std::min(far_m, (node - touch).norm());
     out.push_back(unseen_lean_std * far_m * directions(-side.toward, aside, within(height_m, i), within(breadth_m, i)));
   }
+  // Edges stay as straight as they were: an element whose corners are in order is then in order.
+  constexpr int edges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+  for (Index t = 0; mesh.tetrahedra.cols() == 10 && t < mesh.tetrahedra.rows(); ++t)
+    for (int e = 0; e < 6; ++e) {
+      const auto of = [&](int k) { return static_cast<std::size_t>(mesh.tetrahedra(t, k)); };
+      out[of(4 + e)] = 0.5 * (out[of(edges[e][0])] + out[of(edges[e][1])]);
+    }
   return out;
 }
 
-bool turned_inside_out(const TetMesh& mesh) {
-  for (Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
-    const auto node = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(t, k))); };
-    if (!((node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) > 0)) return true;
-  }
+/// True where an element has lost nearly all of its volume, or turned over.
+bool crushes(const TetMesh& before, const Points& after_m) {
+  constexpr double least = 0.1;
+  const auto volume = [&](const Points& nodes_m, Index t) {
+    const auto node = [&](int k) { return Vec3(nodes_m.row(before.tetrahedra(t, k))); };
+    return (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0));
+  };
+  for (Index t = 0; t < before.tetrahedra.rows(); ++t)
+    if (!(volume(after_m, t) > least * volume(before.nodes_m, t))) return true;
   return false;
 }
 
@@ -84,7 +95,7 @@ TetMesh with_unseen_moved(const TetMesh& mesh, const UnseenSide& side, VectorX& 
   const auto motion = motions(mesh, side);
   for (int k = 0; k < most_halvings; ++k, amounts /= 2) {
     TetMesh moved = moved_by(mesh, motion, amounts);
-    if (!turned_inside_out(moved)) return moved;
+    if (!crushes(mesh, moved.nodes_m)) return moved;
   }
   amounts.setZero();
   return mesh;
