@@ -26,17 +26,18 @@ Eigen::Matrix<double, 3, unseen_mode_count> directions(const Vec3& away, const V
 std::vector<Eigen::Matrix<double, 3, unseen_mode_count>> motions(const TetMesh& mesh, const UnseenSide& side) {
   const geometry::TriangleTree seen(side.seen);
   const Vec3 aside = side.up.cross(side.toward);
-  const VectorX height_m = mesh.nodes_m * side.up, breadth_m = mesh.nodes_m * aside;
-  const auto within = [](const VectorX& along, Index i) {
+  const auto within = [&](const Vec3& direction) {
+    const VectorX along = mesh.nodes_m * direction;
     const double low = along.minCoeff(), high = along.maxCoeff();
-    return high > low ? 2 * (along(i) - low) / (high - low) - 1 : 0;
+    return high > low ? VectorX(2 * (along.array() - low) / (high - low) - 1) : VectorX::Zero(along.size());
   };
+  const VectorX height = within(side.up), breadth = within(aside);
   std::vector<Eigen::Matrix<double, 3, unseen_mode_count>> out;
   for (Index i = 0; i < mesh.nodes_m.rows(); ++i) {
     const Vec3 node = mesh.nodes_m.row(i);
     double far_m = std::sqrt(seen.closest(node).squared_distance_m2);
     for (const Vec3& touch : side.touched_m) far_m = std::min(far_m, (node - touch).norm());
-    out.push_back(unseen_lean_std * far_m * directions(-side.toward, aside, within(height_m, i), within(breadth_m, i)));
+    out.push_back(unseen_lean_std * far_m * directions(-side.toward, aside, height(i), breadth(i)));
   }
   // Edges stay as straight as they were: an element whose corners are in order is then in order.
   constexpr int edges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};

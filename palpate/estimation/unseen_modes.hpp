@@ -18,8 +18,7 @@ struct UnseenSide {
 };
 
 /// What the unseen part may do: each moves it along the support in proportion to the distance from the nearest place that was seen
-/// or touched,
-/// so that the seen part stays and what stands on the support stays on it.
+/// or touched, so that these stay, and what stands on the support stays on it.
 inline constexpr int unseen_mode_count = 6;
 
 /// One standard deviation of each: metres of motion a metre of that distance. All six together are 0.4 rms; mirrored backs of 11 bears,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inside of TriangleTree and PerspectiveGrid: does a ray meet a triangle? The ray becomes the z axis of a sheared frame, and a point on a
+// Inside of TriangleTree and RayBundle: does a ray meet a triangle? The ray becomes the z axis of a sheared frame, and a point on a
 // shared edge belongs to both triangles, so that no ray slips between (Woop, Benthin, Wald 2013).
 #pragma once
 

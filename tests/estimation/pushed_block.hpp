@@ -123,4 +123,15 @@ inline bool says(const Identification& answer, const std::string& code) {
   return std::any_of(answer.verdicts.begin(), answer.verdicts.end(), [&](const Verdict& v) { return v.code == code; });
 }
 
+/// Leaves of every step's cloud what a sensor above the block sees.
+inline void leave_the_top(Inputs& inputs) {
+  for (auto& step : inputs) {
+    auto& cloud = std::get<PointCloud>(step[0]);
+    Index kept = 0;
+    for (Index i = 0; i < cloud.points_m.rows(); ++i)
+      if (cloud.points_m(i, 2) > 0.8 * block_size_m.z()) cloud.points_m.row(kept++) = cloud.points_m.row(i).eval();
+    cloud.points_m.conservativeResize(kept, 3);
+  }
+}
+
 }  // namespace palpate::estimation

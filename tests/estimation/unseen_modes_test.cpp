@@ -53,13 +53,7 @@ Seen seen_from_above(double sigma_m) {
   truth.points = 4000;
   truth.sigma_m = sigma_m;
   out.inputs = clouds_of(truth, out.recording);
-  for (auto& step : out.inputs) {
-    auto& cloud = std::get<PointCloud>(step[0]);
-    Index kept = 0;
-    for (Index i = 0; i < cloud.points_m.rows(); ++i)
-      if (cloud.points_m(i, 2) > 0.8 * block_size_m.z()) cloud.points_m.row(kept++) = cloud.points_m.row(i).eval();
-    cloud.points_m.conservativeResize(kept, 3);
-  }
+  leave_the_top(out.inputs);
   return out;
 }
 
