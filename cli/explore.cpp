@@ -35,6 +35,20 @@ struct Options {
   LiveOptions live;
 };
 
+nlohmann::json moduli_json(const std::vector<Parameter>& young) {
+  if (young.size() == 1) return young.front().value;
+  nlohmann::json regions;
+  for (const Parameter& one : young) regions[one.region] = one.value;
+  return regions;
+}
+
+std::string moduli_words(const std::vector<Parameter>& young) {
+  std::string words;
+  for (const Parameter& one : young)
+    words += fmt::format("{}{}{}{}", words.empty() ? "" : ", ", one.region, one.region.empty() ? "" : " ", report::quantity(one.value, "Pa"));
+  return words;
+}
+
 nlohmann::json json_of(const ExploredPush& push) {
   const auto& at = push.plan.candidate;
   return {{"push", push.name},
@@ -46,8 +60,8 @@ nlohmann::json json_of(const ExploredPush& push) {
           {"pushes_planned", push.pushes_planned > 0 ? nlohmann::json(push.pushes_planned) : nlohmann::json()},
           {"promised", spread_json(push.plan.expected)},
           {"found", spread_json(push.found)},
-          {"young_modulus_pa", push.young_modulus.value},
-          {"young_modulus_within_95", young_modulus_half_width(push.young_modulus)},
+          {"young_modulus_pa", moduli_json(push.young_moduli)},
+          {"young_modulus_within_95", young_modulus_half_width(push)},
           {"poisson_ratio", push.poisson_ratio.value},
           {"poisson_ratio_within_95", poisson_ratio_half_width(push.poisson_ratio)}};
 }
@@ -97,7 +111,7 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
         "{}{} at ({:.3f} {:.3f} {:.3f}) along ({:+.2f} {:+.2f} {:+.2f}): E {} within {:.1f} % (promised {}), nu {:.3f} "
         "within {:.3f} (promised {}){}",
         first ? "" : "  ", push.name, at.x(), at.y(), at.z(), along.x(), along.y(), along.z(),
-        report::quantity(push.young_modulus.value, "Pa"), 100 * young_modulus_half_width(push.young_modulus),
+        moduli_words(push.young_moduli), 100 * young_modulus_half_width(push),
         percent_95(push.plan.expected.log_young_std), push.poisson_ratio.value, poisson_ratio_half_width(push.poisson_ratio),
         plain_95(push.plan.expected.poisson_std), plans_of(push)));
   };
@@ -183,7 +197,7 @@ Run verbs::explore(CLI::App& app) {
                  "folder for recording/, result.json, model/, report.html, exploration.json and truth.json")
       ->required();
   add_robot_options(app, given->robot);
-  app.add_option("--young-modulus-within", options.young_modulus_within, "goal: half of the 95 % interval over E")
+  app.add_option("--young-modulus-within", options.young_modulus_within, "goal: half of the 95 % interval over E, of every region")
       ->check(positive_number())
       ->capture_default_str();
   app.add_option("--poisson-ratio-within", options.poisson_ratio_within, "goal: half of the 95 % interval")

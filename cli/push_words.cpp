@@ -17,7 +17,8 @@ nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::js
 }  // namespace
 
 std::string percent_95(double log_std) {
-  if (!std::isfinite(log_std)) return "-";
+  constexpr double nothing = 1;  // known to a factor of seven at best
+  if (!(log_std < nothing)) return "-";
   return fmt::format("{:.1f} %", 100 * (std::exp(quantile_975 * log_std) - 1));
 }
 
@@ -28,6 +29,7 @@ std::string push_words(const estimation::RatedPush& push, const PushScene& scene
   std::string words = fmt::format("push at ({:.4f} {:.4f} {:.4f}) along ({:+.2f} {:+.2f} {:+.2f}) up to {} (about {})",
                                   at.x(), at.y(), at.z(), along.x(), along.y(), along.z(),
                                   report::quantity(push.force_n, "N"), report::quantity(push.travel_m, "m"));
+  if (scene.simulated.region_names.size() > 1) words += ", on " + scene.simulated.region_names[std::size_t(push.region)];
   if (push.view >= 0 && scene.viewpoints.size() > 1) words += ", seen by " + scene.viewpoints[std::size_t(push.view)].name;
   return words;
 }
@@ -48,10 +50,13 @@ std::vector<std::string> push_warnings(const std::string& name, const acquisitio
 }
 
 nlohmann::json spread_json(const estimation::ExpectedSpread& spread) {
-  return {{"log_young_std", number(spread.log_young_std)},
-          {"young_modulus_within_95", number(std::exp(quantile_975 * spread.log_young_std) - 1)},
-          {"poisson_std", number(spread.poisson_std)},
-          {"poisson_ratio_within_95", number(quantile_975 * spread.poisson_std)}};
+  nlohmann::json json = {{"log_young_std", number(spread.log_young_std)},
+                         {"young_modulus_within_95", number(std::exp(quantile_975 * spread.log_young_std) - 1)},
+                         {"poisson_std", number(spread.poisson_std)},
+                         {"poisson_ratio_within_95", number(quantile_975 * spread.poisson_std)}};
+  if (spread.region_log_young_std.size() > 1)
+    for (const double std : spread.region_log_young_std) json["region_log_young_std"].push_back(number(std));
+  return json;
 }
 
 }  // namespace palpate::cli

@@ -67,6 +67,27 @@ Known read(Session& session, const Options& given, std::vector<std::string>& war
   return known;
 }
 
+/// Every Young's modulus that is known, with its interval.
+std::string moduli_words(const estimation::PushRanking& ranking) {
+  std::string words;
+  const estimation::Knowledge& known = ranking.knowledge;
+  for (Index r = 0; r < ranking.so_far.region_log_young_std.size(); ++r) {
+    const std::string name = known.regions.empty() ? "" : known.regions[std::size_t(r)] + " ";
+    words += fmt::format("{}{}{}, 95 % within {}", r == 0 ? "" : "; ", name, report::quantity(known.young_modulus_of(static_cast<int>(r)), "Pa"),
+                         percent_95(ranking.so_far.region_log_young_std(r)));
+  }
+  return words;
+}
+
+nlohmann::json moduli_json(const estimation::Knowledge& known) {
+  if (known.regions.empty()) return known.young_modulus_pa;
+  nlohmann::json regions;
+  for (std::size_t r = 0; r < known.regions.size(); ++r) regions[known.regions[r]] = known.young_modulus_of(static_cast<int>(r));
+  return regions;
+}
+
+double young_std_there(const estimation::RatedPush& push) { return push.expected.region_log_young_std(push.region); }
+
 nlohmann::json vector_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 nlohmann::json json_of(const estimation::RatedPush& push, const PushScene& scene) {
@@ -77,6 +98,7 @@ nlohmann::json json_of(const estimation::RatedPush& push, const PushScene& scene
       {"travel_m", push.travel_m},
       {"steps", push.steps},
       {"seen_share", push.seen_share},
+      {"region", scene.simulated.region_names.size() > 1 ? nlohmann::json(scene.simulated.region_names[std::size_t(push.region)]) : nlohmann::json()},
       {"view", push.view < 0 ? nlohmann::json() : nlohmann::json(scene.viewpoints[std::size_t(push.view)].name)},
       {"expected", spread_json(push.expected)}};
   return json;
@@ -137,10 +159,10 @@ int run(const Options& given, Session& session) {
   for (const std::string& warning : warnings) session.warn(warning);
 
   const auto& knowledge = ranking.knowledge;
+  const bool in_regions = knowledge.regions.size() > 1;
   if (knowledge.touched)
-    session.say(fmt::format("known so far     E {}, 95 % within {}; nu {:.3f}, within {}",
-                            report::quantity(knowledge.young_modulus_pa, "Pa"), percent_95(ranking.so_far.log_young_std),
-                            knowledge.poisson_ratio, plain_95(ranking.so_far.poisson_std)));
+    session.say(fmt::format("known so far     E {}; nu {:.3f}, 95 % within {}", moduli_words(ranking), knowledge.poisson_ratio,
+                            plain_95(ranking.so_far.poisson_std)));
   else
     session.say(fmt::format(
         "before the first touch: E is taken as {} (--young-modulus), nu as {:.2f}; forces go with E, intervals hardly do",
@@ -154,25 +176,26 @@ int run(const Options& given, Session& session) {
     return exit_numbers;
   }
   const auto& best = ranking.pushes.front();
-  session.say(fmt::format("suggested        {}; then E within {}, nu within {} (95 %)", push_words(best, scene),
-                          percent_95(best.expected.log_young_std), plain_95(best.expected.poisson_std)));
+  session.say(fmt::format("suggested        {}; then E{} within {}, nu within {} (95 %)", push_words(best, scene), in_regions ? " there" : "",
+                          percent_95(young_std_there(best)), plain_95(best.expected.poisson_std)));
   session.say("  no  contact (m)                 along                  force     travel   in view  E within  nu within");
   const bool several_views = scene.viewpoints.size() > 1;
   for (std::size_t i = 0; i < ranking.pushes.size() && i < std::size_t(given.show); ++i) {
     const auto& push = ranking.pushes[i];
     session.say(
-        fmt::format("  {:>2}  {:+.4f} {:+.4f} {:+.4f}   {:+.2f} {:+.2f} {:+.2f}   {:>9} {:>9}   {:4.0f} %   {:>7}   {:>7}{}",
+        fmt::format("  {:>2}  {:+.4f} {:+.4f} {:+.4f}   {:+.2f} {:+.2f} {:+.2f}   {:>9} {:>9}   {:4.0f} %   {:>7}   {:>7}{}{}",
                     i + 1, push.candidate.contact_m.x(), push.candidate.contact_m.y(), push.candidate.contact_m.z(),
                     push.candidate.direction.x(), push.candidate.direction.y(), push.candidate.direction.z(),
                     report::quantity(push.force_n, "N"), report::quantity(push.travel_m, "m"), 100 * push.seen_share,
-                    percent_95(push.expected.log_young_std), plain_95(push.expected.poisson_std),
+                    percent_95(young_std_there(push)), plain_95(push.expected.poisson_std),
+                    in_regions ? "   " + knowledge.regions[std::size_t(push.region)] : "",
                     several_views && push.view >= 0 ? "   " + scene.viewpoints[std::size_t(push.view)].name : ""));
   }
   nlohmann::json json = {{"format", "palpate-suggestion/1"},
                          {"goal", given.goal},
                          {"tool", scene.tool},
                          {"touched", knowledge.touched},
-                         {"young_modulus_pa", knowledge.young_modulus_pa},
+                         {"young_modulus_pa", moduli_json(knowledge)},
                          {"poisson_ratio", knowledge.poisson_ratio},
                          {"so_far", spread_json(ranking.so_far)},
                          {"pushes", nlohmann::json::array()},
@@ -194,7 +217,7 @@ int run(const Options& given, Session& session) {
   const bool with_target = given.young_modulus_within || given.poisson_ratio_within;
   const auto order =
       with_target ? pushes_to_target(given, ranking, session, json) : estimation::plan_sequence(ranking, given.then);
-  if (order.size() > 1) session.say("one after another:");
+  if (order.size() > 1) session.say(in_regions ? "one after another (E of the least known region):" : "one after another:");
   for (std::size_t n = 0; n < order.size(); ++n) {
     const estimation::RatedPush& push = ranking.pushes[order[n]];
     made.push_back(&push);

@@ -15,10 +15,12 @@ namespace {
 using estimation::PushRanking;
 using estimation::RatedPush;
 
-const Parameter& parameter(const Identification& answer, const std::string& name) {
+std::vector<Parameter> parameters(const Identification& answer, const std::string& name) {
+  std::vector<Parameter> found;
   for (const auto& one : answer.parameters)
-    if (one.name == name && one.region.empty()) return one;
-  throw Error("holds no " + name, "Identification.parameters");
+    if (one.name == name) found.push_back(one);
+  if (found.empty()) throw Error("holds no " + name, "Identification.parameters");
+  return found;
 }
 
 class Loop {
@@ -48,7 +50,7 @@ class Loop {
         if (fixed_order.empty()) fixed_order = order_of(ranking.knowledge, pushes);
         next.plan = again(pushes, fixed_order[made % fixed_order.size()]);
       }
-      push(next, so_far != nullptr);
+      push(next, is_known(ranking.so_far, next.plan.region));
       if (next.report.stop == acquisition::StopReason::user) return end("stopped on request");
       if (!pressed()) {
         ++out_.fruitless;
@@ -99,6 +101,12 @@ class Loop {
   }
 
   estimation::SpreadTarget target() const { return {options_.young_modulus_within, options_.poisson_ratio_within}; }
+
+  /// What is pressed on has been felt: forces can be planned.
+  static bool is_known(const estimation::ExpectedSpread& spread, int region) {
+    constexpr double known = 0.5;  // standard deviation of log E, as Parameter::determined
+    return spread.region_log_young_std(region) < known;
+  }
 
   void choose(ExploredPush& next, const PushRanking& ranking, const std::vector<RatedPush>& pushes, int most) const {
     next.plan = pushes.front();
@@ -187,7 +195,7 @@ class Loop {
   void estimate(bool whole) {
     IdentifyOptions options = options_.identify;
     options.fit.cross_checks = whole;
-    if (!out_.pushes.empty()) options.fit.young_start_pa = parameter(out_.identified.answer, "young_modulus").value;
+    if (!out_.pushes.empty()) options.fit.young_start_pa = parameters(out_.identified.answer, "young_modulus").front().value;
     out_.identified = identify(out_.recording, options, hooks_.on_progress);
   }
 
@@ -197,15 +205,14 @@ class Loop {
       out_.message = "the estimate did not work out: " + answer.message;
       return;
     }
-    next.young_modulus = parameter(answer, "young_modulus");
-    next.poisson_ratio = parameter(answer, "poisson_ratio");
-    next.found.log_young_std = std::sqrt(answer.covariance(0, 0));
-    next.found.poisson_std = std::sqrt(answer.covariance(1, 1));
-    out_.reached = young_modulus_half_width(next.young_modulus) <= options_.young_modulus_within &&
+    next.young_moduli = parameters(answer, "young_modulus");
+    next.poisson_ratio = parameters(answer, "poisson_ratio").front();
+    next.found = estimation::expected_after(estimation::after_fit(out_.recording, answer), {});
+    out_.reached = young_modulus_half_width(next) <= options_.young_modulus_within &&
                    poisson_ratio_half_width(next.poisson_ratio) <= options_.poisson_ratio_within;
     out_.pushes.push_back(std::move(next));
     if (hooks_.on_push) hooks_.on_push(out_.pushes.back());
-    if (out_.reached) out_.message = "both intervals are as narrow as was asked for";
+    if (out_.reached) out_.message = out_.pushes.back().young_moduli.size() > 1 ? "all intervals are as narrow as was asked for" : "both intervals are as narrow as was asked for";
   }
 
   Explored end(const std::string& message) {
@@ -238,6 +245,11 @@ void check(const ExploreOptions& o) {
 }
 
 double young_modulus_half_width(const Parameter& young) { return 0.5 * (young.upper_95 - young.lower_95) / young.value; }
+double young_modulus_half_width(const ExploredPush& push) {
+  double widest = 0;
+  for (const Parameter& one : push.young_moduli) widest = std::max(widest, young_modulus_half_width(one));
+  return widest;
+}
 double poisson_ratio_half_width(const Parameter& ratio) { return 0.5 * (ratio.upper_95 - ratio.lower_95); }
 
 Explored explore(acquisition::Robot& robot, const Recording& scene, const ExploreOptions& options,

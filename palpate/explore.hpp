@@ -22,7 +22,7 @@ enum class PushOrder {
 };
 
 struct ExploreOptions {
-  double young_modulus_within = 0.05;  ///< half of the 95 % interval over E
+  double young_modulus_within = 0.05;  ///< half of the 95 % interval over E, of every region
   double poisson_ratio_within = 0.03;  ///< half of the 95 % interval
   int max_pushes = 8;
   PushOrder order = PushOrder::next_best;
@@ -45,7 +45,8 @@ struct ExploredPush {
   estimation::RatedPush plan;  ///< `expected` is what was promised for after it
   int pushes_planned = 0;      ///< from this one on, until the goal; 0: not within max_pushes, or not planned
   acquisition::PushReport report;
-  Parameter young_modulus, poisson_ratio;  ///< estimated from all pushes so far
+  std::vector<Parameter> young_moduli;     ///< of every region, or one; estimated from all pushes so far
+  Parameter poisson_ratio;
   estimation::ExpectedSpread found;        ///< standard deviations of that estimate
 };
 
@@ -70,13 +71,15 @@ struct ExploreHooks {
   OnProgress on_progress;
 };
 
-/// @param scene  object, supports, tools and priors without pushes
+/// @param scene  object, supports, tools and priors without pushes; with `regions`, every part's E is wanted
 /// @throws Error where no push is possible, no hook plans one, or no answer can exist.
 Explored explore(acquisition::Robot& robot, const Recording& scene, const ExploreOptions& options,
                  const ExploreHooks& hooks);
 
 /// Half of a 95 % interval over E (relative) and of nu.
 double young_modulus_half_width(const Parameter& young_modulus);
+/// Of the least known region.
+double young_modulus_half_width(const ExploredPush& push);
 double poisson_ratio_half_width(const Parameter& poisson_ratio);
 
 }  // namespace palpate

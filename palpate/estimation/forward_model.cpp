@@ -258,8 +258,12 @@ std::shared_ptr<const geometry::TriangleTree> ForwardModel::rest_tree() const {
   return solved_->rest_tree;
 }
 
-void ForwardModel::forget() {
+void ForwardModel::forget_steps() {
   for (auto& memory : memory_) memory = Memory{};
+}
+
+void ForwardModel::forget() {
+  forget_steps();
   for (auto& bodies : solved_->bodies) {
     for (auto& [tools, body] : bodies) {
       body->response->forget();

@@ -183,6 +183,8 @@ class ForwardModel {
 
   /// Forgets warm starts, so that the next answer does not depend on what was asked before.
   void forget();
+  /// What was solved for each step alone: its memory, where many steps are asked once each.
+  void forget_steps();
 
   /// Equilibria that were asked for.
   int solves() const;

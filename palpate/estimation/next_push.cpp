@@ -9,25 +9,61 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/push_information.hpp"
+#include "palpate/estimation/unknowns.hpp"
 
 namespace palpate::estimation {
 namespace {
 
 constexpr double known_exactly = 1e12;  // information of what is fixed
 
+/// (log E of every region, nu) as rows of (log E of the first, nu, log ratios, force scale).
+MatrixX every_young(Index unknowns) {
+  const Index regions = unknowns - 2;
+  MatrixX rows = MatrixX::Zero(regions + 1, unknowns);
+  rows.col(0).head(regions).setOnes();
+  for (Index r = 1; r < regions; ++r) rows(r, 1 + r) = 1;
+  rows(regions, 1) = 1;
+  return rows;
+}
+
+/// Parts that an answer tells apart; none where it has one Young's modulus.
+std::vector<std::string> regions_of(const Identification& answer) {
+  std::vector<std::string> names;
+  for (const auto& one : answer.parameters)
+    if (one.name == "young_modulus" && !one.region.empty()) names.push_back(one.region);
+  return names;
+}
+
+Index parameter_row(const Identification& answer, const std::string& name, const std::string& region) {
+  for (std::size_t i = 0; i < answer.parameters.size(); ++i)
+    if (answer.parameters[i].name == name && answer.parameters[i].region == region) return static_cast<Index>(i);
+  throw Error("holds no " + name + (region.empty() ? " of the whole object" : " of the region '" + region + "'"), "result: parameters");
+}
+
+double root_of_determinant(const MatrixX& covariance) {
+  return covariance.llt().matrixLLT().diagonal().prod();
+}
+
 ExpectedSpread spread_of(const MatrixX& information, const Eigen::Vector2d& uncured) {
+  const Index regions = information.rows() - 2;
   ExpectedSpread spread;
   // Nothing of E is known before the first touch: that row has no inverse.
   if (!(information(0, 0) > 0)) {
-    spread.log_young_std = std::numeric_limits<double>::infinity();
+    spread.log_young_std = spread.young_volume = spread.volume = std::numeric_limits<double>::infinity();
+    spread.region_log_young_std = VectorX::Constant(regions, spread.log_young_std);
     spread.poisson_std = information(1, 1) > 0 ? std::sqrt(1 / information(1, 1) + uncured(1)) : spread.log_young_std;
     return spread;
   }
-  const MatrixX covariance = information.ldlt().solve(MatrixX::Identity(3, 3));
-  const double young = covariance(0, 0) + uncured(0), ratio = covariance(1, 1) + uncured(1);
-  spread.log_young_std = std::sqrt(std::max(young, 0.0));
-  spread.poisson_std = std::sqrt(std::max(ratio, 0.0));
-  spread.correlation = young > 0 && ratio > 0 ? covariance(0, 1) / std::sqrt(young * ratio) : 0;
+  const MatrixX rows = every_young(information.rows());
+  MatrixX covariance = rows * information.ldlt().solve(rows.transpose());
+  covariance.diagonal().head(regions).array() += uncured(0);
+  covariance(regions, regions) += uncured(1);
+  covariance.diagonal() = covariance.diagonal().cwiseMax(1e-24);
+  spread.region_log_young_std = covariance.diagonal().head(regions).cwiseSqrt();
+  spread.log_young_std = spread.region_log_young_std.maxCoeff();
+  spread.poisson_std = std::sqrt(covariance(regions, regions));
+  spread.young_volume = root_of_determinant(covariance.topLeftCorner(regions, regions));
+  spread.volume = root_of_determinant(covariance);
   return spread;
 }
 
@@ -41,9 +77,12 @@ PushGoal push_goal(const std::string& name) {
 }
 
 double ExpectedSpread::score(PushGoal goal) const {
-  if (goal == PushGoal::young_modulus) return log_young_std;
-  if (goal == PushGoal::poisson_ratio) return poisson_std;
-  return log_young_std * poisson_std * std::sqrt(std::max(1e-12, 1 - correlation * correlation));
+  if (goal == PushGoal::young_modulus) return young_volume;
+  return goal == PushGoal::poisson_ratio ? poisson_std : volume;
+}
+
+double Knowledge::young_modulus_of(int region) const {
+  return region == 0 ? young_modulus_pa : young_modulus_pa * std::exp(log_ratio(region - 1));
 }
 
 Knowledge before_touch(const Recording& recording, double young_modulus_pa) {
@@ -52,34 +91,44 @@ Knowledge before_touch(const Recording& recording, double young_modulus_pa) {
   known.young_modulus_pa = young_modulus_pa;
   const ModelDefaults& model = recording.model;
   known.poisson_ratio = model.poisson_fixed.value_or(std::clamp(0.3, model.poisson_lower, model.poisson_upper));
+  if (recording.regions.size() > 1)  // as in the simulation
+    for (const Region& region : recording.regions) known.regions.push_back(region.name);
+  const Index ratios = std::max<Index>(1, static_cast<Index>(known.regions.size())) - 1;
+  known.log_ratio = VectorX::Zero(ratios);
+  known.information = MatrixX::Zero(3 + ratios, 3 + ratios);
   const double range = model.poisson_upper - model.poisson_lower;
   known.information(1, 1) = model.poisson_fixed || !(range > 0) ? known_exactly : 12 / (range * range);
-  known.information(2, 2) = recording.force_scale_std > 0 ? std::pow(recording.force_scale_std, -2) : known_exactly;
+  known.information.diagonal().segment(2, ratios).setConstant(std::pow(Unknowns::ratio_prior_std, -2));
+  known.information(2 + ratios, 2 + ratios) = recording.force_scale_std > 0 ? std::pow(recording.force_scale_std, -2) : known_exactly;
   return known;
 }
 
 Knowledge after_fit(const Recording& recording, const Identification& answer) {
-  int young = -1, ratio = -1;
-  for (std::size_t i = 0; i < answer.parameters.size(); ++i) {
-    if (!answer.parameters[i].region.empty()) continue;
-    if (answer.parameters[i].name == "young_modulus") young = static_cast<int>(i);
-    if (answer.parameters[i].name == "poisson_ratio") ratio = static_cast<int>(i);
-  }
-  if (young < 0 || ratio < 0)
-    throw Error("holds no Young's modulus and Poisson ratio of the whole object", "result: parameters");
-  if (answer.covariance.rows() <= std::max(young, ratio) || !answer.covariance.allFinite() ||
-      !(answer.covariance(young, young) > 0))
-    throw Error("holds no covariance; estimate with the default method", "result: covariance");
-  const auto at = [&](int i) { return static_cast<std::size_t>(i); };
   Knowledge known;
   known.touched = true;
-  known.young_modulus_pa = answer.parameters[at(young)].value;
-  known.poisson_ratio = std::clamp(answer.parameters[at(ratio)].value, 0.0, 0.499);
-  Eigen::Matrix2d covariance;
-  covariance << answer.covariance(young, young), answer.covariance(young, ratio), answer.covariance(young, ratio),
-      answer.covariance(ratio, ratio);
-  const bool fixed = recording.model.poisson_fixed || !(covariance(1, 1) > 0);
-  if (fixed) covariance(1, 0) = covariance(0, 1) = 0, covariance(1, 1) = 1 / known_exactly;
+  known.regions = regions_of(answer);
+  // Where the answer's parameters hold every log E and then nu.
+  std::vector<Index> rows;
+  for (const auto& name : known.regions) rows.push_back(parameter_row(answer, "young_modulus", name));
+  if (rows.empty()) rows.push_back(parameter_row(answer, "young_modulus", ""));
+  rows.push_back(parameter_row(answer, "poisson_ratio", ""));
+  const Index regions = static_cast<Index>(rows.size()) - 1;
+  if (answer.covariance.rows() <= *std::max_element(rows.begin(), rows.end()) || !answer.covariance.allFinite())
+    throw Error("holds no covariance; estimate with the default method", "result: covariance");
+  MatrixX covariance = answer.covariance(rows, rows);
+  if (!(covariance.diagonal().head(regions).minCoeff() > 0))
+    throw Error("holds no covariance; estimate with the default method", "result: covariance");
+  const auto value = [&](Index r) { return answer.parameters[static_cast<std::size_t>(rows[static_cast<std::size_t>(r)])].value; };
+  known.young_modulus_pa = value(0);
+  known.poisson_ratio = std::clamp(value(regions), 0.0, 0.499);
+  known.log_ratio.resize(regions - 1);
+  for (Index r = 1; r < regions; ++r) known.log_ratio(r - 1) = std::log(value(r) / value(0));
+  const bool fixed = recording.model.poisson_fixed || !(covariance(regions, regions) > 0);
+  if (fixed) {
+    covariance.row(regions).setZero();
+    covariance.col(regions).setZero();
+    covariance(regions, regions) = 1 / known_exactly;
+  }
 
   // The mesh's error comes back with every push, and none shows the unseen side or the foot. Its sign of correlation is not told, so it goes out of the diagonal.
   for (const auto& entry : answer.budget) {
@@ -87,22 +136,28 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
     known.uncured(0) += std::pow(entry.young_modulus_percent / 100, 2);
     known.uncured(1) += fixed ? 0 : entry.poisson_shift * entry.poisson_shift;
   }
-  for (int i = 0; i < 2; ++i) known.uncured(i) = std::min(known.uncured(i), 0.9 * covariance(i, i));
-  const double left = std::sqrt((1 - known.uncured(0) / covariance(0, 0)) * (1 - known.uncured(1) / covariance(1, 1)));
-  covariance.diagonal() -= known.uncured;
-  covariance(0, 1) *= left;
-  covariance(1, 0) *= left;
+  known.uncured(0) = std::min(known.uncured(0), 0.9 * covariance.diagonal().head(regions).minCoeff());
+  known.uncured(1) = std::min(known.uncured(1), 0.9 * covariance(regions, regions));
+  VectorX left(regions + 1);
+  for (Index k = 0; k <= regions; ++k) left(k) = std::sqrt(1 - known.uncured(k < regions ? 0 : 1) / covariance(k, k));
+  covariance = left.asDiagonal() * covariance * left.asDiagonal();
 
-  // E is proportional to the force: d log E / d scale = 1 exactly.
+  // E is proportional to the force: d log E / d scale = 1 exactly, of every region.
   double scale_std = recording.force_scale_std;
   for (const auto& nuisance : answer.nuisances)
     if (nuisance.name == "force_scale") scale_std = std::min(scale_std, nuisance.std);
-  const double scale = std::min(scale_std * scale_std, 0.9 * covariance(0, 0));
-  MatrixX joint = MatrixX::Zero(3, 3);
-  joint.topLeftCorner(2, 2) = covariance;
-  joint(2, 2) = scale > 0 ? scale : 1 / known_exactly;
-  joint(0, 2) = joint(2, 0) = scale;
-  known.information = joint.fullPivLu().inverse();
+  const double scale = std::min(scale_std * scale_std, 0.9 * covariance.diagonal().head(regions).minCoeff());
+  MatrixX joint = MatrixX::Zero(regions + 2, regions + 2);
+  joint.topLeftCorner(regions + 1, regions + 1) = covariance;
+  joint(regions + 1, regions + 1) = scale > 0 ? scale : 1 / known_exactly;
+  joint.col(regions + 1).head(regions).setConstant(scale);
+  joint.row(regions + 1).head(regions).setConstant(scale);
+  // From (every log E, nu, scale) to (log E of the first, nu, log ratios, scale).
+  MatrixX to = MatrixX::Zero(regions + 2, regions + 2);
+  to(0, 0) = to(1, regions) = to(regions + 1, regions + 1) = 1;
+  for (Index r = 1; r < regions; ++r) to(1 + r, r) = 1, to(1 + r, 0) = -1;
+  const MatrixX about = to * joint * to.transpose();
+  known.information = about.fullPivLu().inverse();
   return known;
 }
 

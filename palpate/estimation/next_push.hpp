@@ -36,15 +36,20 @@ struct SensorPlan {
   int levels = 4;                 ///< force steps up to the limit; each is a choice of how hard to push
 };
 
-/// What is known of log E and nu before the push.
+/// What is known of log E and nu before the push. Of an object in R regions (two or more) E is that of the first, and the others are
+/// known by the log of their ratio to it, as in the fit (estimation::Unknowns).
 struct Knowledge {
   double young_modulus_pa = 2e4, poisson_ratio = 0.3;  ///< where information is computed
-  MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, force scale), their priors included
-  Eigen::Vector2d uncured = Eigen::Vector2d::Zero();   ///< variance of log E and nu that no push takes away: the mesh's and the unseen side's
+  std::vector<std::string> regions;                    ///< R names; empty: one stiffness everywhere
+  VectorX log_ratio;                                   ///< R - 1: where information is computed
+  MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, R - 1 log ratios, force scale), their priors included
+  Eigen::Vector2d uncured = Eigen::Vector2d::Zero();   ///< variance of log E (of every region) and nu that no push takes away: the mesh's and the unseen side's
   bool touched = false;                                ///< false: nothing but priors, E is a guess
+
+  double young_modulus_of(int region) const;  ///< Pa; 0: the first, or the whole object
 };
 
-/// Priors alone: nothing of E, the recording's range of nu and scale of force.
+/// Priors alone: nothing of E, the recording's range of nu and scale of force, ratios as wide as the fit's.
 Knowledge before_touch(const Recording& recording, double young_modulus_pa);
 /// The posterior so far. The force's scale is a common error that is held apart: further pushes do not average it out.
 /// @throws Error when the answer has no Young's modulus or Poisson ratio, or no covariance.
@@ -52,8 +57,10 @@ Knowledge after_fit(const Recording& recording, const Identification& answer);
 
 /// Standard deviations of log E and nu.
 struct ExpectedSpread {
-  double log_young_std = 0, poisson_std = 0, correlation = 0;
-  double score(PushGoal goal) const;  ///< what is minimised: a standard deviation, or the root of the determinant
+  double log_young_std = 0, poisson_std = 0;  ///< in regions: of the least known one
+  VectorX region_log_young_std;               ///< R; one entry where there is one stiffness
+  double young_volume = 0, volume = 0;        ///< root of the determinant of the covariance of every log E; with nu
+  double score(PushGoal goal) const;          ///< what is minimised: a standard deviation, or the root of the determinant
 };
 
 struct RatedPush {
@@ -64,7 +71,8 @@ struct RatedPush {
   int steps = 0;            ///< levels up to it
   double seen_share = 0;    ///< of the surface around the tool, by that view
   ExpectedSpread expected;  ///< after the push
-  MatrixX information;      ///< that it adds, 3 x 3 as Knowledge's, every nuisance of its own integrated out
+  int region = 0;           ///< that the tool presses on
+  MatrixX information;      ///< that it adds, as Knowledge's, every nuisance of its own integrated out
 };
 
 struct PushRanking {
@@ -83,9 +91,10 @@ struct RankOptions {
 };
 
 /// @param scene      supports, environment, tools and priors of the object; its pushes are not looked at
-/// @param object     simulated with small strains, whatever its law: one factorisation for all candidates
+/// @param object     simulated with small strains, whatever its law: one factorisation for all candidates; its regions count
+///                   where `knowledge` has them
 /// @param tool       name in scene.tools
-/// @throws Error as ForwardModel does; on a plan without sensors.
+/// @throws Error as ForwardModel does; on a plan without sensors; where regions of object and knowledge differ.
 PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, const std::string& tool,
                         const std::vector<PushCandidate>& candidates, const SensorPlan& sensors, const Knowledge& knowledge,
                         const RankOptions& options, const OnProgress& progress = {});

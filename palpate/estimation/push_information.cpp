@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "palpate/core/error.hpp"
@@ -11,6 +12,7 @@
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/estimation/load_columns.hpp"
 #include "palpate/estimation/push_visibility.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
@@ -77,6 +79,11 @@ VectorX compliances_m_per_n(const Recording& scene, const SimulatedObject& objec
                                  VectorX::Zero(boundary.forces.cols()), VectorX::Zero(boundary.motions.cols())};
   fem::Response::Options response_options;
   response_options.statics = options;
+  if (!object.region.empty()) {
+    response_options.statics.region = object.region;
+    response_options.statics.region_stiffness = VectorX::Ones(1 + knowledge.log_ratio.size());
+    response_options.statics.region_stiffness.tail(knowledge.log_ratio.size()) = knowledge.log_ratio.array().exp();
+  }
   response_options.poisson_lower = response_options.poisson_upper = knowledge.poisson_ratio;
   const fem::Response response(object.mesh, "linear", std::move(boundary), Eigen::SparseMatrix<double>(0, dofs), response_options);
   const fem::ResponseState unit = response.at(query);
@@ -91,6 +98,18 @@ VectorX compliances_m_per_n(const Recording& scene, const SimulatedObject& objec
       compliance(static_cast<Index>(c)) = -1;
   }
   return compliance;
+}
+
+/// The nearest element's.
+int region_at(const SimulatedObject& object, const Vec3& place_m) {
+  if (object.region.empty()) return 0;
+  Index nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (Index e = 0; e < object.mesh.tetrahedra.rows(); ++e) {
+    const double d2 = (fem::element_centre(object.mesh, e) - place_m).squaredNorm();
+    if (d2 < least) least = d2, nearest = e;
+  }
+  return object.region[static_cast<std::size_t>(nearest)];
 }
 
 /// What one step adds, before nuisances are integrated out.
@@ -114,6 +133,7 @@ struct PushInformation::Impl {
   RankOptions options;
   Tool tool;
   std::vector<PushCandidate> candidates;  // of planned.pushes
+  std::vector<int> region;                // that it presses on
   std::vector<Points> seen_m;             // a view
   std::vector<double> spacing;            // a view
   std::optional<geometry::TriangleTree> surface;
@@ -123,6 +143,7 @@ struct PushInformation::Impl {
   std::map<std::string, int> shared;
   std::unique_ptr<ForwardModel> model;
   double log_young_value = 0, poisson_value = 0;
+  VectorX log_ratio;
   int force_scale = -1;
 
   Push made_up(const PushCandidate& candidate, double highest_n, const std::string& name) const {
@@ -149,14 +170,17 @@ struct PushInformation::Impl {
     VectorX at = unknowns.prior_mean();
     at(log_young) = log_young_value;
     at(poisson) = poisson_value;
+    at.segment(first_ratio, log_ratio.size()) = log_ratio;
     return at;
   }
 
-  /// Schur complement of all that is not (log E, nu, force scale).
+  /// Schur complement of all that is not (log E, nu, log ratios, force scale).
   MatrixX marginal(const std::vector<const Block*>& blocks) const {
-    std::map<int, Index> at{{log_young, 0}, {poisson, 1}};
-    if (force_scale >= 0) at.emplace(force_scale, 2);
-    Index size = 3;
+    std::map<int, Index> at;
+    for (int k = 0; k < unknowns.parameter_count(); ++k) at.emplace(k, k);
+    const Index scale = unknowns.parameter_count(), kept = scale + 1;
+    if (force_scale >= 0) at.emplace(force_scale, scale);
+    Index size = kept;
     for (const Block* block : blocks)
       for (const int unknown : block->unknowns)
         if (!unknowns[unknown].fixed || unknown == poisson) size += at.emplace(unknown, size).second;
@@ -172,10 +196,10 @@ struct PushInformation::Impl {
       }
     }
     for (const auto& [unknown, k] : at)
-      if (k >= 3 && std::isfinite(unknowns[unknown].prior_std)) all(k, k) += std::pow(unknowns[unknown].prior_std, -2);
-    if (size == 3) return all;
-    const MatrixX own = all.bottomRightCorner(size - 3, size - 3), cross = all.bottomLeftCorner(size - 3, 3);
-    return all.topLeftCorner(3, 3) - cross.transpose() * own.ldlt().solve(cross);
+      if (k >= kept && std::isfinite(unknowns[unknown].prior_std)) all(k, k) += std::pow(unknowns[unknown].prior_std, -2);
+    if (size == kept) return all;
+    const MatrixX own = all.bottomRightCorner(size - kept, size - kept), cross = all.bottomLeftCorner(size - kept, kept);
+    return all.topLeftCorner(kept, kept) - cross.transpose() * own.ldlt().solve(cross);
   }
 };
 
@@ -197,6 +221,7 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
   plan.planned.model.poisson_fixed = knowledge.poisson_ratio;  // one ratio, one factorisation
   plan.log_young_value = std::log(knowledge.young_modulus_pa);
   plan.poisson_value = knowledge.poisson_ratio;
+  plan.log_ratio = knowledge.log_ratio;
   plan.rest_step = scene.rest.surface_std_m > 0;
   plan.surface.emplace(object.surface.rest());
   for (const auto& view : sensors.views) {
@@ -207,10 +232,17 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
   }
   SimulatedObject small_strains = object;
   small_strains.material = "linear";
+  if (knowledge.regions.empty()) {
+    small_strains.region.clear();
+    small_strains.region_names.clear();
+  } else if (small_strains.region_names != knowledge.regions) {
+    throw Error("the result tells other regions apart than the recording names; estimate again with those of the recording",
+                "result: parameters");
+  }
   FitOptions fit_options;
   fit_options.threads = options.threads;
   const fem::StaticsOptions statics = statics_options(plan.planned, small_strains, fit_options);
-  const VectorX compliance = compliances_m_per_n(scene, object, plan.tool, candidates, knowledge, statics);
+  const VectorX compliance = compliances_m_per_n(scene, small_strains, plan.tool, candidates, knowledge, statics);
   const double pressed_m2 = EIGEN_PI * plan.tool.radius_m * plan.tool.radius_m;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     const double give = compliance(static_cast<Index>(c));
@@ -221,10 +253,12 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
     const PushCandidate& candidate = candidates[c];
     const PushLimits& limits = options.limits;
     double highest_n = std::min(limits.force_n, limits.travel_m / give);
-    highest_n = std::min(highest_n, limits.pressure_over_young * knowledge.young_modulus_pa * pressed_m2);
+    const int region = region_at(small_strains, candidate.contact_m);
+    highest_n = std::min(highest_n, limits.pressure_over_young * knowledge.young_modulus_of(region) * pressed_m2);
     if (candidate.thickness_m > 0) highest_n = std::min(highest_n, limits.thickness_share * candidate.thickness_m / give);
     plan.planned.pushes.push_back(plan.made_up(candidate, highest_n, "candidate " + std::to_string(c)));
     plan.candidates.push_back(candidate);
+    plan.region.push_back(region);
   }
   if (plan.candidates.empty()) return;
   plan.model = std::make_unique<ForwardModel>(plan.planned, std::move(small_strains), plan.unknowns, statics);
@@ -286,6 +320,7 @@ std::vector<RatedPush> PushInformation::rate(std::size_t c) {
       view_blocks[v][s] = block_of(rows, rows.robust ? surface_weight : 1);
     }
   }
+  plan.model->forget_steps();
 
   std::vector<RatedPush> rated;
   for (std::size_t v = 0; v < std::max<std::size_t>(1, views.size()); ++v) {
@@ -301,6 +336,7 @@ std::vector<RatedPush> PushInformation::rate(std::size_t c) {
       one.force_n = push.steps[s].loads[0].force_n->norm();
       one.travel_m = travel_m[s];
       one.steps = static_cast<int>(s + 1 - (plan.rest_step ? 1 : 0));
+      one.region = plan.region[c];
       one.information = plan.marginal(blocks);
       rated.push_back(std::move(one));
     }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "palpate/core/error.hpp"
 
@@ -11,6 +12,7 @@ namespace palpate::estimation {
 namespace {
 
 constexpr double normal_975 = 1.959964;
+constexpr double noticeable = 1 - 1e-9;  // of what an exchange leaves; else rounding would go on for ever
 
 /// Counts of pushes a and b.
 struct Mix {
@@ -46,6 +48,22 @@ class Planner {
     return plan;
   }
 
+  /// A plan that is one push shorter, for as long as leaving one out and exchanging the others finds one.
+  TargetPlan shortened(TargetPlan plan) const {
+    if (!plan.reached) exchange(plan);
+    while (plan.reached && plan.order.size() > 1) {
+      TargetPlan shorter;
+      for (std::size_t k = 0; k < plan.order.size() && !shorter.reached; ++k) {
+        shorter.order = plan.order;
+        shorter.order.erase(shorter.order.begin() + static_cast<std::ptrdiff_t>(k));
+        exchange(shorter);
+      }
+      if (!shorter.reached) break;
+      plan = shorter;
+    }
+    return plan;
+  }
+
   /// The shortest plan of at most `most` pushes out of one or two of them.
   TargetPlan mixed(int most, bool one_place) const {
     for (int n = 1; n <= most; ++n) {
@@ -66,6 +84,75 @@ class Planner {
   }
 
  private:
+  /// What exchanges make smaller: where several intervals are too wide, narrowing any of them helps.
+  double excess(const MatrixX& information) const {
+    const ExpectedSpread then = spread(information);
+    double sum = std::pow(target_.poisson_miss(then.poisson_std), 8);
+    for (const double std : then.region_log_young_std) sum += std::pow(target_.young_miss(std), 8);
+    return sum;
+  }
+
+  /// Replaces pushes, one or two at a time, by those that leave the least to be wished for, until none do.
+  void exchange(TargetPlan& plan) const {
+    for (;;) {
+      plan.expected = spread(information(plan.order));
+      plan.reached = target_.miss(plan.expected) <= 1;
+      if (plan.reached || !(exchanged_one(plan.order) || exchanged_two(plan.order))) return;
+    }
+  }
+
+  bool exchanged_one(std::vector<std::size_t>& order) const {
+    const MatrixX all = information(order);
+    std::vector<std::size_t> best;
+    double least = noticeable * excess(all);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      const MatrixX others = all - pushes_[order[k]].information;
+      for (std::size_t i = 0; i < pushes_.size(); ++i) {
+        const double left = excess(others + pushes_[i].information);
+        if (left >= least) continue;
+        least = left;
+        best = order;
+        best[k] = i;
+      }
+    }
+    if (!best.empty()) order = best;
+    return !best.empty();
+  }
+
+  /// Out of the pushes that would help most as one more.
+  bool exchanged_two(std::vector<std::size_t>& order) const {
+    constexpr std::size_t tried = 24;
+    const MatrixX all = information(order);
+    std::vector<std::pair<double, std::size_t>> helpful;
+    for (std::size_t i = 0; i < pushes_.size(); ++i) helpful.emplace_back(excess(all + pushes_[i].information), i);
+    std::sort(helpful.begin(), helpful.end());
+    helpful.resize(std::min(helpful.size(), tried));
+    std::vector<std::size_t> best;
+    double least = noticeable * excess(all);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      for (std::size_t l = k + 1; l < order.size(); ++l) {
+        const MatrixX others = all - pushes_[order[k]].information - pushes_[order[l]].information;
+        for (std::size_t i = 0; i < helpful.size(); ++i) {
+          for (std::size_t j = i; j < helpful.size(); ++j) {
+            const std::size_t a = helpful[i].second, b = helpful[j].second;
+            const double left = excess(others + pushes_[a].information + pushes_[b].information);
+            if (left >= least) continue;
+            least = left;
+            best = order;
+            best[k] = a, best[l] = b;
+          }
+        }
+      }
+    }
+    if (!best.empty()) order = best;
+    return !best.empty();
+  }
+
+  MatrixX information(const std::vector<std::size_t>& order) const {
+    MatrixX sum = knowledge_.information;
+    for (const std::size_t i : order) sum += pushes_[i].information;
+    return sum;
+  }
   ExpectedSpread spread(const MatrixX& information) const {
     Knowledge then = knowledge_;
     then.information = information;
@@ -94,10 +181,15 @@ class Planner {
 
 }  // namespace
 
-double SpreadTarget::miss(const ExpectedSpread& spread) const {
+double SpreadTarget::young_miss(double log_young_std) const {
   // Half of the interval over E is sinh(1.96 std of log E).
-  return std::max(std::sinh(normal_975 * std::min(spread.log_young_std, 100.0)) / young_modulus_within,
-                  normal_975 * spread.poisson_std / poisson_ratio_within);
+  return std::sinh(normal_975 * std::min(log_young_std, 100.0)) / young_modulus_within;
+}
+
+double SpreadTarget::poisson_miss(double poisson_std) const { return normal_975 * poisson_std / poisson_ratio_within; }
+
+double SpreadTarget::miss(const ExpectedSpread& spread) const {
+  return std::max(young_miss(spread.log_young_std), poisson_miss(spread.poisson_std));
 }
 
 TargetPlan plan_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,
@@ -113,6 +205,7 @@ TargetPlan plan_for_target(const Knowledge& knowledge, const std::vector<RatedPu
   };
   if (best.order.empty()) return best;
   take_better(planner.greedy(most, [](const ExpectedSpread& s) { return s.score(PushGoal::both); }));
+  if (knowledge.regions.size() > 1) take_better(planner.shortened(best));
   const int to_beat = best.reached ? static_cast<int>(best.order.size()) : most;
   const TargetPlan mixed = planner.mixed(to_beat, false);
   if (mixed.reached) take_better(mixed);

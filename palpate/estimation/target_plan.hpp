@@ -9,11 +9,13 @@
 
 namespace palpate::estimation {
 
-/// Half widths of 95 % intervals, of E relative to it.
+/// Half widths of 95 % intervals, of E relative to it (in regions: of every E).
 struct SpreadTarget {
   double young_modulus_within = 0.05, poisson_ratio_within = 0.03;
   /// The worse of both half widths over what was asked for; at most 1 where the target is reached.
   double miss(const ExpectedSpread& spread) const;
+  double young_miss(double log_young_std) const;   ///< of one E
+  double poisson_miss(double poisson_std) const;
 };
 
 struct TargetPlan {
@@ -22,8 +24,9 @@ struct TargetPlan {
   bool reached = false;
 };
 
-/// Tried are every push and every pair of pushes, each repeated, and two greedy orders over all of them; among plans of the
-/// same length the one that leaves the most room wins, and the push that says the most comes first.
+/// Tried are every push and every pair of pushes, each repeated, and two greedy orders over all of them, of an object in regions
+/// with one push less for as long as exchanges of one or two pushes keep the target; among plans of the same length the one that leaves the most room
+/// wins, and the push that says the most comes first.
 /// @param most  longest plan; where the target is out of its reach, the plan is the greedy one that comes nearest
 /// @throws Error on targets that are not positive.
 TargetPlan plan_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,

@@ -41,9 +41,9 @@ class Unknowns {
   }
   /// The ratios of `count` further regions; right after log E and nu. Their prior is wide, and keeps a region that no push
   /// reaches from drifting off.
+  static constexpr double ratio_prior_std = 2.3;  ///< a factor of ten
   void add_ratios(const std::vector<std::string>& regions) {
-    constexpr double prior_std = 2.3;  // a factor of ten
-    for (const auto& region : regions) add({"log_young_ratio[" + region + "]", "1", 0, prior_std});
+    for (const auto& region : regions) add({"log_young_ratio[" + region + "]", "1", 0, ratio_prior_std});
     ratios_ = static_cast<int>(regions.size());
   }
   int ratio_count() const { return ratios_; }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/core/quantity.hpp"
 #include "palpate/estimation/step_checks.hpp"
 
 namespace palpate::estimation {
@@ -153,8 +154,8 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
       if (stiffest == nullptr || part.log_young > stiffest->log_young) stiffest = &part;
     }
     out.push_back({"not_homogeneous",
-                   "The pushes do not agree on one E: from " + number(std::exp(softest->log_young)) + " Pa (" + softest->name +
-                       ") to " + number(std::exp(stiffest->log_young)) + " Pa (" + stiffest->name +
+                   "The pushes do not agree on one E: from " + quantity(std::exp(softest->log_young), "Pa") + " (" + softest->name +
+                       ") to " + quantity(std::exp(stiffest->log_young), "Pa") + " (" + stiffest->name +
                        "), more than their intervals allow. The object is not the same everywhere, or a contact point or "
                        "support is wrong; look at E by push."});
   }
@@ -277,8 +278,8 @@ void judge_equilibrium(const VerdictInput& in, std::vector<Verdict>& out) {
 Verdict partly_seen(const ShapeDoubt& doubt) {
   const std::optional<ShapeEffect>& effect = doubt.effect;
   std::string said = number(100 * doubt.unseen_share, "{:.0f}") + " % of the object's surface was not seen, and is a guess. ";
-  said += effect ? "Between the shapes that may stand there E goes from " + number(effect->softest_pa) + " to " +
-                       number(effect->stiffest_pa) + " Pa; the interval counts that as its part `unseen side` of the budget. "
+  said += effect ? "Between the shapes that may stand there E goes from " + quantity(effect->softest_pa, "Pa") + " to " +
+                       quantity(effect->stiffest_pa, "Pa") + "; the interval counts that as its part `unseen side` of the budget. "
                  : "What that does to E could not be found out: the interval does not hold it. ";
   return {"partly_seen", said + "A view from another side makes it smaller."};
 }

@@ -3,18 +3,14 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include "palpate/core/identification.hpp"
+#include "palpate/core/quantity.hpp"
 
 namespace palpate::report {
 
-/// "20.3 kPa", "1.24 mm", "0.450", "12.0 N". SI units in (Pa, m, N, s, rad, kg/m3, "" for a bare number); Pa and m get the
-/// prefix that fits. `resolution` (same unit) is the smallest difference worth printing; 0 prints three significant digits.
-std::string quantity(double value, std::string_view unit, double resolution = 0);
-
-/// "19.9 to 20.7 kPa", both ends with the same prefix and digits.
-std::string interval(double lower, double upper, std::string_view unit);
+using palpate::interval;
+using palpate::quantity;
 
 /// "Young's modulus", "Poisson ratio", ... with the region in brackets where there is one.
 std::string parameter_title(const Parameter& parameter);

@@ -189,6 +189,77 @@ TEST(NextPush, ASequenceNeverGetsWorseAndForceScaleIsNotAveragedOut) {
   EXPECT_LT(after.log_young_std, 0.02);
 }
 
+TEST(NextPush, WithTheRatioOfTwoHalvesKnownAPushSaysWhatItSaysOfOneMaterial) {
+  Recording scene = block_on_table();
+  Region left, right;
+  left.name = "left", left.select = RegionSelection::box;
+  left.box_min_m = Vec3(-1, -1, -1), left.box_max_m = Vec3(0.04, 1, 1);
+  right.name = "right";
+  scene.regions = {left, right};
+  const SimulatedObject whole = block_object(1);
+  SimulatedObject halves = whole;
+  in_regions(halves, scene.regions);
+  const auto candidates = block_candidates(6, 1);
+  const SensorPlan sensors = block_sensors(whole.surface.rest());
+  const Knowledge nothing = before_touch(scene, true_young_pa);
+  ASSERT_EQ(nothing.regions.size(), 2u);
+  const PushRanking apart = rank_pushes(scene, halves, "pad", candidates, sensors, nothing, {});
+  const PushRanking alike = ranked(candidates, untouched(), PushGoal::both);
+  ASSERT_EQ(apart.pushes.size(), alike.pushes.size());
+  int pressed[2] = {0, 0};
+  for (const RatedPush& push : apart.pushes) {
+    ++pressed[push.region];
+    EXPECT_EQ(push.region, push.candidate.contact_m.x() > 0.04 ? 1 : 0);
+    // The half that is pressed is known better, the other hardly.
+    EXPECT_LT(push.expected.region_log_young_std(push.region), push.expected.region_log_young_std(1 - push.region));
+    const auto same = std::find_if(alike.pushes.begin(), alike.pushes.end(), [&](const RatedPush& other) {
+      return other.candidate.contact_m == push.candidate.contact_m && other.candidate.direction == push.candidate.direction && other.steps == push.steps;
+    });
+    ASSERT_NE(same, alike.pushes.end());
+    EXPECT_NEAR(push.force_n, same->force_n, 1e-6 * same->force_n);
+    const std::vector<Index> known{0, 1, 3};
+    const MatrixX information = push.information(known, known);
+    EXPECT_LT((information - same->information).norm(), 1e-4 * same->information.norm());
+  }
+  EXPECT_GT(pressed[0], 0);
+  EXPECT_GT(pressed[1], 0);
+
+  // An answer that tells the parts apart otherwise cannot be built on, one that tells none apart can.
+  Knowledge other = nothing;
+  other.regions = {"top", "bottom"};
+  EXPECT_THROW(rank_pushes(scene, halves, "pad", candidates, sensors, other, {}), Error);
+  const PushRanking as_one = rank_pushes(scene, halves, "pad", candidates, sensors, untouched(), {});
+  EXPECT_NEAR(as_one.pushes.front().expected.volume, alike.pushes.front().expected.volume, 1e-9 * alike.pushes.front().expected.volume);
+}
+
+TEST(NextPush, WhatIsKnownOfRegionsComesBackOutOfAnAnswer) {
+  Recording scene = block_on_table();
+  Identification answer;
+  for (const char* region : {"head", "", "belly"}) {
+    Parameter one{*region != 0 ? "young_modulus" : "poisson_ratio", region, ""};
+    one.value = *region == 0 ? 0.3 : *region == 'h' ? 3e4 : 2e4;
+    answer.parameters.push_back(one);
+  }
+  answer.covariance.resize(3, 3);
+  answer.covariance << 0.04, -0.001, 0.01, -0.001, 0.0025, -0.002, 0.01, -0.002, 0.09;
+  const Knowledge known = after_fit(scene, answer);
+  EXPECT_EQ(known.regions, (std::vector<std::string>{"head", "belly"}));
+  EXPECT_NEAR(known.young_modulus_of(1), 2e4, 1e-6);
+  const ExpectedSpread spread = expected_after(known, {});
+  EXPECT_NEAR(spread.region_log_young_std(0), 0.2, 1e-9);
+  EXPECT_NEAR(spread.region_log_young_std(1), 0.3, 1e-9);
+  EXPECT_NEAR(spread.log_young_std, 0.3, 1e-9);
+  EXPECT_NEAR(spread.poisson_std, 0.05, 1e-9);
+  EXPECT_NEAR(spread.volume, std::sqrt(answer.covariance.determinant()), 1e-9);
+  // The force's scale is one for both: a push that tells of it alone narrows both, to what is left.
+  RatedPush weighed;
+  weighed.information = MatrixX::Zero(4, 4);
+  weighed.information(3, 3) = 1e12;
+  const ExpectedSpread scaled = expected_after(known, {&weighed});
+  EXPECT_NEAR(std::pow(scaled.region_log_young_std(0), 2), 0.04 - 1e-4, 1e-7);
+  EXPECT_NEAR(std::pow(scaled.region_log_young_std(1), 2), 0.09 - 1e-4, 1e-7);
+}
+
 TEST(NextPush, BadPlansAreRefused) {
   EXPECT_THROW(push_goal("density"), Error);
   EXPECT_THROW(before_touch(block_on_table(), 0), Error);

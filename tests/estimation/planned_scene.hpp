@@ -9,6 +9,7 @@
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/next_push.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/geometry/ray_subset.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
@@ -38,6 +39,11 @@ inline Recording block_on_table() {
 inline SimulatedObject block_object(int refinement) {
   const TetMesh mesh = kuhn_block(5 * refinement, 5 * refinement, 4 * refinement, soft_block_m);
   return simulated(fem::to_quadratic(mesh), "linear");
+}
+
+inline void in_regions(SimulatedObject& object, const std::vector<Region>& regions) {
+  object.region = fem::regions_of(object.mesh, regions);
+  for (const Region& region : regions) object.region_names.push_back(region.name);
 }
 
 /// Rays of a camera at `eye_m` that meet the surface, a bundle of n x n over the block.

@@ -87,6 +87,44 @@ TEST(TargetPlan, IsAsShortAsTheShortestOfAllCombinations) {
   EXPECT_GE(longest, 4) << "else nothing was asked";
 }
 
+TEST(TargetPlan, WithThreeRegionsItIsAsShortAsTheShortestOfAllCombinations) {
+  // (log E of the first, nu, two log ratios, force scale); a push tells of the stiffness of one region, and of nu.
+  Knowledge known;
+  known.regions = {"head", "belly", "back"};
+  known.log_ratio = VectorX::Zero(2);
+  known.information = MatrixX::Zero(5, 5);
+  known.information.diagonal() << 1e-3, 12 / (0.5 * 0.5), 0.19, 0.19, 1e4;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  int longest = 0, missed = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    std::vector<RatedPush> pushes;
+    for (int i = 0; i < 7; ++i) {
+      RatedPush push;
+      push.region = i % 3;
+      push.information = MatrixX::Zero(5, 5);
+      const double young_std = 0.02 * std::exp(uniform(random)), poisson_std = 0.01 * std::exp(2 * uniform(random));
+      VectorX row = VectorX::Zero(5);
+      row(0) = 1;
+      if (push.region > 0) row(1 + push.region) = 1;
+      push.information = row * row.transpose() / (young_std * young_std);
+      push.information(1, 1) = 1 / (poisson_std * poisson_std);
+      pushes.push_back(push);
+    }
+    const SpreadTarget target{0.04 + 0.04 * uniform(random), 0.015 + 0.01 * uniform(random)};
+    const TargetPlan plan = plan_for_target(known, pushes, target, 7);
+    const int best = fewest(known, pushes, target, 7);
+    const int found = plan.reached ? static_cast<int>(plan.order.size()) : 0;
+    if (best > 0) {
+      EXPECT_LE(found, best + 1) << "trial " << trial;
+    }
+    missed += found != best;
+    longest = std::max(longest, best);
+  }
+  EXPECT_LE(missed, 2);
+  EXPECT_GE(longest, 5) << "else nothing was asked";
+}
+
 TEST(TargetPlan, OutOfReachItComesAsNearAsItCan) {
   const std::vector<RatedPush> pushes{push_of(0.03, 0.025), push_of(0.015, 0.3)};
   Knowledge coarse = nearly_nothing();

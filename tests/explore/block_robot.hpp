@@ -14,7 +14,9 @@ namespace palpate {
 
 class BlockRobot : public acquisition::Robot {
  public:
-  explicit BlockRobot(unsigned seed) : random_(seed), truth_(estimation::block_object(2)) {
+  /// @param harder  the half beyond the middle is so many times as stiff; 1: it is one material, and nobody asks
+  explicit BlockRobot(unsigned seed, double harder = 1) : random_(seed), truth_(estimation::block_object(2)), harder_(harder) {
+    if (harder != 1) estimation::in_regions(truth_, halves());
     for (int k = 0; k < 3; ++k) bias_n_(k) = 0.2 * normal_(random_);
     camera_.camera = {120, 100, 320, 320, 59.5, 49.5, DistortionModel::none, {}};
     camera_.noise.sigma_m = 1e-3;
@@ -27,9 +29,21 @@ class BlockRobot : public acquisition::Robot {
     tip_.translation() = Vec3(0.04, 0.04, 0.2);
   }
 
+  static std::vector<Region> halves() {
+    Region near;
+    near.name = "near";
+    near.select = RegionSelection::box;
+    near.box_min_m = Vec3(-1, -1, -1);
+    near.box_max_m = Vec3(0.5 * estimation::soft_block_m.x(), 1, 1);
+    Region far;
+    far.name = "far";
+    return {near, far};
+  }
+
   /// The scene as a person would write it down.
-  static Recording scene() {
+  Recording scene() const {
     Recording scene = estimation::block_on_table();
+    if (harder_ != 1) scene.regions = halves();
     scene.name = "block";
     scene.rest.volume = estimation::kuhn_block(5, 5, 4, estimation::soft_block_m);
     scene.environment.planes = {Plane{}};
@@ -105,6 +119,7 @@ class BlockRobot : public acquisition::Robot {
     VectorX at = unknowns.prior_mean();
     at(estimation::log_young) = std::log(estimation::true_young_pa);
     at(estimation::poisson) = estimation::true_poisson;
+    if (harder_ != 1) at(estimation::first_ratio) = std::log(harder_);
     const auto pressed = model.predict(0, at);
     give_m_per_n_ = pressed.travel_m(0);
     const Points moved = pressed.surface_m - truth_.surface.rest().vertices_m;
@@ -115,6 +130,7 @@ class BlockRobot : public acquisition::Robot {
   std::mt19937 random_;
   std::normal_distribution<double> normal_;
   estimation::SimulatedObject truth_;
+  double harder_;
   Vec3 bias_n_, contact_m_ = Vec3::Zero(), direction_ = -Vec3::UnitZ();
   DepthFrame camera_;
   Pose tip_ = Pose::Identity();
