@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "geometry/shapes.hpp"
 #include "palpate/io/recording.hpp"
@@ -65,6 +67,33 @@ class Suggest : public testing::Test {
   const test::TemporaryFolder files_{"suggest"};
   const std::string folder_ = (files_ / "box").string();
 };
+
+TEST_F(Suggest, OfAnObjectInRegionsEveryPushSaysWhichOfThemItPresses) {
+  Recording halves = box_on_table();
+  Region left, right;
+  left.name = "left";
+  left.select = RegionSelection::box;
+  left.box_min_m = Vec3(0, -1, -1);
+  left.box_max_m = Vec3(0.55, 1, 1);
+  right.name = "right";
+  halves.regions = {left, right};
+  const std::string folder = (files_ / "halves").string();
+  io::write_recording(halves, folder);
+  const Answer answer = suggest(folder, "--young-modulus-within 0.1 --poisson-ratio-within 0.05");
+  ASSERT_EQ(answer.exit_code, 0);
+  EXPECT_EQ(answer.json["young_modulus_pa"].size(), 2u);
+  std::set<std::string> pressed;
+  for (const auto& push : answer.json["pushes"]) {
+    pressed.insert(push["region"].get<std::string>());
+    EXPECT_EQ(push["region"], push["contact_m"][0].get<double>() > 0.55 ? "right" : "left");
+    EXPECT_EQ(push["expected"]["region_log_young_std"].size(), 2u);
+  }
+  EXPECT_EQ(pressed, (std::set<std::string>{"left", "right"}));
+  ASSERT_TRUE(answer.json["target_reached"].get<bool>());
+  const auto& after = answer.json["sequence"].back()["expected"];
+  for (const auto& std : after["region_log_young_std"]) EXPECT_LE(std::sinh(1.96 * std.get<double>()), 0.1001) << "both E were asked for";
+  EXPECT_LE(1.96 * after["poisson_std"].get<double>(), 0.05);
+}
 
 TEST_F(Suggest, BeforeTheFirstTouchPushesAreSortedAndWithinTheLimits) {
   const Answer answer = suggest(folder_, "--for poisson-ratio --force-limit 2.5");
