@@ -19,6 +19,7 @@
 #include "estimation/random_field.hpp"
 #include "fem/calculix.hpp"
 #include "palpate/estimation/fit.hpp"
+#include "palpate/estimation/fit_on_fine_mesh.hpp"
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/linear_response.hpp"
@@ -61,10 +62,7 @@ class Scene {
     Recording pushed = with_push(shifts, 1);
     const Recording given_recording = pushed;
     object_ = build_simulated_object(pushed);
-    finer_ = estimation::finer_model(pushed, object_, fill_anew(given_recording, pushed));
-    // Columns for contacts that may have shifted serve every row.
-    estimation::Unknowns unknowns;
-    memory_.model = estimation::ForwardModel(pushed, object_, unknowns, statics_options(pushed, object_, {})).solved();
+    const estimation::FillAnew anew = fill_anew(given_recording, pushed);
     recording_ = pushed;
     recording_.pushes.clear();
 
@@ -105,6 +103,19 @@ class Scene {
     for (Index i = 0; i < all.range_m.size(); ++i)
       centre_m_ += (all.origins_m.row(i) + all.range_m(i) * all.directions.row(i)).transpose() / double(all.range_m.size());
     stride_px_ = std::max(1, static_cast<int>(stride_px_ * std::sqrt(double(all.range_m.size()) / points)));
+
+    // As identify does, once for all recordings: the mesh errs by no more than is tolerated of a clean one.
+    Draw clean = draw(rows().front(), 1);
+    estimation::FitOptions quick;
+    quick.cross_checks = quick.stresses = false;
+    estimation::fit_on_fine_mesh(clean.recording, object_, clean.inputs, quick, IdentifyOptions{}.mesh_tolerance, nullptr, {}, anew);
+    recording_ = clean.recording;
+    recording_.pushes.clear();
+    // Columns for contacts that may have shifted serve every row.
+    const Recording shifted = with_push(shifts, 1);
+    finer_ = estimation::finer_model(shifted, object_, anew);
+    estimation::Unknowns unknowns;
+    memory_.model = estimation::ForwardModel(shifted, object_, unknowns, statics_options(shifted, object_, {})).solved();
   }
 
   const SceneSpec& spec() const { return spec_; }

@@ -103,7 +103,7 @@ struct Tally {
 
 TEST(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
   const int seeds = from_environment("PALPATE_SEEDS", 3), first = from_environment("PALPATE_FIRST_SEED", 1);
-  const int fine = from_environment("PALPATE_FINE", 6), tetrahedra = from_environment("PALPATE_TRUE_TETRAHEDRA", 24000);
+  const int fine = from_environment("PALPATE_FINE", 6);
   const bool each = std::getenv("PALPATE_EACH") != nullptr;
   const char* solver = std::getenv("PALPATE_TRUTH");
   const bool noiseless = std::getenv("PALPATE_NOISELESS") != nullptr;
@@ -114,7 +114,7 @@ TEST(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
   std::printf("| scene       | row        |    |    n | 68 %%| 95 %%| pull   | bias     | rms     | bound   | stated  | rms / bound |\n");
   for (const SceneSpec& spec : scenes()) {
     if (!wanted("PALPATE_SCENE", spec.name)) continue;
-    Scene scene(spec, fine, tetrahedra);
+    Scene scene(spec, fine, from_environment("PALPATE_TRUE_TETRAHEDRA", spec.true_tetrahedra));
     scene.by_calculix = by_calculix;
     scene.noise = noiseless ? 0 : 1;
     if (each) {
