@@ -91,6 +91,7 @@ double young_std_there(const estimation::RatedPush& push) { return push.expected
 nlohmann::json vector_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 nlohmann::json json_of(const estimation::RatedPush& push, const PushScene& scene) {
+  const auto& regions = scene.simulated.region_names;
   nlohmann::json json = {
       {"contact_m", vector_json(push.candidate.contact_m)},
       {"direction", vector_json(push.candidate.direction)},
@@ -98,7 +99,7 @@ nlohmann::json json_of(const estimation::RatedPush& push, const PushScene& scene
       {"travel_m", push.travel_m},
       {"steps", push.steps},
       {"seen_share", push.seen_share},
-      {"region", scene.simulated.region_names.size() > 1 ? nlohmann::json(scene.simulated.region_names[std::size_t(push.region)]) : nlohmann::json()},
+      {"region", regions.size() > 1 ? nlohmann::json(regions[std::size_t(push.region)]) : nlohmann::json()},
       {"view", push.view < 0 ? nlohmann::json() : nlohmann::json(scene.viewpoints[std::size_t(push.view)].name)},
       {"expected", spread_json(push.expected)}};
   return json;

@@ -212,7 +212,8 @@ class Loop {
                    poisson_ratio_half_width(next.poisson_ratio) <= options_.poisson_ratio_within;
     out_.pushes.push_back(std::move(next));
     if (hooks_.on_push) hooks_.on_push(out_.pushes.back());
-    if (out_.reached) out_.message = out_.pushes.back().young_moduli.size() > 1 ? "all intervals are as narrow as was asked for" : "both intervals are as narrow as was asked for";
+    const bool two = out_.pushes.back().young_moduli.size() == 1;
+    if (out_.reached) out_.message = std::string(two ? "both" : "all") + " intervals are as narrow as was asked for";
   }
 
   Explored end(const std::string& message) {

@@ -43,7 +43,8 @@ struct Knowledge {
   std::vector<std::string> regions;                    ///< R names; empty: one stiffness everywhere
   VectorX log_ratio;                                   ///< R - 1: where information is computed
   MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, R - 1 log ratios, force scale), their priors included
-  Eigen::Vector2d uncured = Eigen::Vector2d::Zero();   ///< variance of log E (of every region) and nu that no push takes away: the mesh's and the unseen side's
+  /// Variance of log E (of every region) and nu that no push takes away: the mesh's and the unseen side's.
+  Eigen::Vector2d uncured = Eigen::Vector2d::Zero();
   bool touched = false;                                ///< false: nothing but priors, E is a guess
 
   double young_modulus_of(int region) const;  ///< Pa; 0: the first, or the whole object

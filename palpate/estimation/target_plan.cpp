@@ -119,9 +119,10 @@ class Planner {
     return !best.empty();
   }
 
-  /// Out of the pushes that would help most as one more.
+  /// Out of the pushes that would help most as one more; of a long plan there are too many pairs.
   bool exchanged_two(std::vector<std::size_t>& order) const {
-    constexpr std::size_t tried = 24;
+    constexpr std::size_t tried = 24, longest = 10;
+    if (order.size() > longest) return false;
     const MatrixX all = information(order);
     std::vector<std::pair<double, std::size_t>> helpful;
     for (std::size_t i = 0; i < pushes_.size(); ++i) helpful.emplace_back(excess(all + pushes_[i].information), i);
@@ -206,6 +207,7 @@ TargetPlan plan_for_target(const Knowledge& knowledge, const std::vector<RatedPu
   if (best.order.empty()) return best;
   take_better(planner.greedy(most, [](const ExpectedSpread& s) { return s.score(PushGoal::both); }));
   if (knowledge.regions.size() > 1) take_better(planner.shortened(best));
+  if (knowledge.regions.size() > 2) return best;  // two places are not enough
   const int to_beat = best.reached ? static_cast<int>(best.order.size()) : most;
   const TargetPlan mixed = planner.mixed(to_beat, false);
   if (mixed.reached) take_better(mixed);

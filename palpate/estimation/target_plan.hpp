@@ -24,9 +24,9 @@ struct TargetPlan {
   bool reached = false;
 };
 
-/// Tried are every push and every pair of pushes, each repeated, and two greedy orders over all of them, of an object in regions
-/// with one push less for as long as exchanges of one or two pushes keep the target; among plans of the same length the one that leaves the most room
-/// wins, and the push that says the most comes first.
+/// Tried are every push and every pair of pushes, each repeated, and two greedy orders over all of them; of an object in
+/// regions those orders with one push less, for as long as exchanges of one or two pushes keep the target. Among plans of the
+/// same length the one that leaves the most room wins, and the push that says the most comes first.
 /// @param most  longest plan; where the target is out of its reach, the plan is the greedy one that comes nearest
 /// @throws Error on targets that are not positive.
 TargetPlan plan_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,
