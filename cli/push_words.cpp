@@ -29,7 +29,8 @@ std::string push_words(const estimation::RatedPush& push, const PushScene& scene
   std::string words = fmt::format("push at ({:.4f} {:.4f} {:.4f}) along ({:+.2f} {:+.2f} {:+.2f}) up to {} (about {})",
                                   at.x(), at.y(), at.z(), along.x(), along.y(), along.z(),
                                   report::quantity(push.force_n, "N"), report::quantity(push.travel_m, "m"));
-  if (scene.simulated.region_names.size() > 1) words += ", on " + scene.simulated.region_names[std::size_t(push.region)];
+  // Of an answer with one E nobody asks where it is pressed.
+  if (push.expected.region_log_young_std.size() > 1) words += ", on " + scene.simulated.region_names[std::size_t(push.region)];
   if (push.view >= 0 && scene.viewpoints.size() > 1) words += ", seen by " + scene.viewpoints[std::size_t(push.view)].name;
   return words;
 }

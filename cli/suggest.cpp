@@ -99,7 +99,7 @@ nlohmann::json json_of(const estimation::RatedPush& push, const PushScene& scene
       {"travel_m", push.travel_m},
       {"steps", push.steps},
       {"seen_share", push.seen_share},
-      {"region", regions.size() > 1 ? nlohmann::json(regions[std::size_t(push.region)]) : nlohmann::json()},
+      {"region", push.expected.region_log_young_std.size() > 1 ? nlohmann::json(regions[std::size_t(push.region)]) : nlohmann::json()},
       {"view", push.view < 0 ? nlohmann::json() : nlohmann::json(scene.viewpoints[std::size_t(push.view)].name)},
       {"expected", spread_json(push.expected)}};
   return json;
