@@ -205,6 +205,7 @@ class ForwardModel {
   /// False: no equilibrium, and `out` says why.
   bool solve_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
                   fem::ResponseState& seen);
+  VectorX lent_start(std::size_t s) const;  // of a step that another model lent a solution of
   bool solve_contact_step(std::size_t s, Body& body, const Coefficients& c, const VectorX& unknowns, bool derivatives,
                           fem::ResponseState& seen);
   SolvedAtPtr contact_state(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives);

@@ -39,6 +39,7 @@ struct ForwardModel::SolvedAt {
   std::vector<int> columns;  // unknowns that the state's derivatives are to: the parameters, then others
   fem::ResponseState state;
 
+  bool is_lent() const { return unknowns.size() == 0; }  // not solved for here: another model's
   bool differentiated() const { return state.solution && state.solution->derivative.cols() > 0; }
   VectorX change_to(const VectorX& there) const;  // of the columns' unknowns
   /// The displacement moved along its derivatives; as it is where they would move it by more than a fifth: a straight line is no
@@ -94,6 +95,7 @@ struct ForwardModel::Coefficients {
 struct ForwardModel::Memory {
   std::shared_ptr<const SolvedAt> seen;     // nothing: not solved yet; of what lies at rest: without what its weight does
   std::shared_ptr<const SolvedAt> contact;  // as the solver has it
+  VectorX lent_m;                           // what a model on another mesh lent to begin with; empty: none did
 };
 
 struct ForwardModel::TrueForce {

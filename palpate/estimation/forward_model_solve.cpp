@@ -94,7 +94,7 @@ bool ForwardModel::solve_step(std::size_t s, Body& body, const Coefficients& c, 
   // Start from the last solution of this step, or else of the step before, moved along its derivatives.
   VectorX guess_m;
   if (memory_[s].seen) {
-    guess_m = memory_[s].seen->displacement_at(unknowns);
+    guess_m = memory_[s].seen->is_lent() ? lent_start(s) : memory_[s].seen->displacement_at(unknowns);
   } else if (s > first_step_of(worker) && steps_[s - 1].push == steps_[s].push && memory_[s - 1].seen) {
     // Little of the load is left after a retreat: nearer to rest than to the step before.
     const Coefficients before = coefficients(s - 1, body, unknowns);

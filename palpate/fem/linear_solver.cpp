@@ -69,6 +69,7 @@ struct LinearSolver::Impl {
   double known_iterations = 0;  // of the last iterative solve, 0: none yet
   double steps_left = 0;        // when conjugate gradients last stopped before the end
   double matrices = 0;          // that have been set
+  double served = 0;            // right-hand sides solved with the present matrix
 
   void need_tree() {
     if (!tree) tree = std::make_shared<const FrontTree>(build_front_tree(lower, options.block));
@@ -143,6 +144,7 @@ struct LinearSolver::Impl {
   }
 
   LinearMethod choose(double count) {
+    count += served;  // as if as many were still to come as have been: a factor may pay that never does for one alone
     if (options.indefinite) return LinearMethod::direct;
     if (options.method != LinearMethod::automatic) return options.method;
     if (lower.cols() < kAnalyseAtOnceBelow) need_tree();
@@ -231,10 +233,11 @@ struct LinearSolver::Impl {
 
   Outcome solve_iterative(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
     if (!need_rigid()) return refuse(LinearMethod::iterative);
-    // Automatic: where more steps are left than the factor would take, the factor takes over.
+    // Automatic: where more steps are left than a right-hand side's share of the factor would take, the factor takes over.
     Patience patience{.max_iterations = options.max_iterations};
     if (options.method == LinearMethod::automatic && fits(4)) {
-      patience.worth = mixed_cost(1) / (kIterationPerBlock * block_count());
+      const double count = served;
+      patience.worth = mixed_cost(count) / (count * kIterationPerBlock * block_count());
       patience.first_look = static_cast<int>(std::min(kFirstLookAtMost, std::max(patience.worth, 1.5 * expected_iterations())));
     }
     const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, patience, done);
@@ -285,6 +288,7 @@ void LinearSolver::set_matrix(const Eigen::SparseMatrix<double>& lower) {
   std::copy_n(lower.valuePtr(), lower.nonZeros(), impl.lower.valuePtr());
   impl.has_values = true;
   impl.matrices += 1;
+  impl.served = 0;
   impl.blocks_current = false;
   impl.factor_state = impl.small_state = impl.rigid_state = Impl::State::stale;
 }
@@ -303,6 +307,7 @@ LinearSolver::Outcome LinearSolver::solve_in_place(Eigen::Ref<MatrixX> right_han
     throw Error("starting points must have the shape of the right-hand sides", "LinearSolver::solve_in_place start");
   }
   const LinearMethod method = impl.choose(static_cast<double>(right_hand_sides.cols()));
+  impl.served += static_cast<double>(right_hand_sides.cols());
   const bool automatic = impl.options.method == LinearMethod::automatic;
   Eigen::Index done = 0;
   Outcome outcome;

@@ -201,6 +201,24 @@ TEST(LinearSolver, AutomaticTakesTheFactorForSmallSystemsAndManyLoads) {
   EXPECT_LT(large.residual(x.col(39)), 1e-9);
 }
 
+TEST(LinearSolver, AutomaticTakesTheFactorForLoadsThatComeOneByOne) {
+  const Cube cube(16, 0.3);
+  LinearSolver solver;
+  solver.analyse(cube.lower, cube.placement);
+  for (int matrix = 0; matrix < 2; ++matrix) {
+    solver.set_matrix(cube.lower);
+    LinearMethod used = LinearMethod::iterative;
+    int loads = 0;
+    for (; used == LinearMethod::iterative && loads < 60; ++loads) {
+      MatrixX x = cube.load;
+      used = solver.solve_in_place(x).used;
+      EXPECT_LT(cube.residual(x), 1e-9);
+    }
+    EXPECT_GT(loads, 2) << "one load alone is no reason for a factor";
+    EXPECT_NE(used, LinearMethod::iterative);
+  }
+}
+
 TEST(LinearSolver, AutomaticFallsBackOnTheFactor) {
   // Nearly incompressible and without placement: the steps run out and the factor takes over.
   const Cube cube(16, 0.4995);
