@@ -45,7 +45,7 @@ struct DepthFrame {
   double time_s = 0;
   Camera camera;
   Pose T_base_camera = Pose::Identity();
-  double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the camera's pose, per frame; it turns about where it stands
+  double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the camera's pose, per frame
   DepthImage depth_m;
   MaskImage mask;  ///< empty, or 1 where a pixel is invalid (robot, table, ...)
   bool robot_is_masked = false;  ///< the mask holds what there is of the robot to be masked; else its model and joints say it
@@ -56,7 +56,7 @@ struct PointCloud {
   Points points_m;
   Points normals;                           ///< 0 x 3 where unknown
   VectorX sigma_m;                          ///< size 1 (common) or N: standard deviation per axis
-  double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the cloud's pose, per frame; it turns about the middle of its points
+  double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the cloud's pose, per frame
 };
 
 /// Depth measurements as rays, what the likelihood along the camera ray works on.

@@ -100,6 +100,8 @@ class Scene {
     // The picture is thinned to about the wished number of points.
     lab::Random none(0);
     const RayCloud all = look(seen.vertices_m, Pose::Identity(), Vec3::Zero(), false, 1000000, none);
+    for (Index i = 0; i < all.range_m.size(); ++i)
+      centre_m_ += (all.origins_m.row(i) + all.range_m(i) * all.directions.row(i)).transpose() / double(all.range_m.size());
     stride_px_ = std::max(1, static_cast<int>(stride_px_ * std::sqrt(double(all.range_m.size()) / points)));
 
     // As identify does, once for all recordings: the mesh errs by no more than is tolerated of a clean one.
@@ -171,7 +173,7 @@ class Scene {
       const Vec3 turn = row.pose_rad * pose_random.normal3();
       Pose frame = Pose::Identity();
       if (turn.norm() > 0) frame.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
-      frame = Eigen::Translation3d(spec_.eye_m + row.pose_m * pose_random.normal3()) * frame * Eigen::Translation3d(-spec_.eye_m);
+      frame = Eigen::Translation3d(centre_m_ + row.pose_m * pose_random.normal3()) * frame * Eigen::Translation3d(-centre_m_);
 
       estimation::RayObservation seen;
       seen.rays = look(moved, frame, tip_m, pressed, points, point_random);
@@ -346,6 +348,7 @@ class Scene {
   std::unique_ptr<fem::LinearResponse> response_;
   std::unique_ptr<geometry::TriangleTree> tree_;
   Points normals_;
+  Vec3 centre_m_ = Vec3::Zero();  // of what the camera sees at rest
   int stride_px_ = 2;
 };
 

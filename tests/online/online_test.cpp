@@ -149,8 +149,7 @@ TEST_F(SeenByOneCamera, AStepThatWasBrokenOffLeavesNothingBehind) {
                  std::runtime_error);
   }
   const Identification& then = broken.add(push_.steps[3]);
-  // Both stop where a step would gain less than a hundredth of a standard deviation or two.
-  EXPECT_NEAR(then.parameters.at(0).value, expected, 0.03 * then.parameters.at(0).std);
+  EXPECT_NEAR(then.parameters.at(0).value, expected, 0.02 * then.parameters.at(0).std);
 }
 
 /// A force that is imposed is no observation of it.

@@ -35,7 +35,9 @@ class RayTerm : public Term {
         rest_tree_(std::move(rest)),
         rest_(rest_tree_->mesh()),
         hints_(static_cast<std::size_t>(rays_.range_m.size()), -1) {
-    eye_m_ = rays_.origins_m.colwise().mean();
+    centre_m_ = rest_.vertices_m.colwise().mean();
+    pivot_m_ = (rays_.origins_m.colwise().sum().transpose() + rays_.directions.transpose() * rays_.range_m) /
+               static_cast<double>(rays_.range_m.size());
     typical_ = rays_.sigma_m.mean();
     one_eye_ = (rays_.origins_m.rowwise() - rays_.origins_m.row(0)).isZero(0);
   }
@@ -170,10 +172,10 @@ class RayTerm : public Term {
   bool needs_surface_derivatives() const override { return scatter_ >= 0; }
 
  private:
-  /// What every frame of the camera errs by: a motion along and about the camera's axes.
+  /// What every frame of the camera errs by: a motion along and about the camera's axes, turning about the object's middle.
   RigidMap camera_pose(const VectorX& unknowns) const {
     RigidOffset offset;
-    offset.pivot_m = eye_m_;
+    offset.pivot_m = centre_m_;
     if (camera_ >= 0) {
       offset.translation_m = R_base_camera_ * unknowns.segment<3>(camera_);
       offset.rotation_rad = R_base_camera_ * unknowns.segment<3>(camera_ + 3);
@@ -189,7 +191,7 @@ class RayTerm : public Term {
     Vec3 place(const Vec3& seen_m) const { return frame.apply(camera.apply(seen_m)); }
   };
   Sight look(const Points& surface_m, const VectorX& unknowns, const TermView& view) const {
-    Sight out{frame_pose(unknowns, pose_, eye_m_), camera_pose(unknowns), {}};
+    Sight out{frame_pose(unknowns, pose_, pivot_m_), camera_pose(unknowns), {}};
     out.rotation = out.frame.rotation() * out.camera.rotation();
     if (!view.along_rays || !one_eye_) return out;
     std::vector<char> skipped;
@@ -363,7 +365,7 @@ class RayTerm : public Term {
   int pose_, camera_;
   double least_cosine_;
   int bias_, scatter_;
-  Vec3 eye_m_ = Vec3::Zero();  // a camera's pose errs about where it stands: a turn moves what is far away
+  Vec3 pivot_m_ = Vec3::Zero(), centre_m_;
   double typical_ = 0;
   bool one_eye_ = false;  // all rays start at one point
   std::shared_ptr<const geometry::TriangleTree> rest_tree_;
