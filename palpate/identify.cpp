@@ -40,12 +40,6 @@ constexpr Index masked_a_step = 1500;  // points under the masks that are kept f
 constexpr double most_unseen = 0.1;    // of a surface: beyond that, what the rest may look like is part of the interval
 constexpr double rays_a_frame = 6000;  // beyond that, noise is not what limits E: neighbouring pixels err together
 
-/// Steeper than the removal of edges leaves alone no ray counts.
-void trust_what_stays(const DepthFrame& frame, estimation::RayObservation& seen) {
-  if (seen.rays.range_m.size() == 0) return;
-  seen.least_cosine = std::max(estimation::grazing_cosine, std::cos(sensing::trusted_incidence_rad(frame, seen.rays.range_m.mean())));
-}
-
 /// Every n-th row and column of an image, so that some thousand rays are left.
 RayCloud thinned_rays(const DepthFrame& frame) {
   sensing::BackProjectionOptions options;
@@ -349,7 +343,6 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
           terms.push_back(estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad,
                                                      frame->noise.bias_std_m, sensing::lens_scatter(*frame), cameras[frame_number++],
                                                      frame->T_base_camera.linear()});
-          trust_what_stays(*frame, std::get<estimation::RayObservation>(terms.back()));
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
           terms.push_back(*cloud);
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {

@@ -14,7 +14,8 @@ struct BackProjectionOptions {
   double max_depth_m = 10.0;         ///< farther ones are invalid
   int stride_px = 1;                 ///< keep every n-th row and column (all of them serve normals and edges)
   bool remove_edges = true;          ///< drop pixels at depth edges, where flying pixels live
-  double edge_sigmas = 4.0;          ///< neighbours differing by more than this many standard deviations are an edge ...
+  double edge_sigmas = 4.0;          ///< neighbours that differ by more than this many standard deviations from what the surface
+                                     ///< around them says are an edge ...
   double edge_incidence_rad = 1.4;   ///< ... unless a surface seen at this angle to its normal explains the difference
   int edge_margin_px = 1;            ///< and this many pixels around an edge go too
   bool remove_hole_borders = false;  ///< drop pixels beside missing data as well (sensors that smear around holes)
@@ -41,16 +42,8 @@ Points normals(const DepthFrame& frame, const MaskImage& invalid, const BackProj
 /// 0 where there is none, or too few different depths to tell.
 double depth_step_m(const DepthImage& depth_m);
 
-/// How steeply a surface may be seen, rad between ray and normal, before its own noise decides which of its pixels count as depth
-/// edges and go: those that stay are then too near on average, by 0.1 (D435, beyond 75 degrees) to 0.5 (Kinect, beyond 75)
-/// standard deviations for the lab's ball. A step between neighbours and one and a half standard deviations of it stay below what
-/// counts as an edge there; between 45 and 75 degrees.
-/// @param depth_m  where the surface is
-/// @throws Error as invalid_pixels does.
-double trusted_incidence_rad(const DepthFrame& frame, double depth_m, const BackProjectionOptions& options = {});
-
 /// Valid pixels as rays in the base frame, with the standard deviation along the ray from the sensor's noise model at that
-/// depth and incidence, and from the rounding to whole steps (a step over the root of 12).
+/// depth and incidence, as a pixel's neighbours tell them, and from the rounding to whole steps (a step over the root of 12).
 /// @param normals_base  if given: filled with one unit normal a ray (base frame, facing the camera)
 /// @throws Error as invalid_pixels does.
 RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& options = {}, Points* normals_base = nullptr);

@@ -86,6 +86,20 @@ double axial_sigma_m(const DepthNoise& noise, const DepthNoiseInput& input) {
   return std::hypot(constant ? noise.sigma_m : depth_noise_model(noise.model).axial_sigma_m(input), noise.shared_std_m);
 }
 
+DepthSigma::DepthSigma(const DepthNoise& noise, double focal_px)
+    : constant_m_(noise.sigma_m), shared_m_(noise.shared_std_m), focal_px_(focal_px) {
+  axial_sigma_m(noise, {1.0, 0.0, focal_px});  // throws when it cannot be told
+  if (noise.model != "constant") model_ = &depth_noise_model(noise.model);
+}
+
+double DepthSigma::at(double depth_m, double slope) const {
+  const DepthNoiseInput input{depth_m, slope == 0 ? 0 : std::atan(std::abs(slope)), focal_px_};
+  double squared = square(model_ != nullptr ? model_->axial_sigma_m(input) : constant_m_) + square(shared_m_);
+  if (slope != 0 && model_ != nullptr && model_->lateral_sigma_px != nullptr)
+    squared += square(model_->lateral_sigma_px(input) * depth_m / focal_px_ * slope);
+  return std::sqrt(squared);
+}
+
 double stereo_sigma_m(double depth_m, double focal_px, double baseline_m, double disparity_sigma_px) {
   return square(depth_m) * disparity_sigma_px / (focal_px * baseline_m);
 }

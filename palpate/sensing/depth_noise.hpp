@@ -35,6 +35,20 @@ const DepthNoiseModel& depth_noise_model(std::string_view name);
 /// @throws Error when `constant` has no positive sigma_m, or for an unknown model.
 double axial_sigma_m(const DepthNoise& noise, const DepthNoiseInput& input);
 
+/// Noise of one camera's depths, its model looked up once.
+class DepthSigma {
+ public:
+  /// @throws Error as axial_sigma_m does.
+  DepthSigma(const DepthNoise& noise, double focal_px);
+  /// Standard deviation along the optical axis, m, of a depth on a surface that falls by `slope` (metres of depth a metre aside).
+  /// A sample that belongs to a point beside the pixel's centre is off by the slope times that distance.
+  double at(double depth_m, double slope = 0) const;
+
+ private:
+  double constant_m_ = 0, shared_m_ = 0, focal_px_ = 0;
+  const DepthNoiseModel* model_ = nullptr;  // nullptr: constant
+};
+
 /// Stereo law: sigma_z = z^2 s / (f B) for a disparity error of `disparity_sigma_px`.
 double stereo_sigma_m(double depth_m, double focal_px, double baseline_m, double disparity_sigma_px);
 

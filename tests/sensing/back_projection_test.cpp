@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include "palpate/core/error.hpp"
@@ -144,6 +145,41 @@ TEST(BackProjection, NormalsFollowASphere) {
   }
   EXPECT_LT(mean, 0.02);
   EXPECT_LT(worst, 0.5);
+}
+
+// Errors of one sign would count more than those of the other: most of all at the outline, where a pixel tips its own plane.
+TEST(BackProjection, APixelsWeightDoesNotKnowItsOwnNoise) {
+  DepthFrame frame = empty_frame();
+  frame.noise = {"realsense_d435", NAN, 0};
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0, 0.002F);
+  const Vec3 centre(0, 0, 0.8);
+  const double radius = 0.2;
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      const Vec3 ray = unproject(frame.camera, Vec2(column, row))->normalized();
+      const double along = ray.dot(centre), under = along * along - centre.squaredNorm() + radius * radius;
+      if (under > 0) frame.depth_m(row, column) = float((along - std::sqrt(under)) * ray.z()) + noise(random);
+    }
+  const RayCloud before = back_project(frame);
+  const auto sigma_of = [](const RayCloud& rays, int row, int column) -> std::optional<double> {
+    for (Index i = 0; i < rays.pixel.rows(); ++i)
+      if (rays.pixel(i, 0) == column && rays.pixel(i, 1) == row) return rays.sigma_m(i);
+    return std::nullopt;
+  };
+  int checked = 0;
+  for (Index i = 0; i < before.pixel.rows(); i += 37) {
+    const int column = before.pixel(i, 0), row = before.pixel(i, 1);
+    for (const float error_m : {-0.002F, 0.002F}) {
+      DepthFrame other = frame;
+      other.depth_m(row, column) += error_m;
+      const auto sigma_m = sigma_of(back_project(other), row, column);
+      if (!sigma_m) continue;  // an edge to its neighbours then
+      EXPECT_EQ(*sigma_m, before.sigma_m(i)) << row << " " << column;
+      ++checked;
+    }
+  }
+  EXPECT_GT(checked, 100);
 }
 
 TEST(BackProjection, FlyingPixelsAtAStepAreRemovedAndNothingElse) {

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/grazing.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
 #include "palpate/geometry/ray_bundle.hpp"
 
@@ -29,7 +30,6 @@ class RayTerm : public Term {
         R_base_camera_(observation.R_base_camera),
         pose_(pose),
         camera_(camera),
-        least_cosine_(observation.least_cosine),
         bias_(bias),
         scatter_(scatter),
         rest_tree_(std::move(rest)),
@@ -85,7 +85,7 @@ class RayTerm : public Term {
         if (const auto hit = cast(sight, predicted.surface_m, i, origin_m, direction)) {
           const Vec3 normal = face_normal(predicted.surface_m, hit->triangle);
           const double cosine = normal.dot(direction);
-          rows.facing(i) = std::abs(cosine) / least_cosine_;
+          rows.facing(i) = std::abs(cosine) / grazing_cosine;
           if (chosen || rows.facing(i) > 1) {
             triangle = hit->triangle;
             barycentric = hit->barycentric;
@@ -263,7 +263,7 @@ class RayTerm : public Term {
       Index& facet = facet_of[static_cast<std::size_t>(hit->triangle)];
       if (facet < 0) facet = add_facet(predicted.surface_m, hit->triangle, sight, facets);
       const double cosine = facets.normal.row(facet).dot(direction);
-      rows.facing(i) = std::abs(cosine) / least_cosine_;
+      rows.facing(i) = std::abs(cosine) / grazing_cosine;
       if (!chosen && !(rows.facing(i) > 1)) continue;
       const double along = 1 / (std::copysign(std::max(std::abs(cosine), steepest_cosine), cosine) * rays_.sigma_m(i));
       facets.facet[static_cast<std::size_t>(i)] = facet;
@@ -363,7 +363,6 @@ class RayTerm : public Term {
   LensScatter lens_;
   Mat3 R_base_camera_;
   int pose_, camera_;
-  double least_cosine_;
   int bias_, scatter_;
   Vec3 pivot_m_ = Vec3::Zero(), centre_m_;
   double typical_ = 0;

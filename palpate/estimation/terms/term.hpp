@@ -13,7 +13,6 @@
 #include "palpate/core/lens_scatter.hpp"
 #include "palpate/core/recording.hpp"
 #include "palpate/estimation/forward_model.hpp"
-#include "palpate/estimation/grazing.hpp"
 #include "palpate/estimation/shared_noise.hpp"
 #include "palpate/estimation/unknowns.hpp"
 
@@ -30,7 +29,6 @@ struct RayObservation {
   /// that carries the camera in the other, and the images tell which.
   std::string camera = {};
   Mat3 R_base_camera = Mat3::Identity();
-  double least_cosine = grazing_cosine;  ///< between ray and normal: below it a ray has no say
 };
 
 using TermInput = std::variant<RayObservation, PointCloud, Markers, ToolTravel, Wrench>;
