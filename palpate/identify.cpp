@@ -239,6 +239,7 @@ reconstruction::BuiltObject build_from_views(const Recording& recording, const r
   const auto build = [&](bool smooth) {
     sensing::ObserveOptions observing;
     observing.back_projection.smooth = smooth;
+    observing.back_projection.blind_to_own_noise = false;
     std::vector<PointCloud> clouds;
     for (const DepthFrame& view : images) {
       Points normals;

@@ -122,12 +122,13 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
     for (int column = 0; column < invalid.cols(); column += options.stride_px) {
       if (invalid(row, column)) continue;
       const auto [plane, of_neighbours] = fit.at(row, column);
-      if (!plane.found() || !of_neighbours.found()) continue;
+      const FittedPlane& judge = options.blind_to_own_noise ? of_neighbours : plane;
+      if (!plane.found() || !judge.found()) continue;
       const Vec3 ray = directions.row(Eigen::Index(row) * invalid.cols() + column);
       const double stretch = ray.norm();  // range = stretch * depth
-      const double cosine = std::min(1.0, -of_neighbours.normal.dot(ray) / stretch);
+      const double cosine = std::min(1.0, -judge.normal.dot(ray) / stretch);
       if (cosine < min_cosine) continue;
-      const double sigma_m = std::hypot(sigma.at(of_neighbours.depth_m, std::tan(std::acos(cosine))), rounding_m);
+      const double sigma_m = std::hypot(sigma.at(judge.depth_m, std::tan(std::acos(cosine))), rounding_m);
       const double depth_m = options.smooth ? plane.depth_m : frame.depth_m(row, column);
       hits.push_back({row, column, ray / stretch, plane.normal, depth_m * stretch, sigma_m * stretch});
     }

@@ -17,6 +17,10 @@ struct BackProjectionOptions {
   double edge_sigmas = 4.0;          ///< neighbours that differ by more than this many standard deviations from what the surface
                                      ///< around them says are an edge ...
   double edge_incidence_rad = 1.4;   ///< ... unless a surface seen at this angle to its normal explains the difference
+  /// A pixel's weight, and whether it stays, are told by its neighbours and not by its own depth, a surface's fall is taken off
+  /// before edges are judged, and a slope's own noise is allowed for: those that stay are right on average, which a likelihood
+  /// needs. Otherwise more of those that mix two surfaces go, which shapes need.
+  bool blind_to_own_noise = true;
   int edge_margin_px = 1;            ///< and this many pixels around an edge go too
   bool remove_hole_borders = false;  ///< drop pixels beside missing data as well (sensors that smear around holes)
   int normal_radius_px = 3;          ///< half width of the window that normals are fitted in

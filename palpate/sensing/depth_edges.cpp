@@ -36,11 +36,13 @@ class EdgeTest {
         sigma_(frame.noise, frame.camera.fx_px),
         sigmas_(options.edge_sigmas * std::sqrt(2.0)),
         steepest_(std::tan(options.edge_incidence_rad)),
+        blind_(options.blind_to_own_noise),
         spacing_(1 / std::min(frame.camera.fx_px, frame.camera.fy_px)) {}
 
   bool differ(int row, int column, int other_row, int other_column) const {
     const double a = frame_.depth_m(row, column), b = frame_.depth_m(other_row, other_column);
     const double near_m = std::min(a, b), most_m = steepest_ * spacing_ * near_m, jump_m = b - a;
+    if (!blind_) return std::abs(jump_m) > allowed_m(near_m, 0);
     // Planes are fitted only where what they say can change the answer.
     if (std::abs(jump_m) <= allowed_m(near_m, 0) - most_m) return false;
     if (std::abs(jump_m) > allowed_m(near_m, steepest_) + most_m) return true;
@@ -70,7 +72,9 @@ class EdgeTest {
   Points directions_;
   PlaneFitter fit_;
   DepthSigma sigma_;
-  double sigmas_, steepest_, spacing_;  // spacing of pixels a metre of depth
+  double sigmas_, steepest_;
+  bool blind_;
+  double spacing_;  // of pixels, a metre of depth
 };
 
 }  // namespace

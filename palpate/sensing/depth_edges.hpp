@@ -7,9 +7,10 @@
 
 namespace palpate::sensing {
 
-/// Pixels beside a depth edge: neighbours whose depths differ by more than noise and the surface's own fall explain. What it falls
-/// by is taken off first, as the planes around both say: a limit that it uses up would be passed more often by noise of one sign,
-/// and the pixels that stay would be wrong on average. On slopes the noise is that of samples beside the pixel's centre, too.
+/// Pixels beside a depth edge: neighbours whose depths differ by more than noise and the surface's own fall explain. With
+/// options.blind_to_own_noise what it falls by is taken off first, as the planes around both say: a limit that it uses up would be
+/// passed more often by noise of one sign, and the pixels that stay would be wrong on average. And on slopes the noise is that of
+/// samples beside the pixel's centre, too.
 /// @param missing  1: no depth there, and no edge either unless options.remove_hole_borders
 MaskImage depth_edges(const DepthFrame& frame, const MaskImage& missing, const BackProjectionOptions& options);
 

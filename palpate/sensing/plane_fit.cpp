@@ -17,7 +17,7 @@ FittedPlanes PlaneFitter::at(int row, int column) const {
   const Vec3 ray = directions_.row(Index(row) * columns + column);
   FittedPlanes planes;
   if (!ray.allFinite()) return planes;
-  const double z0 = around_m(row, column);
+  const double z0 = options_.blind_to_own_noise ? around_m(row, column) : double(frame_.depth_m(row, column));
   const double noise_gate = options_.edge_sigmas * std::sqrt(2.0) * sigma_.at(z0);
   const double slope = std::tan(options_.edge_incidence_rad) * z0 / std::min(frame_.camera.fx_px, frame_.camera.fy_px);
   Mat3 normal_matrix = Mat3::Zero();

@@ -77,8 +77,9 @@ TEST_P(RimBias, RaysThatCountAreRightOnAverage) {
   EXPECT_LT(chi2, bins + 4 * std::sqrt(2.0 * bins)) << "all of them together";
   // The steepest that count tip the object's outline: 0.02 sigma moved nu by a third of its standard deviation.
   EXPECT_NEAR(errors[14].over_sigma(), 0, 0.02);
-  if (std::string_view(GetParam()) == "realsense_d435")  // a Kinect leaves too few there
+  if (std::string_view(GetParam()) == "realsense_d435") {  // a Kinect leaves too few there
     EXPECT_GT(errors[15].in_deviations(), 4) << "75 to 80 degrees: were they right, there would be no need to leave them out";
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensors, RimBias, testing::Values("realsense_d435", "kinect_v1"),
