@@ -128,7 +128,8 @@ RayCloud back_project(const DepthFrame& frame, const BackProjectionOptions& opti
       const double stretch = ray.norm();  // range = stretch * depth
       const double cosine = std::min(1.0, -judge.normal.dot(ray) / stretch);
       if (cosine < min_cosine) continue;
-      const double sigma_m = std::hypot(sigma.at(judge.depth_m, std::tan(std::acos(cosine))), rounding_m);
+      const double at_m = options.blind_to_own_noise ? judge.depth_m : double(frame.depth_m(row, column));
+      const double sigma_m = sigma.at(at_m, std::tan(std::acos(cosine)), rounding_m);
       const double depth_m = options.smooth ? plane.depth_m : frame.depth_m(row, column);
       hits.push_back({row, column, ray / stretch, plane.normal, depth_m * stretch, sigma_m * stretch});
     }

@@ -64,8 +64,7 @@ class EdgeTest {
  private:
   Vec3 ray(int row, int column) const { return directions_.row(Index(row) * frame_.depth_m.cols() + column); }
   double allowed_m(double depth_m, double slope) const {
-    const double noise_m = sigmas_ * sigma_.at(depth_m, slope), fall_m = steepest_ * spacing_ * depth_m;
-    return std::sqrt(noise_m * noise_m + fall_m * fall_m);
+    return std::hypot(sigmas_ * sigma_.at(depth_m, slope), steepest_ * spacing_ * depth_m);
   }
 
   const DepthFrame& frame_;

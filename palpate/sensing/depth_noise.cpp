@@ -92,12 +92,11 @@ DepthSigma::DepthSigma(const DepthNoise& noise, double focal_px)
   if (noise.model != "constant") model_ = &depth_noise_model(noise.model);
 }
 
-double DepthSigma::at(double depth_m, double slope) const {
+double DepthSigma::at(double depth_m, double slope, double rounding_m) const {
   const DepthNoiseInput input{depth_m, slope == 0 ? 0 : std::atan(std::abs(slope)), focal_px_};
-  double squared = square(model_ != nullptr ? model_->axial_sigma_m(input) : constant_m_) + square(shared_m_);
-  if (slope != 0 && model_ != nullptr && model_->lateral_sigma_px != nullptr)
-    squared += square(model_->lateral_sigma_px(input) * depth_m / focal_px_ * slope);
-  return std::sqrt(squared);
+  const double axial_m = std::hypot(model_ != nullptr ? model_->axial_sigma_m(input) : constant_m_, shared_m_);
+  const bool sideways = slope != 0 && model_ != nullptr && model_->lateral_sigma_px != nullptr;
+  return std::hypot(axial_m, sideways ? model_->lateral_sigma_px(input) * depth_m / focal_px_ * slope : 0, rounding_m);
 }
 
 double stereo_sigma_m(double depth_m, double focal_px, double baseline_m, double disparity_sigma_px) {

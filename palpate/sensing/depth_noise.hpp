@@ -41,8 +41,9 @@ class DepthSigma {
   /// @throws Error as axial_sigma_m does.
   DepthSigma(const DepthNoise& noise, double focal_px);
   /// Standard deviation along the optical axis, m, of a depth on a surface that falls by `slope` (metres of depth a metre aside).
-  /// A sample that belongs to a point beside the pixel's centre is off by the slope times that distance.
-  double at(double depth_m, double slope = 0) const;
+  /// A sample that belongs to a point beside the pixel's centre is off by the slope times that distance. What depths are rounded
+  /// by is added in squares.
+  double at(double depth_m, double slope = 0, double rounding_m = 0) const;
 
  private:
   double constant_m_ = 0, shared_m_ = 0, focal_px_ = 0;

@@ -25,10 +25,10 @@ FittedPlanes PlaneFitter::at(int row, int column) const {
   int count = 0;
   for (int r = std::max(0, row - radius); r <= std::min(rows - 1, row + radius); ++r)
     for (int c = std::max(0, column - radius); c <= std::min(columns - 1, column + radius); ++c) {
-      if (invalid_(r, c) || (r == row && c == column)) continue;
+      if (invalid_(r, c)) continue;
       const double z = frame_.depth_m(r, c);
       const double pixels = std::max(std::abs(r - row), std::abs(c - column));
-      if (std::abs(z - z0) > noise_gate + slope * pixels) continue;
+      if (std::abs(z - z0) > noise_gate + slope * pixels && pixels > 0) continue;
       const auto direction = directions_.row(Index(r) * columns + c);
       // Centred on the pixel: the matrix stays well conditioned for long focal lengths.
       const Vec3 base((direction.x() - ray.x()), (direction.y() - ray.y()), 1.0);
@@ -37,11 +37,13 @@ FittedPlanes PlaneFitter::at(int row, int column) const {
       right_hand_side += base / z;
       ++count;
     }
-  if (count >= options_.min_normal_pixels) planes.of_neighbours = solved(normal_matrix, right_hand_side, count, ray);
-  normal_matrix(2, 2) += 1;  // the pixel itself: nothing aside
-  right_hand_side(2) += 1 / double(frame_.depth_m(row, column));
-  ++count;
   if (count >= options_.min_normal_pixels) planes.with_pixel = solved(normal_matrix, right_hand_side, count, ray);
+  if (invalid_(row, column) == 0) {  // the pixel itself lies nothing aside
+    normal_matrix(2, 2) -= 1;
+    right_hand_side(2) -= 1 / double(frame_.depth_m(row, column));
+    --count;
+  }
+  if (count >= options_.min_normal_pixels) planes.of_neighbours = solved(normal_matrix, right_hand_side, count, ray);
   return planes;
 }
 
