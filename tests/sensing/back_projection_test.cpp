@@ -122,16 +122,20 @@ TEST(BackProjection, SmoothDepthsDoNotCurlInAtTheRim) {
   EXPECT_GT(averaged.rms_m, 0.1 * raw.rms_m);
 }
 
-TEST(BackProjection, NormalsFollowASphere) {
+DepthFrame see_sphere(const Vec3& centre_m, double radius_m) {
   DepthFrame frame = empty_frame();
-  const Vec3 centre(0, 0, 0.8);
-  const double radius = 0.2;
   for (int row = 0; row < 120; ++row)
     for (int column = 0; column < 160; ++column) {
       const Vec3 ray = unproject(frame.camera, Vec2(column, row))->normalized();
-      const double along = ray.dot(centre), under = along * along - centre.squaredNorm() + radius * radius;
+      const double along = ray.dot(centre_m), under = along * along - centre_m.squaredNorm() + radius_m * radius_m;
       if (under > 0) frame.depth_m(row, column) = float((along - std::sqrt(under)) * ray.z());
     }
+  return frame;
+}
+
+TEST(BackProjection, NormalsFollowASphere) {
+  const Vec3 centre(0, 0, 0.8);
+  const DepthFrame frame = see_sphere(centre, 0.2);
   Points normals_base;
   const RayCloud rays = back_project(frame, {}, &normals_base);
   ASSERT_GT(rays.range_m.size(), 2000);
@@ -149,18 +153,12 @@ TEST(BackProjection, NormalsFollowASphere) {
 
 // Errors of one sign would count more than those of the other: most of all at the outline, where a pixel tips its own plane.
 TEST(BackProjection, APixelsWeightDoesNotKnowItsOwnNoise) {
-  DepthFrame frame = empty_frame();
+  DepthFrame frame = see_sphere(Vec3(0, 0, 0.8), 0.2);
   frame.noise = {"realsense_d435", NAN, 0};
   std::mt19937 random(5);
   std::normal_distribution<float> noise(0, 0.002F);
-  const Vec3 centre(0, 0, 0.8);
-  const double radius = 0.2;
-  for (int row = 0; row < 120; ++row)
-    for (int column = 0; column < 160; ++column) {
-      const Vec3 ray = unproject(frame.camera, Vec2(column, row))->normalized();
-      const double along = ray.dot(centre), under = along * along - centre.squaredNorm() + radius * radius;
-      if (under > 0) frame.depth_m(row, column) = float((along - std::sqrt(under)) * ray.z()) + noise(random);
-    }
+  for (Index i = 0; i < frame.depth_m.size(); ++i)
+    if (frame.depth_m.data()[i] > 0) frame.depth_m.data()[i] += noise(random);
   const RayCloud before = back_project(frame);
   const auto sigma_of = [](const RayCloud& rays, int row, int column) -> std::optional<double> {
     for (Index i = 0; i < rays.pixel.rows(); ++i)
