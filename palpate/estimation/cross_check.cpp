@@ -8,7 +8,6 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr double contact_model_std = 0.02;  // of log E between contacts: patch and pressure are idealised
 constexpr std::size_t most_held_out = 6;    // pushes that are left out in turn
 constexpr double nearby_m = 1e-3;           // contacts of tools without a radius that are one site
 constexpr double nearly = 0.1;              // of log E: one step from the joint optimum gets a part's own to a few per mille

@@ -34,6 +34,9 @@ struct CrossChecks {
 /// @param factor  information factor of robust rows
 CrossChecks cross_check(Objective& objective, const Optimum& optimum, const Loss& loss, double factor, const OnProgress& progress);
 
+/// Of log E between contacts: patch and pressure are idealised.
+inline constexpr double contact_model_std = 0.02;
+
 /// Cochran's Q test that parts share one E: chance of differences at least as large (Cochran 1954). Each part's variance holds
 /// its own noise, what nu's uncertainty does to it apart from the others, and 2 % for the tool's contact, which no part knows.
 /// @returns 1 for fewer than two usable parts

@@ -7,8 +7,10 @@
 #include <memory>
 #include <string_view>
 
+#include "palpate/core/error.hpp"
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/fem/regions.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -63,6 +65,20 @@ Doubted doubted(const Recording& recording, const TetMesh& mesh) {
   return out;
 }
 
+/// The same object in parts around the places that were pushed. False: as it was, where there is one place, or places lie closer
+/// than elements are large.
+bool divide(SimulatedObject& object, const Recording& recording) {
+  const std::vector<Region> sites = sites_pushed(recording);
+  if (sites.empty() || !object.region_names.empty()) return false;
+  try {
+    object.region = fem::regions_of(object.mesh, sites);
+  } catch (const Error&) {
+    return false;
+  }
+  for (const Region& site : sites) object.region_names.push_back(site.name);
+  return true;
+}
+
 /// Where each of the fit's unknowns is among more of them: in the same order.
 std::vector<int> places(const Unknowns& fitted, const Unknowns& more) {
   std::vector<int> at;
@@ -74,22 +90,39 @@ std::vector<int> places(const Unknowns& fitted, const Unknowns& more) {
   return at;
 }
 
-/// Newton's step of the unknowns `moving`, and the covariance of the last `count` of them, which have no prior.
+/// Newton's step, and the covariance of the last unknowns of it.
 struct NewtonMove {
   VectorX move;
   MatrixX covariance;
 };
-std::optional<NewtonMove> step_of(const MatrixX& hessian, const VectorX& gradient, const std::vector<int>& moving,
-                                  Index count) {
-  const Eigen::LDLT<MatrixX> factorised(MatrixX(hessian(moving, moving)));
-  if (factorised.info() != Eigen::Success || !factorised.isPositive()) return std::nullopt;
-  const Index size = static_cast<Index>(moving.size());
-  NewtonMove out;
-  out.move = -factorised.solve(VectorX(gradient(moving)));
-  out.covariance = factorised.solve(MatrixX(MatrixX::Identity(size, size).rightCols(count))).bottomRows(count);
-  if (!out.move.allFinite() || !out.covariance.allFinite()) return std::nullopt;
-  return out;
-}
+
+/// Newton's steps from the optimum with more unknowns than were fitted.
+struct ScoreTests {
+  const Unknowns& unknowns;
+  MatrixX information;
+  VectorX gradient;
+  std::vector<int> moving;
+
+  /// Takes an unknown's prior off, and lets it move.
+  void free(const std::vector<int>& more) {
+    for (const int k : more) {
+      information(k, k) -= 1 / (unknowns[k].prior_std * unknowns[k].prior_std);
+      moving.push_back(k);
+    }
+  }
+  std::optional<NewtonMove> freeing(const std::vector<int>& more) const {
+    ScoreTests with = *this;
+    with.free(more);
+    const Eigen::LDLT<MatrixX> factorised(MatrixX(with.information(with.moving, with.moving)));
+    if (factorised.info() != Eigen::Success || !factorised.isPositive()) return std::nullopt;
+    const Index size = static_cast<Index>(with.moving.size()), count = static_cast<Index>(more.size());
+    NewtonMove out;
+    out.move = -factorised.solve(VectorX(gradient(with.moving)));
+    out.covariance = factorised.solve(MatrixX(MatrixX::Identity(size, size).rightCols(count))).bottomRows(count);
+    if (!out.move.allFinite() || !out.covariance.allFinite()) return std::nullopt;
+    return out;
+  }
+};
 
 }  // namespace
 
@@ -98,10 +131,12 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   const ForwardModel& fitted = objective.model();
   if (fitted.touches()) return {};
   const Doubted more = doubted(recording, fitted.object().mesh);
-  if (more.asked.empty()) return {};
+  SimulatedObject object = fitted.object();
+  const bool divided = divide(object, recording);
+  if (more.asked.empty() && !divided) return {};
   Unknowns unknowns;
   constexpr double between_ratios = 1e-3;  // of a linear body's answers: the test is no finer
-  ForwardModel model(more.recording, fitted.object(), unknowns, statics_options(recording, fitted.object(), options),
+  ForwardModel model(more.recording, object, unknowns, statics_options(recording, fitted.object(), options),
                      nullptr, between_ratios);
   model.start_from(fitted);
   Objective wider(model, inputs, unknowns);
@@ -131,37 +166,45 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
     const bool of_torque = name.rfind("torque_tare[", 0) == 0 || name.rfind("tip_offset[", 0) == 0;
     if (of_torque && std::find(moving.begin(), moving.end(), k) == moving.end()) moving.push_back(k);
   }
-  const MatrixX information = there.evaluation.information(factor);
-  const auto as_fitted = step_of(information, there.evaluation.gradient, moving, 0);
+  ScoreTests tests{unknowns, there.evaluation.information(factor), there.evaluation.gradient, moving};
+  const auto of_sites = [&]() -> std::optional<SiteStiffness> {
+    const std::vector<int> ratios = unknowns.ratios();
+    const auto step = tests.freeing(ratios);
+    if (!step || moving.front() != log_young) return std::nullopt;
+    return site_stiffness(object.region_names, there.unknowns(log_young) + step->move(0),
+                          step->move.tail(static_cast<Index>(ratios.size())), misfit * step->covariance);
+  };
+  if (divided) out.sites = of_sites();
+  // What differs from place to place is not asked of contacts and feet as well: they are asked what is left.
+  const bool apart = out.sites && out.sites->p_value < rare;
+  if (apart) tests.free(unknowns.ratios());
+  const auto as_fitted = tests.freeing({});
   if (!as_fitted) return out;
   for (std::size_t d = 0; d < more.asked.size(); ++d) {
-    std::vector<int> free = moving;
-    MatrixX hessian = information;
-    for (const std::string& name : more.unknowns[d]) {
-      for (int k = 0; k < unknowns.size(); ++k) {
-        if (unknowns[k].name != name) continue;
-        free.push_back(k);
-        hessian(k, k) -= 1 / (unknowns[k].prior_std * unknowns[k].prior_std);
-        break;
-      }
-    }
-    const Index count = static_cast<Index>(free.size() - moving.size());
-    if (count == 0) continue;
-    const auto step = step_of(hessian, there.evaluation.gradient, free, count);
+    const std::vector<int> these = unknowns.named(more.unknowns[d]);
+    const Index count = static_cast<Index>(these.size());
+    const auto step = count > 0 ? tests.freeing(these) : std::nullopt;
     if (!step) continue;
     const VectorX asked = step->move.tail(count);
     Doubt doubt = more.asked[d];
+    doubt.unknowns = these;
     doubt.chi2 = asked.dot(step->covariance.ldlt().solve(asked)) / misfit;
     doubt.size_m = count == 1 ? asked(0) : asked.norm();
     doubt.p_value = std::min(1.0, chi_square_tail(doubt.chi2, static_cast<int>(count)) * static_cast<double>(more.asked.size()));
+    const VectorX change = step->move.head(as_fitted->move.size()) - as_fitted->move;
     for (std::size_t k = 0; k < moving.size(); ++k) {
-      const Index i = static_cast<Index>(k);
-      if (moving[k] == log_young) doubt.log_young = step->move(i) - as_fitted->move(i);
-      if (moving[k] == poisson) doubt.poisson = step->move(i) - as_fitted->move(i);
+      if (moving[k] == log_young) doubt.log_young = change(static_cast<Index>(k));
+      if (moving[k] == poisson) doubt.poisson = change(static_cast<Index>(k));
     }
     out.all.push_back(doubt);
   }
   std::stable_sort(out.all.begin(), out.all.end(), [](const Doubt& a, const Doubt& b) { return a.chi2 > b.chi2; });
+  // And the other way round, where one of those is there all the same.
+  if (apart && !out.all.empty() && out.all.front().p_value < very_rare) {
+    tests.moving = moving;
+    tests.free(out.all.front().unknowns);
+    out.sites = of_sites();
+  }
   return out;
 }
 

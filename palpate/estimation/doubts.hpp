@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a recording states as exactly known and the residuals may speak against: where and how wide a tool touches, whether the
-// foot holds.
+// foot holds, that the object is the same everywhere.
 #pragma once
 
 #include <optional>
@@ -9,15 +9,20 @@
 
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/site_stiffness.hpp"
 #include "palpate/estimation/step_checks.hpp"
 
 namespace palpate::estimation {
+
+/// Chances at which a difference between parts of a recording is said, and at which something that was stated is doubted.
+inline constexpr double rare = 0.01, very_rare = 0.001;
 
 /// Another value that the residuals ask for, all else of the fit free under its priors (the score test of one added unknown).
 struct Doubt {
   enum class About { contact, tool_radius, support };
   About about = About::contact;
   std::string name;    ///< of the push, the tool or the support
+  std::vector<int> unknowns;  ///< of the wider model that asked
   double size_m = 0;   ///< contact: how far aside; tool: wider (below zero: narrower); support: how far its rim slides outwards
   double scale_m = 0;  ///< contact and tool: the tool's radius; support: radius of its rim
   double chi2 = 0;     ///< by how much it would fall
@@ -28,6 +33,7 @@ struct Doubt {
 struct Doubts {
   std::vector<Doubt> all;          ///< the one that explains most first
   std::optional<StepChange> slip;  ///< of contacts that are stated as exactly known (see contact_slip)
+  std::optional<SiteStiffness> sites;  ///< where several places were pushed and no regions are given
 };
 
 /// One evaluation at the optimum with everything unknown that is stated as exactly known, from the fit's own equilibria. Nothing is

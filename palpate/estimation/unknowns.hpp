@@ -3,6 +3,7 @@
 #pragma once
 
 #include <limits>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,20 @@ class Unknowns {
     ratios_ = static_cast<int>(regions.size());
   }
   int ratio_count() const { return ratios_; }
+  std::vector<int> ratios() const {
+    std::vector<int> all(static_cast<std::size_t>(ratios_));
+    std::iota(all.begin(), all.end(), first_ratio);
+    return all;
+  }
+  /// Indices of those of these names that there are.
+  std::vector<int> named(const std::vector<std::string>& names) const {
+    std::vector<int> found;
+    for (const auto& name : names) {
+      for (int k = 0; k < size(); ++k)
+        if ((*this)[k].name == name) found.push_back(k);
+    }
+    return found;
+  }
   /// log E, nu and the ratios: what is asked for; everything from here on is a nuisance.
   int parameter_count() const { return first_ratio + ratios_; }
   int size() const { return static_cast<int>(entries_.size()); }

@@ -133,9 +133,6 @@ void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
   }
 }
 
-/// Differences that chance makes once in a hundred recordings are said.
-constexpr double rare = 0.01;
-
 void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
   double poisson_std = 0;
   for (const auto& parameter : in.answer.parameters) {
@@ -146,6 +143,15 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
     out.push_back({"not_homogeneous",
                    "The pushes disagree even with a stiffness for each region: a region is not the same everywhere, its border "
                    "lies elsewhere, or a contact point or support is wrong."});
+  } else if (in.doubts.sites && in.doubts.sites->p_value < rare) {
+    std::string around;
+    for (std::size_t s = 0; s < in.doubts.sites->sites.size(); ++s)
+      around += (s > 0 ? ", " : "") + quantity(std::exp(in.doubts.sites->log_young(static_cast<Index>(s))), "Pa") + " around " +
+                in.doubts.sites->sites[s];
+    out.push_back({"not_homogeneous",
+                   "One E does not explain all places that were pushed: the residuals ask for about " + around +
+                       ". The object is not the same everywhere (fit each part its own E: give the regions, or `--regions by-site`), or a "
+                       "contact point or support is wrong."});
   } else if (homogeneity_p_value(in.checks.pushes, poisson_std) < rare) {
     const PartialYoung *softest = nullptr, *stiffest = nullptr;
     for (const auto& part : in.checks.pushes) {
@@ -177,9 +183,6 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
                                      "step, or press more slowly."});
   }
 }
-
-/// What one step says against the others is said where chance makes it once in a thousand recordings.
-constexpr double very_rare = 0.001;
 
 /// What is stated as exactly known, where the residuals ask for something else and it would matter for E or nu. The
 /// likeliest one is said: they explain the same residuals, and all of them would be too many.

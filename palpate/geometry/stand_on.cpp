@@ -21,6 +21,7 @@ namespace {
 
 constexpr double reach = 0.15;         // of the longest edge: faces that near the plane are laid on it
 constexpr double least_volume = 0.2;   // of an element, that it keeps
+constexpr double lowest_quality = 0.15;  // tet_quality: 9 degrees
 constexpr double outline_reach = 0.7;  // of the mean edge around a node: further it does not go out
 constexpr double beside = 0.5;         // of the longest edge: faces with a corner further beside the foot are not of it
 constexpr double sharp = 0.9;          // cosine between two pieces of the outline that meet at a corner
@@ -30,6 +31,21 @@ double signed_volume(const TetMesh& mesh, Index t) {
   return (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6;
 }
 
+double height_m(const Plane& plane, const Vec3& p) { return plane.normal.dot(p - plane.point_m); }
+
+Vec3 on(const Plane& plane, const Vec3& p) { return p - height_m(plane, p) * plane.normal; }
+
+/// Elements that a move left too little of their volume, or made worse than `least_quality` and than they were.
+std::vector<Index> worse_than(double least_quality, const TetMesh& old, const TetMesh& volume) {
+  std::vector<Index> worse;
+  for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
+    const double now = tet_quality(volume, t);
+    const bool good = now >= least_quality || now >= tet_quality(old, t);
+    if (!good || signed_volume(volume, t) < least_volume * signed_volume(old, t)) worse.push_back(t);
+  }
+  return worse;
+}
+
 /// Takes back half of a move, and half again, where it leaves an element too little of its volume, or makes one worse than
 /// `least_quality`.
 void keep_elements(const Points& before, TetMesh& volume, double least_quality) {
@@ -37,10 +53,7 @@ void keep_elements(const Points& before, TetMesh& volume, double least_quality) 
   const TetMesh old{before, volume.tetrahedra};
   for (int round = 0;; ++round) {
     std::set<Index> back;
-    for (Index t = 0; t < volume.tetrahedra.rows(); ++t) {
-      const double now = tet_quality(volume, t);
-      const bool good = now >= least_quality || now >= tet_quality(old, t);
-      if (good && signed_volume(volume, t) >= least_volume * signed_volume(old, t)) continue;
+    for (const Index t : worse_than(least_quality, old, volume)) {
       for (int k = 0; k < 4; ++k) {
         const Index i = volume.tetrahedra(t, k);
         if (volume.nodes_m.row(i) != before.row(i)) back.insert(i);
@@ -75,6 +88,27 @@ Triangles boundary_of(const TetMesh& volume) {
   return faces;
 }
 
+/// Nodes that held each other back, and each other's elements good: one after the other, nearest first, at the cost of worse
+/// elements where it must be. A foot that lost a corner is worse.
+void lay_one_by_one(const Plane& plane, const Triangles& faces, const std::set<Index>& laid, double least_quality, TetMesh& volume) {
+  std::vector<std::pair<double, Index>> off;
+  for (Index i : laid) {
+    const double off_m = std::abs(height_m(plane, volume.nodes_m.row(i)));
+    if (off_m > 1e-12) off.emplace_back(off_m, i);
+  }
+  std::sort(off.begin(), off.end());
+  for (double floor = least_quality; floor >= lowest_quality; floor *= 0.5) {
+    for (auto& [off_m, i] : off) {
+      if (off_m == 0) continue;
+      const TetMesh old = volume;
+      volume.nodes_m.row(i) = on(plane, old.nodes_m.row(i)).transpose();
+      make_room(faces, old.nodes_m, floor, volume);
+      if (worse_than(floor, old, volume).empty()) off_m = 0;
+      else volume.nodes_m = old.nodes_m;
+    }
+  }
+}
+
 /// @param least_quality  of elements, for which faces are rather left where they are
 /// @param may_lie  whether a node, at its place in the plane, may be laid on it, given the face's longest edge
 std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& volume, double least_quality,
@@ -92,11 +126,9 @@ std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& v
     for (int k = 0; along && k < 3; ++k) laid.insert(faces(t, k));
   }
   const Points before = volume.nodes_m;
-  for (Index i : laid) {
-    const Vec3 node = before.row(i);
-    volume.nodes_m.row(i) -= plane.normal.dot(node - plane.point_m) * plane.normal.transpose();
-  }
+  for (Index i : laid) volume.nodes_m.row(i) = on(plane, before.row(i)).transpose();
   settle(faces, before, volume, least_quality);
+  if (least_quality > 0) lay_one_by_one(plane, faces, laid, least_quality, volume);
   return laid;
 }
 

@@ -13,11 +13,11 @@ namespace palpate::geometry {
 /// outline of the surface's own faces in the plane, its corners first. Edges that the mesher cut off would else leave a foot
 /// that is too small (a bar then seems to be on a soft base), and a round object one that is held too far out on one side. No
 /// element loses more than four fifths of its volume.
-/// @param least_quality  tet_quality that elements keep rather than following the foot (0: only their volume counts)
+/// @param least_quality  tet_quality that elements keep (0: only their volume counts); half of it where the foot would else lose a node
 void stand_on(const Plane& plane, const TriMesh& surface, TetMesh& volume, double least_quality = 0);
 
-/// Its first half alone, for surfaces whose foot has no outline that could be trusted; no element becomes flatter than
-/// 17 degrees for it.
+/// Its first half alone, for surfaces whose foot has no outline that could be trusted; few elements become flatter
+/// than 17 degrees for it, and none than 9.
 void lay_on(const Plane& plane, TetMesh& volume, double least_quality = 0.3);
 
 /// Where a volume must be fine enough to stand on a plane: over each foot of the surface in it, edges of an eighth of the foot's

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <vector>
 
 #include "palpate/identify.hpp"
 #include "palpate/lab/robot.hpp"
@@ -36,13 +37,14 @@ Foot foot_of(const TriMesh& surface, double tolerance_m) {
 struct Bars {
   const char* object;
   double area, middle_m;
+  std::vector<std::uint64_t> seeds = {1, 2, 3};
 };
 
 class BuiltFoot : public testing::TestWithParam<Bars> {};
 
 TEST_P(BuiltFoot, IsWhereTheTrueOneIs) {
-  const auto [name, area, middle_m] = GetParam();
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  const auto& [name, area, middle_m, seeds] = GetParam();
+  for (const std::uint64_t seed : seeds) {
     LabOptions options;
     options.seed = seed;
     LabRobot robot(options, make_object(name, {}));
@@ -75,7 +77,9 @@ TEST_P(BuiltFoot, IsWhereTheTrueOneIs) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Objects, BuiltFoot, testing::Values(Bars{"ball", 0.12, 0.0015}, Bars{"cube", 0.06, 0.002}, Bars{"bear", 0.2, 0.004}),
+// Cubes 18 and 22 were left without a corner: 0.91 and 0.84 of the area, and 5 and 8 mm aside.
+INSTANTIATE_TEST_SUITE_P(Objects, BuiltFoot,
+                         testing::Values(Bars{"ball", 0.12, 0.0015}, Bars{"cube", 0.06, 0.003, {1, 2, 3, 18, 22}}, Bars{"bear", 0.2, 0.004}),
                          [](const auto& bars) { return std::string(bars.param.object); });
 
 }  // namespace

@@ -44,7 +44,7 @@ TEST_P(SeenAround, ModelIsNearTheTrueShape) {
     EXPECT_LT(off.hausdorff_m, hausdorff_m) << name << views;
     EXPECT_NEAR(check.volume_m3 / true_m3, 1, volume) << name << views;
     EXPECT_EQ(check.components, 1) << name << views;
-    EXPECT_GT(check.min_dihedral_deg, 15) << name << views;
+    EXPECT_GT(check.min_dihedral_deg, 8.6) << name << views;
     EXPECT_LT(check.max_dihedral_deg, 150) << name << views;
   }
 }
