@@ -13,14 +13,15 @@
 namespace palpate::sensing {
 namespace {
 
-// Of the pixels around one that have data.
-double median_depth_m(const DepthImage& depth_m, Eigen::Index row, Eigen::Index column, int window_px,
-                      std::vector<float>& scratch) {
+// Of the pixels around one that have data; 0 where none has. Not of itself: what stays would else know its own noise.
+double median_around_m(const DepthImage& depth_m, Eigen::Index row, Eigen::Index column, int window_px,
+                       std::vector<float>& scratch) {
   scratch.clear();
   for (Eigen::Index r = std::max<Eigen::Index>(0, row - window_px); r <= std::min(depth_m.rows() - 1, row + window_px); ++r)
     for (Eigen::Index c = std::max<Eigen::Index>(0, column - window_px); c <= std::min(depth_m.cols() - 1, column + window_px);
          ++c)
-      if (depth_m(r, c) > 0) scratch.push_back(depth_m(r, c));
+      if (depth_m(r, c) > 0 && (r != row || c != column)) scratch.push_back(depth_m(r, c));
+  if (scratch.empty()) return 0;
   const auto middle = scratch.begin() + std::ptrdiff_t(scratch.size() / 2);
   std::nth_element(scratch.begin(), middle, scratch.end());
   return *middle;
@@ -54,7 +55,7 @@ MaskImage mask_planes(const DepthFrame& frame, const std::vector<Plane>& planes,
         const double margin_m = options.margin_m + options.sigmas * sigma * std::abs(fall);
         // Only where the noise might decide, and not across a depth edge, where the neighbours show something else.
         if (options.window_px > 0 && std::abs(height - z * fall - margin_m) < 6 * sigma * std::abs(fall)) {
-          const double median = median_depth_m(frame.depth_m, row, column, options.window_px, scratch);
+          const double median = median_around_m(frame.depth_m, row, column, options.window_px, scratch);
           const double slope_m = 3 * options.window_px * z / std::min(frame.camera.fx_px, frame.camera.fy_px);
           if (std::abs(median - z) < 5 * sigma + slope_m) z = median;
         }
