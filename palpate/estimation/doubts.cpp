@@ -166,17 +166,18 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
     const bool of_torque = name.rfind("torque_tare[", 0) == 0 || name.rfind("tip_offset[", 0) == 0;
     if (of_torque && std::find(moving.begin(), moving.end(), k) == moving.end()) moving.push_back(k);
   }
-  ScoreTests tests{unknowns, there.evaluation.information(factor), there.evaluation.gradient, moving};
-  const auto of_sites = [&]() -> std::optional<SiteStiffness> {
+  const ScoreTests as_stated{unknowns, there.evaluation.information(factor), there.evaluation.gradient, moving};
+  const auto of_sites = [&](const ScoreTests& tests) -> std::optional<SiteStiffness> {
     const std::vector<int> ratios = unknowns.ratios();
     const auto step = tests.freeing(ratios);
     if (!step || moving.front() != log_young) return std::nullopt;
     return site_stiffness(object.region_names, there.unknowns(log_young) + step->move(0),
                           step->move.tail(static_cast<Index>(ratios.size())), misfit * step->covariance);
   };
-  if (divided) out.sites = of_sites();
+  if (divided) out.sites = of_sites(as_stated);
   // What differs from place to place is not asked of contacts and feet as well: they are asked what is left.
   const bool apart = out.sites && out.sites->p_value < rare;
+  ScoreTests tests = as_stated;
   if (apart) tests.free(unknowns.ratios());
   const auto as_fitted = tests.freeing({});
   if (!as_fitted) return out;
@@ -201,9 +202,9 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   std::stable_sort(out.all.begin(), out.all.end(), [](const Doubt& a, const Doubt& b) { return a.chi2 > b.chi2; });
   // And the other way round, where one of those is there all the same.
   if (apart && !out.all.empty() && out.all.front().p_value < very_rare) {
-    tests.moving = moving;
-    tests.free(out.all.front().unknowns);
-    out.sites = of_sites();
+    ScoreTests with_doubt = as_stated;
+    with_doubt.free(out.all.front().unknowns);
+    out.sites = of_sites(with_doubt);
   }
   return out;
 }
