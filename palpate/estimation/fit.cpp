@@ -90,14 +90,17 @@ void check(const FitOptions& options) {
 }
 
 fem::StaticsOptions statics_options(const Recording& recording, const SimulatedObject& object, const FitOptions& options) {
+  return statics_options(object, options, recording.model.poisson_fixed.value_or(recording.model.poisson_upper));
+}
+
+fem::StaticsOptions statics_options(const SimulatedObject& object, const FitOptions& options, double largest_poisson) {
   fem::StaticsOptions statics;
   statics.threads = options.threads;
   // A search that comes to a modulus which hardly bears the load does better to turn back than to follow it to the end.
   statics.max_load_steps = 16;
   // Quadratic tetrahedra lock mildly towards nu = 0.5 (a few per cent of E at 0.49); linear ones are left as they are, since
   // who asks for them has a reason.
-  const double largest_nu = recording.model.poisson_fixed.value_or(recording.model.poisson_upper);
-  if (object.mesh.tetrahedra.cols() == 10 && largest_nu > 0.45) statics.dilatation = fem::Dilatation::averaged;
+  if (object.mesh.tetrahedra.cols() == 10 && largest_poisson > 0.45) statics.dilatation = fem::Dilatation::averaged;
   return statics;
 }
 
@@ -307,7 +310,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     if (better == nullptr) break;
     bool corrected = MeshCorrection::applies_to(model);
     if (corrected) {
-      auto next = std::make_unique<MeshCorrection>(*better->mesh, inputs, options);
+      auto next = std::make_unique<MeshCorrection>(*better->mesh, inputs, options, optimum.unknowns(poisson));
       corrected = next->correct(objective, optimum.unknowns, loss, progress) && optimise_again() && weigh_neighbours();
       load_cases_of_meshes += next->model().load_cases();
       correction = std::move(next);

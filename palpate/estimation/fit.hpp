@@ -69,6 +69,8 @@ using Inputs = std::vector<std::vector<TermInput>>;
 
 /// How the solver is set up for a recording: threads, and the cure for locking where nu may come near 0.5.
 fem::StaticsOptions statics_options(const Recording& recording, const SimulatedObject& object, const FitOptions& options);
+/// The same where nu is known to stay below `largest_poisson`.
+fem::StaticsOptions statics_options(const SimulatedObject& object, const FitOptions& options, double largest_poisson);
 
 /// @param recording  loads, supports, priors; recording.model gives nu's prior range and whether it is fixed
 /// @param inputs     one list a step

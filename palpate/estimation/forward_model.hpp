@@ -123,7 +123,7 @@ class ForwardModel {
   std::shared_ptr<const geometry::TriangleTree> rest_tree() const;
 
   /// Solves step s. Starts from the last solution of this step, moved along its derivatives to the new unknowns.
-  /// @param derivatives  false: surface and converged only (the paper's method differentiates numerically)
+  /// @param derivatives  false: surface, readings and converged only (the paper's method differentiates numerically)
   StepPrediction predict(std::size_t s, const VectorX& unknowns, bool derivatives = true);
 
   /// The same with StepPrediction::in_span, where the surface is a sum of a linear body's fields: where nothing turns the body or
@@ -200,6 +200,9 @@ class ForwardModel {
 
   enum class Wanted { surface, derivatives, in_span, coordinates };
   StepPrediction unchanged(std::size_t s, const VectorX& unknowns, Wanted wanted);
+  /// What the tools should read, without derivatives.
+  void add_readings(std::size_t s, const Body& body, const Coefficients& c, const VectorX& unknowns, const fem::ResponseState& at,
+                    StepPrediction& out) const;
   std::optional<SpanPlace> place_in_span(std::size_t s, const Body& body, const Coefficients& c, const VectorX& unknowns) const;
   int unit_load_cases() const;
   /// False: no equilibrium, and `out` says why.
@@ -238,6 +241,8 @@ class ForwardModel {
   struct TrueForce;  // of a load: its reading without what the sensor errs by
   TrueForce true_force(std::size_t s, std::size_t l, const VectorX& unknowns) const;
   struct LoadPart;  // of one load: columns that work together
+  /// Of a patch, weighted with its pressure.
+  static Vec3 mean_motion(const std::vector<LoadPart>& parts, const fem::ResponseState& at);
   std::vector<LoadPart> load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const;
   RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;
 

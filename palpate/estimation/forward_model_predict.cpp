@@ -49,6 +49,38 @@ void ForwardModel::add_surface(std::size_t s, const VectorX& unknowns, StepPredi
   place_surface(s, unknowns, predicted.in_span->moved_m(), predicted);
 }
 
+Vec3 ForwardModel::mean_motion(const std::vector<LoadPart>& parts, const fem::ResponseState& at) {
+  Vec3 motion_m = Vec3::Zero();
+  for (const LoadPart& part : parts) motion_m += part.weight * at.conjugate_m.segment<3>(part.first);
+  return motion_m;
+}
+
+void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficients& c, const VectorX& unknowns,
+                                const fem::ResponseState& at, StepPrediction& out) const {
+  const Step& now = step(s);
+  const int tare = tare_[steps_[s].push];
+  const Vec3& tare_axis = tare_axis_[steps_[s].push];
+  const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
+  out.travel_m = VectorX::Zero(static_cast<Index>(now.loads.size()));
+  out.force_n.assign(now.loads.size(), Vec3::Zero());
+  for (std::size_t l = 0; l < now.loads.size(); ++l) {
+    const Load& load = now.loads[l];
+    const Vec3 direction = load.direction.normalized();
+    double& travel_m = out.travel_m(static_cast<Index>(l));
+    if (load.travel_m) {
+      const int m = body.motion_column.at(load.tool);
+      travel_m = c.motion(m);
+      out.force_n[l] = scale * at.reaction_n(m) * direction;
+      if (tare < 0) continue;
+      out.force_n[l] += tare_axis.norm() > 0 ? Vec3(unknowns(tare) * tare_axis) : Vec3(unknowns.segment<3>(tare));
+    } else {
+      out.force_n[l] = load.force_n.value_or(Vec3::Zero());
+      const std::vector<LoadPart> parts = load_parts(s, l, body, unknowns);
+      if (!parts.empty()) travel_m = (clamp_offset(s, unknowns).rotation().transpose() * direction).dot(mean_motion(parts, at));
+    }
+  }
+}
+
 StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, Wanted wanted) {
   const bool derivatives = wanted != Wanted::surface;
   const std::size_t worker = worker_of(s);
@@ -82,6 +114,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   } else {
     place_surface(s, unknowns, at.watched_m, out);
   }
+  add_readings(s, body, c, unknowns, at, out);
   if (!derivatives) return out;
 
   out.columns = parameter_columns();
@@ -111,13 +144,11 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     add_rigid(out.surface_m, out.d_surface);
   }
 
-  // What the tools should read.
+  // What the readings depend on.
   const std::size_t p = steps_[s].push;
   const Step& now = step(s);
   const Index loads = static_cast<Index>(now.loads.size());
-  out.travel_m = VectorX::Zero(loads);
   out.d_travel = MatrixX::Zero(loads, count);
-  out.force_n.assign(now.loads.size(), Vec3::Zero());
   out.d_force.assign(now.loads.size(), Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, count));
   const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
   for (Index l = 0; l < loads; ++l) {
@@ -126,32 +157,25 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     if (load.travel_m) {
       const Vec3 direction = load.direction.normalized();
       const int m = body.motion_column.at(load.tool);
-      const double reaction = at.reaction_n(m);
       const Eigen::RowVectorXd d_reaction = at.d_reaction.row(m);
-      out.force_n[at_load] = scale * reaction * direction;
       out.d_force[at_load] = scale * direction * d_reaction;
       for (Index k = parameters_; k < count; ++k) {
-        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += reaction * direction;
+        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += at.reaction_n(m) * direction;
+        out.d_travel(l, k) = c.d_motion(m, k - parameters_);
       }
-      out.travel_m(l) = c.motion(m);
-      for (Index k = parameters_; k < count; ++k) out.d_travel(l, k) = c.d_motion(m, k - parameters_);
     } else {
-      out.force_n[at_load] = load.force_n.value_or(Vec3::Zero());
       const std::vector<LoadPart> parts = load_parts(s, at_load, body, unknowns);
       if (parts.empty()) continue;
       const Vec3 direction = rotation.transpose() * load.direction.normalized();
-      Vec3 mean_motion_m = Vec3::Zero();
       for (const LoadPart& part : parts) {
-        const Vec3 conjugate_m = at.conjugate_m.segment<3>(part.first);
-        mean_motion_m += part.weight * conjugate_m;
         out.d_travel.row(l) += part.weight * direction.transpose() * at.d_conjugate.middleRows<3>(part.first);
         if (part.unknown < 0) continue;
         const auto own = std::find(out.columns.begin(), out.columns.end(), part.unknown);
-        out.d_travel(l, own - out.columns.begin()) += direction.dot(conjugate_m);
+        out.d_travel(l, own - out.columns.begin()) += direction.dot(at.conjugate_m.segment<3>(part.first));
       }
-      out.travel_m(l) = direction.dot(mean_motion_m);
       if (clamp_[s] < 0) continue;
       // A turned clamp turns the object under the tool's direction.
+      const Vec3 mean_motion_m = mean_motion(parts, at);
       const Mat3 turn = clamp.inverse_rotation_derivative(load.direction.normalized());
       for (Index k = parameters_; k < count; ++k) {
         const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s] - 3;
@@ -181,14 +205,13 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     if (!now.loads[l].travel_m) continue;
     if (force_scale_ >= 0 && std::find(c.columns.begin(), c.columns.end(), force_scale_) == c.columns.end()) {
       const Index at_scale = reading_column(force_scale_);
-      out.d_force[l].col(at_scale) += out.force_n[l] / scale;
+      out.d_force[l].col(at_scale) += at.reaction_n(body.motion_column.at(now.loads[l].tool)) * now.loads[l].direction.normalized();
     }
     if (tare_[p] < 0) continue;
     const bool along = tare_axis_[p].norm() > 0;
     for (int k = 0; k < (along ? 1 : 3); ++k) {
       const Index at_tare = reading_column(tare_[p] + k);
       const Vec3 axis = along ? tare_axis_[p] : Vec3(Vec3::Unit(k));
-      out.force_n[l] += unknowns(tare_[p] + k) * axis;
       out.d_force[l].col(at_tare) += axis;
     }
   }

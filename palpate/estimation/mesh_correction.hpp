@@ -16,8 +16,9 @@ class MeshCorrection {
   /// not smooth enough.
   static bool applies_to(const ForwardModel& model);
 
-  /// @param mesh  must outlive this object
-  MeshCorrection(const FinerModel& mesh, const Inputs& inputs, const FitOptions& options);
+  /// @param mesh           must outlive this object
+  /// @param poisson_ratio  about where it is corrected: far from 0.5 plain elements do on large meshes
+  MeshCorrection(const FinerModel& mesh, const Inputs& inputs, const FitOptions& options, double poisson_ratio);
 
   /// Has the objective's model corrected by what this mesh changes at `unknowns`; earlier corrections are gone.
   /// @returns false, and leaves the model as it was, where the finer mesh has no equilibrium there or the caller asked to stop

@@ -41,7 +41,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
     if (kept) *solved = model.solved();
     std::vector<StepPrediction> predicted(model.step_count());
     for (std::size_t s = 0; s < model.step_count(); ++s) {
-      if (all.steps[s] != 0) predicted[s] = model.predict(s, optimum.unknowns);
+      if (all.steps[s] != 0) predicted[s] = model.predict(s, optimum.unknowns, false);
     }
     load_cases += model.load_cases();
     return predicted;

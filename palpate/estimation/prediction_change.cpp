@@ -34,9 +34,9 @@ void PredictionChange::add_to(StepPrediction& predicted, const VectorX& unknowns
   const Points change_m = surface_m + Eigen::Map<const Points>(further_m.data(), surface_m.rows(), 3);
   predicted.surface_m += change_m;
   if (predicted.field != nullptr) predicted.material_m += change_m;
-  if (!derivatives) return;
   predicted.travel_m += travel_m + d_travel * moved;
   for (std::size_t l = 0; l < force_n.size(); ++l) predicted.force_n[l] += force_n[l] + d_force[l] * moved;
+  if (!derivatives) return;
   for (Index k = 0; k < count; ++k) {
     const auto found = std::find(predicted.columns.begin(), predicted.columns.end(), columns[std::size_t(k)]);
     if (found == predicted.columns.end()) continue;

@@ -21,6 +21,8 @@ constexpr double kSetUpPerBlock = 7e-8;                    // values, diagonal i
 constexpr double kAnalysisPerEntry = 6e-8;                 // ordering and symbolic analysis, an entry of the matrix
 constexpr double kFirstLookAtMost = 100;                   // steps; residuals may fall hardly at all before
 constexpr int kMixedIterations = 4;                        // single precision factor, up to Poisson ratios of 0.49
+constexpr int kFirstLookWithAnother = 6;                   // steps, to see how the residual falls
+constexpr double kGuessedFall = 1.5;                       // of log residual a step, with the factor of a matrix nearby
 constexpr Eigen::Index kAnalyseAtOnceBelow = 3000;         // unknowns: the exact flops are worth the ordering
 
 // Volume meshes of 900 to 600 000 unknowns under nested dissection; thin bodies need less. Quadratic tetrahedra have twice the
@@ -64,10 +66,14 @@ struct LinearSolver::Impl {
   enum class State { stale, ready, refused };
   State factor_state = State::stale, small_state = State::stale, rigid_state = State::stale;
   bool blocks_current = false;
+  enum class Another { none, single_precision, double_precision };
+  Another another = Another::none;  // factor of a matrix before
 
   double tolerance = 0;         // of the present solve
   double known_iterations = 0;  // of the last iterative solve, 0: none yet
+  int factorisations = 0;
   double steps_left = 0;        // when conjugate gradients last stopped before the end
+  double fall_with_another = kGuessedFall;  // of log residual a step, when a factor of another matrix last served
   double matrices = 0;          // that have been set
   double served = 0;            // right-hand sides solved with the present matrix
 
@@ -94,7 +100,10 @@ struct LinearSolver::Impl {
     need_tree();
     if (!factor) factor = std::make_unique<FrontFactor<double>>(tree, options.threads);
     if (factor_state == State::stale) {
+      ++factorisations;
       factor_state = factor->factorise(lower.valuePtr(), !options.indefinite) ? State::ready : State::refused;
+      another = Another::none;
+      fall_with_another = kGuessedFall;
     }
     return factor_state == State::ready;
   }
@@ -103,7 +112,10 @@ struct LinearSolver::Impl {
     need_blocks();
     if (!small_factor) small_factor = std::make_unique<FrontFactor<float>>(tree, options.threads);
     if (small_state == State::stale) {
+      ++factorisations;
       small_state = small_factor->factorise(lower.valuePtr(), true) ? State::ready : State::refused;
+      another = Another::none;
+      fall_with_another = kGuessedFall;
     }
     return small_state == State::ready;
   }
@@ -131,8 +143,15 @@ struct LinearSolver::Impl {
   double mixed_cost(double count) const {
     if (small_state == State::refused || !fits(4)) return std::numeric_limits<double>::infinity();
     const double factorisation = small_state == State::ready ? 0 : flops() / kFloatFlops + analysis_cost();
-    return factorisation +
-           count * kMixedIterations * (8.0 * panel_values() / kSweepBytes + kIterationPerBlock * block_count());
+    return factorisation + count * kMixedIterations * step_cost(8.0);
+  }
+  /// Of conjugate gradients with a factor. @param sweep_bytes  of L, an entry, both ways
+  double step_cost(double sweep_bytes) const { return sweep_bytes * panel_values() / kSweepBytes + kIterationPerBlock * block_count(); }
+  double step_cost_with_another() const { return step_cost(another == Another::double_precision ? 16.0 : 8.0); }
+  /// With the factor of a matrix before: Newton's matrices differ little from one to the next.
+  double cost_with_another(double count) const {
+    if (another == Another::none || options.indefinite) return std::numeric_limits<double>::infinity();
+    return count * std::max(1.0, std::log(1 / tolerance) / fall_with_another) * step_cost_with_another();
   }
   double expected_iterations() const {
     return known_iterations > 0 ? known_iterations : guessed_iterations(unknowns(), !placement.empty());
@@ -143,6 +162,9 @@ struct LinearSolver::Impl {
            count * expected_iterations() * kIterationPerBlock * block_count();
   }
 
+  double cost_of(LinearMethod method, double count) const {
+    return method == LinearMethod::direct ? direct_cost(count) : method == LinearMethod::mixed ? mixed_cost(count) : iterative_cost(count);
+  }
   LinearMethod choose(double count) {
     count += served;  // as if as many were still to come as have been: a factor may pay that never does for one alone
     if (options.indefinite) return LinearMethod::direct;
@@ -226,9 +248,24 @@ struct LinearSolver::Impl {
 
   Outcome solve_mixed(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
     if (!need_small_factor()) return refuse(LinearMethod::mixed);
-    FactorPreconditioner preconditioner(*small_factor, blocks->padded());
+    FactorPreconditioner<float> preconditioner(*small_factor, blocks->padded());
     const Patience patience{.max_iterations = std::min(options.max_iterations, 100)};
     return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, patience, done);
+  }
+
+  /// @param otherwise  what any other way would cost
+  Outcome solve_with_another(Eigen::Ref<MatrixX> x, const MatrixX* start, double otherwise, Eigen::Index& done) {
+    need_blocks();
+    const double worth = otherwise / (static_cast<double>(x.cols()) * step_cost_with_another());
+    const Patience patience{.max_iterations = std::max(kFirstLookWithAnother, static_cast<int>(2 * worth)),
+                            .first_look = kFirstLookWithAnother,
+                            .worth = worth};
+    const auto by = [&](auto preconditioner) { return solve_by_steps(LinearMethod::mixed, preconditioner, x, start, patience, done); };
+    const Outcome outcome = another == Another::double_precision ? by(FactorPreconditioner<double>(*factor, blocks->padded()))
+                                                                 : by(FactorPreconditioner<float>(*small_factor, blocks->padded()));
+    if (outcome.iterations > 0 && outcome.residual > 0)
+      fall_with_another = std::max(1e-3, -std::log(outcome.residual) / outcome.iterations);
+    return outcome;
   }
 
   Outcome solve_iterative(Eigen::Ref<MatrixX> x, const MatrixX* start, Eigen::Index& done) {
@@ -242,6 +279,32 @@ struct LinearSolver::Impl {
     }
     const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, patience, done);
     known_iterations = outcome.iterations + steps_left;
+    return outcome;
+  }
+
+  Outcome solve(Eigen::Ref<MatrixX> x, const MatrixX* start) {
+    const LinearMethod method = choose(static_cast<double>(x.cols()));
+    served += static_cast<double>(x.cols());
+    const bool automatic = options.method == LinearMethod::automatic;
+    Eigen::Index done = 0;
+    Outcome outcome;
+    const double otherwise = automatic ? cost_of(method, served) : 0;
+    if (cost_with_another(served) < otherwise) {
+      outcome = solve_with_another(x, start, otherwise, done);
+      if (outcome.solved || outcome.not_positive_definite) return outcome;
+    }
+    if (method == LinearMethod::iterative) {
+      outcome = solve_iterative(x, start, done);
+      if (outcome.solved || outcome.not_positive_definite || !automatic) return outcome;
+    }
+    if (method == LinearMethod::mixed || (method == LinearMethod::iterative && fits(4))) {
+      const int iterations = outcome.iterations;
+      outcome = solve_mixed(x, start, done);
+      outcome.iterations += iterations;
+      if (outcome.solved || !automatic) return outcome;
+    }
+    // Single precision may refuse a matrix that is definite in double precision.
+    if (method == LinearMethod::direct || fits(8)) outcome = solve_direct(x.rightCols(x.cols() - done));
     return outcome;
   }
 };
@@ -290,6 +353,8 @@ void LinearSolver::set_matrix(const Eigen::SparseMatrix<double>& lower) {
   impl.matrices += 1;
   impl.served = 0;
   impl.blocks_current = false;
+  if (impl.factor_state == Impl::State::ready) impl.another = Impl::Another::double_precision;
+  if (impl.small_state == Impl::State::ready) impl.another = Impl::Another::single_precision;  // half as much to read
   impl.factor_state = impl.small_state = impl.rigid_state = Impl::State::stale;
 }
 
@@ -306,25 +371,9 @@ LinearSolver::Outcome LinearSolver::solve_in_place(Eigen::Ref<MatrixX> right_han
   if (start != nullptr && (start->rows() != right_hand_sides.rows() || start->cols() != right_hand_sides.cols())) {
     throw Error("starting points must have the shape of the right-hand sides", "LinearSolver::solve_in_place start");
   }
-  const LinearMethod method = impl.choose(static_cast<double>(right_hand_sides.cols()));
-  impl.served += static_cast<double>(right_hand_sides.cols());
-  const bool automatic = impl.options.method == LinearMethod::automatic;
-  Eigen::Index done = 0;
-  Outcome outcome;
-  if (method == LinearMethod::iterative) {
-    outcome = impl.solve_iterative(right_hand_sides, start, done);
-    if (outcome.solved || outcome.not_positive_definite || !automatic) return outcome;
-  }
-  if (method == LinearMethod::mixed || (method == LinearMethod::iterative && impl.fits(4))) {
-    const int before = outcome.iterations;
-    outcome = impl.solve_mixed(right_hand_sides, start, done);
-    outcome.iterations += before;
-    if (outcome.solved || !automatic) return outcome;
-  }
-  // Single precision may refuse a matrix that is definite in double precision.
-  if (method == LinearMethod::direct || impl.fits(8)) {
-    outcome = impl.solve_direct(right_hand_sides.rightCols(right_hand_sides.cols() - done));
-  }
+  const int before = impl.factorisations;
+  Outcome outcome = impl.solve(right_hand_sides, start);
+  outcome.factorisations = impl.factorisations - before;
   return outcome;
 }
 

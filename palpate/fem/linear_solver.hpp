@@ -13,7 +13,8 @@ namespace palpate::fem {
 enum class LinearMethod {
   automatic,  ///< the cheapest by size, number of right-hand sides and what earlier solves took
   direct,     ///< factor in double precision (the only one for indefinite matrices)
-  mixed,      ///< factor in single precision and conjugate gradients: half the time and memory, full accuracy
+  mixed,      ///< factor in single precision and conjugate gradients: half the time and memory, full accuracy. Chosen
+              ///< automatically, the factor may be that of an earlier matrix as long as that takes less than a new one
   iterative,  ///< conjugate gradients with diagonal blocks and rigid motions of small aggregates
 };
 
@@ -38,6 +39,7 @@ class LinearSolver {
     bool solved = false;
     bool not_positive_definite = false;
     LinearMethod used = LinearMethod::automatic;
+    int factorisations = 0;  ///< made for this solve; 0 where an earlier one served, or none was needed
     int iterations = 0;   ///< largest number of any right-hand side (direct: 0)
     double residual = 0;  ///< largest of any right-hand side, relative (direct and definite: not formed, 0)
     std::string reason;

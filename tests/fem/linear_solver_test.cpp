@@ -219,6 +219,35 @@ TEST(LinearSolver, AutomaticTakesTheFactorForLoadsThatComeOneByOne) {
   }
 }
 
+TEST(LinearSolver, AFactorServesTheMatricesThatFollow) {
+  // Nearly incompressible: conjugate gradients alone take hundreds of steps.
+  const Cube cube(16, 0.4995), near(16, 0.4994), far(16, 0.1);
+  LinearSolver solver;
+  solver.analyse(cube.lower);
+  constexpr double tolerance = 1e-3;  // of a step of Newton's method
+  const auto solve = [&](const Cube& of) {
+    MatrixX x = of.load;
+    const auto outcome = solver.solve_in_place(x, nullptr, tolerance);
+    EXPECT_TRUE(outcome.solved) << outcome.reason;
+    EXPECT_LT(of.residual(x), 1.01 * tolerance);
+    return outcome;
+  };
+  solver.set_matrix(cube.lower);
+  EXPECT_EQ(solve(cube).factorisations, 1);
+  solver.set_matrix(near.lower);
+  const auto second = solve(near);
+  EXPECT_EQ(second.used, LinearMethod::mixed);
+  EXPECT_EQ(second.factorisations, 0) << "a few steps more are cheaper than another factor";
+  solver.set_matrix(far.lower);
+  EXPECT_EQ(solve(far).factorisations, 1) << "here they are not";
+  solver.set_matrix(near.lower);
+  solve(near);
+  Eigen::SparseMatrix<double> negative = -near.lower;
+  solver.set_matrix(negative);
+  MatrixX x = cube.load;
+  EXPECT_TRUE(solver.solve_in_place(x).not_positive_definite);
+}
+
 TEST(LinearSolver, AutomaticFallsBackOnTheFactor) {
   // Nearly incompressible and without placement: the steps run out and the factor takes over.
   const Cube cube(16, 0.4995);

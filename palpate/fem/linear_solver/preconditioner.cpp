@@ -159,10 +159,12 @@ void RigidMotionPreconditioner::apply(const double* r, double* z, const ThreadTe
   }
 }
 
-FactorPreconditioner::FactorPreconditioner(const FrontFactor<float>& factor, const std::vector<Index>& padded)
+template <class Scalar>
+FactorPreconditioner<Scalar>::FactorPreconditioner(const FrontFactor<Scalar>& factor, const std::vector<Index>& padded)
     : factor_(factor), padded_(padded), vector_(static_cast<Eigen::Index>(padded.size())) {}
 
-void FactorPreconditioner::apply(const double* r, double* z, const ThreadTeam& team) {
+template <class Scalar>
+void FactorPreconditioner<Scalar>::apply(const double* r, double* z, const ThreadTeam& team) {
   team.meet();  // r is complete
   if (team.id == 0) {
     for (std::size_t u = 0; u < padded_.size(); ++u) vector_[static_cast<Eigen::Index>(u)] = r[padded_[u]];
@@ -171,5 +173,8 @@ void FactorPreconditioner::apply(const double* r, double* z, const ThreadTeam& t
   }
   team.meet();
 }
+
+template class FactorPreconditioner<float>;
+template class FactorPreconditioner<double>;
 
 }  // namespace palpate::fem

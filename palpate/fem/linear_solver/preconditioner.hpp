@@ -55,14 +55,15 @@ class RigidMotionPreconditioner final : public Preconditioner {
   VectorX coarse_vector_;
 };
 
-/// A factor in single precision: three or four steps to full accuracy, whatever the Poisson ratio.
+/// A factor in single precision: three or four steps to full accuracy, whatever the Poisson ratio. Or one of a matrix nearby.
+template <class Scalar>
 class FactorPreconditioner final : public Preconditioner {
  public:
-  FactorPreconditioner(const FrontFactor<float>& factor, const std::vector<Index>& padded);
+  FactorPreconditioner(const FrontFactor<Scalar>& factor, const std::vector<Index>& padded);
   void apply(const double* r, double* z, const ThreadTeam& team) override;
 
  private:
-  const FrontFactor<float>& factor_;
+  const FrontFactor<Scalar>& factor_;
   const std::vector<Index>& padded_;
   VectorX vector_;
 };

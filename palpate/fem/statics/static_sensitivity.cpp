@@ -14,32 +14,35 @@ MatrixX StaticSystem::solve_tangent_system(const MatrixX& right_hand_sides) {
   return system.solve(right_hand_sides);
 }
 
+double StaticSystem::prepare_tangent(const StaticProblem& p, const VectorX& u) {
+  if (law.is_linear()) {
+    factorise_linear(p.m.poisson, nullptr);
+    return p.m.young_pa;
+  }
+  if (is_large()) {
+    assembly.tangent(law, p.m, u, blocks);
+    system.set_matrix(assembly.pattern(), blocks, 0);
+    return 1;
+  }
+  const bool same = factored_u.size() == u.size() && factored_u == u && factored_moduli.young_pa == p.m.young_pa &&
+                    factored_moduli.poisson == p.m.poisson && factored_moduli.extra == p.m.extra;
+  if (same) return 1;
+  factored_u.resize(0);
+  assembly.tangent(law, p.m, u, blocks);
+  if (system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots())) {
+    factored_u = u;
+    factored_moduli = p.m;
+  } else if (!system.factorise_indefinite(assembly.pattern(), blocks)) {
+    throw Error("the tangent is singular at this state: it has no derivatives", "sensitivity.at");
+  }
+  return 1;
+}
+
 SensitivityAlong StaticSystem::sensitivity(const Equilibrium& at, const MatrixX& along_force, const MatrixX& along_motion) {
   const StaticProblem p =
       problem(at.young_modulus_pa, at.poisson_ratio, at.force_coefficients, at.motion_coefficients, at.extra);
   const VectorX& u = at.displacement_m;
   if (u.size() != 3 * assembly.node_count()) throw Error("is not a state of this mesh", "sensitivity.at");
-  double scale = 1;
-  if (law.is_linear()) {
-    factorise_linear(at.poisson_ratio, nullptr);
-    scale = at.young_modulus_pa;
-  } else {
-    const bool same = factored_u.size() == u.size() && factored_u == u && factored_moduli.young_pa == p.m.young_pa &&
-                      factored_moduli.poisson == p.m.poisson && factored_moduli.extra == p.m.extra;
-    if (is_large()) {
-      assembly.tangent(law, p.m, u, blocks);
-      system.set_matrix(assembly.pattern(), blocks, 0);
-    } else if (!same) {
-      factored_u.resize(0);
-      assembly.tangent(law, p.m, u, blocks);
-      if (system.factorise(assembly.pattern(), blocks, 0, assembly.expected_negative_pivots())) {
-        factored_u = u;
-        factored_moduli = p.m;
-      } else if (!system.factorise_indefinite(assembly.pattern(), blocks)) {
-        throw Error("the tangent is singular at this state: it has no derivatives", "sensitivity.at");
-      }
-    }
-  }
   const Index m = static_cast<Index>(motions.cols()), x = static_cast<Index>(p.m.extra.size());
   const Index along = static_cast<Index>(along_force.cols()), regions = assembly.region_count();
   if (along_force.rows() != boundary.forces.cols() || along_motion.rows() != m || along_motion.cols() != along)
@@ -54,15 +57,18 @@ SensitivityAlong StaticSystem::sensitivity(const Equilibrium& at, const MatrixX&
   for (int r = 0; r < regions; ++r) rhs.col(2 + x + r) = -assembly.forces_d_log_stiffness(law, p.m, u, r);
   rhs.rightCols(along) = boundary.forces * along_force;
   const MatrixX imposed = motions * along_motion;
-  for (Index j = 0; j < along; ++j)
-    if (!imposed.col(j).isZero(0)) rhs.col(2 + x + regions + j) -= scale * assembly.multiply(blocks, imposed.col(j));
-  MatrixX du = law.is_linear() ? solve_linear_system(rhs) : solve_tangent_system(rhs);
-  du /= scale;
-  // Reactions: M' (K du - rhs), with K du of the whole displacement.
-  MatrixX reaction(m, du.cols());
-  for (Index j = 0; m > 0 && j < du.cols(); ++j)
-    reaction.col(j) = motions.transpose() * (scale * assembly.multiply(blocks, du.col(j)) - rhs.col(j));
-  du.rightCols(along) += imposed;
+  MatrixX du = MatrixX::Zero(rhs.rows(), rhs.cols()), reaction = MatrixX::Zero(m, rhs.cols());
+  if (!rhs.isZero(0) || !imposed.isZero(0)) {  // nothing depends on anything at rest, and no factor is needed to know that
+    const double scale = prepare_tangent(p, u);
+    for (Index j = 0; j < along; ++j)
+      if (!imposed.col(j).isZero(0)) rhs.col(2 + x + regions + j) -= scale * assembly.multiply(blocks, imposed.col(j));
+    du = law.is_linear() ? solve_linear_system(rhs) : solve_tangent_system(rhs);
+    du /= scale;
+    // Reactions: M' (K du - rhs), with K du of the whole displacement.
+    for (Index j = 0; m > 0 && j < du.cols(); ++j)
+      reaction.col(j) = motions.transpose() * (scale * assembly.multiply(blocks, du.col(j)) - rhs.col(j));
+    du.rightCols(along) += imposed;
+  }
   SensitivityAlong out;
   out.d_log_young = du.col(0);
   out.d_poisson = du.col(1);

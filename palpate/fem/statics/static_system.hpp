@@ -89,6 +89,9 @@ class StaticSystem {
   StaticProblem problem(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const;
   Equilibrium blank(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra) const;
   void finish(const StaticProblem& p, StaticState& s, Equilibrium& out) const;
+  /// The tangent at a state in `blocks`, ready to be solved with. @returns what it is to be multiplied with: a linear material's is
+  /// at E = 1. @throws Error where it is singular
+  double prepare_tangent(const StaticProblem& p, const VectorX& u);
   /// The two parts of a linear material's stiffness, which do not depend on nu.
   void assemble_linear();
   void factorise_linear(double poisson, int* factorisations);
