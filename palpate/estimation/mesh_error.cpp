@@ -33,6 +33,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
       if (!linear) statics = statics_options(copy, body, options);
     }
     body.material = "linear";
+    statics.loads_expected = static_cast<int>(all.steps.size());
     copy.supports = held_both_ways(std::move(copy.supports));
     Unknowns unknowns;
     auto held = std::make_unique<Recording>(std::move(copy));

@@ -166,7 +166,8 @@ struct LinearSolver::Impl {
     return method == LinearMethod::direct ? direct_cost(count) : method == LinearMethod::mixed ? mixed_cost(count) : iterative_cost(count);
   }
   LinearMethod choose(double count) {
-    count += served;  // as if as many were still to come as have been: a factor may pay that never does for one alone
+    // As if as many were still to come as have been: a factor may pay that never does for one alone.
+    count += std::max<double>(served, options.expected - served);
     if (options.indefinite) return LinearMethod::direct;
     if (options.method != LinearMethod::automatic) return options.method;
     if (lower.cols() < kAnalyseAtOnceBelow) need_tree();

@@ -32,6 +32,7 @@ class LinearSolver {
     int threads = 1;
     double tolerance = 1e-10;  ///< of the residual over the norm of b, checked on every answer but `direct` definite ones
     int max_iterations = 5000;
+    int expected = 0;  ///< right-hand sides that come for each matrix, one after the other: what `automatic` may count on
     double memory_limit_bytes = 8e9;  ///< `automatic` never chooses a factor beyond it
   };
   /// What happened; `solved` false is a result, `reason` says why in plain words.

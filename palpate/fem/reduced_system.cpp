@@ -12,14 +12,15 @@
 namespace palpate::fem {
 
 ReducedSystem::ReducedSystem(const BlockPattern& pattern, const std::vector<Constraint>& constraints, MatrixX rigid_border,
-                             const Points& nodes_m, int threads)
+                             const Points& nodes_m, int threads, int loads_expected)
     : nodes_(static_cast<Index>(nodes_m.rows())),
       kept_(pattern.nodes, 0),
       special_(pattern.nodes, -1),
       constraints_(constraints),
       factor_(SparseFactor::Options{false, 3, threads}),
       nodes_m_(nodes_m),
-      threads_(threads) {
+      threads_(threads),
+      loads_expected_(loads_expected) {
   for (const Constraint& c : constraints_) {
     if (c.count == 3) {
       kept_[c.node] = -1;
@@ -249,6 +250,7 @@ void ReducedSystem::set_matrix(const BlockPattern& pattern, const BlockValues& b
   if (!any_) {
     LinearSolver::Options options;
     options.threads = threads_;
+    options.expected = loads_expected_;
     any_.emplace(options);
     any_->analyse(lower_, placement());
   }

@@ -21,7 +21,7 @@ class ReducedSystem {
   /// shown.
   /// @param rigid_border  3n x 6 mass-weighted rigid motions of a free object, or 3n x 0
   ReducedSystem(const BlockPattern& pattern, const std::vector<Constraint>& constraints, MatrixX rigid_border,
-                const Points& nodes_m, int threads);
+                const Points& nodes_m, int threads, int loads_expected = 0);
 
   /// Part of a displacement (3n) along prescribed directions.
   VectorX prescribed_part(const VectorX& u) const;
@@ -71,7 +71,7 @@ class ReducedSystem {
   Points nodes_m_;
   std::optional<SparseFactor> indefinite_;  // made when a tangent is first met that is not positive definite
   bool use_indefinite_ = false;
-  int threads_ = 1;
+  int threads_ = 1, loads_expected_ = 0;
   // Free object: K = K_s - spring E E' with nine springs at three nodes, and the border B.
   MatrixX border_;
   std::vector<Index> spring_dofs_;

@@ -51,6 +51,7 @@ struct StaticsOptions {
   int max_newton_steps = 60;
   int max_load_steps = 400;  ///< in the continuation that is started when plain Newton fails
   int threads = 1;
+  int loads_expected = 0;  ///< of a linear material: about how many one matrix will be solved for, one after the other
   std::vector<int> region;   ///< an element: its region, 0 and up; empty: one region
   VectorX region_stiffness;  ///< a region: its moduli over those asked for (nu is shared); empty: 1
 };

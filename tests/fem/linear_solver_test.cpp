@@ -219,6 +219,20 @@ TEST(LinearSolver, AutomaticTakesTheFactorForLoadsThatComeOneByOne) {
   }
 }
 
+TEST(LinearSolver, AutomaticTakesTheFactorForLoadsThatAreExpected) {
+  const Cube cube(16, 0.3);
+  LinearSolver solver({.expected = 60});
+  solver.analyse(cube.lower, cube.placement);
+  solver.set_matrix(cube.lower);
+  for (const int factorisations : {1, 0, 0}) {
+    MatrixX x = cube.load;
+    const auto outcome = solver.solve_in_place(x);
+    EXPECT_NE(outcome.used, LinearMethod::iterative);
+    EXPECT_EQ(outcome.factorisations, factorisations);
+    EXPECT_LT(cube.residual(x), 1e-9);
+  }
+}
+
 TEST(LinearSolver, AFactorServesTheMatricesThatFollow) {
   // Nearly incompressible: conjugate gradients alone take hundreds of steps.
   const Cube cube(16, 0.4995), near(16, 0.4994), far(16, 0.1);

@@ -37,7 +37,7 @@ StaticSystem::StaticSystem(const TetMesh& mesh_in, const std::string& material, 
       free(boundary.inertia_relief),
       system(assembly.pattern(), boundary.constraints,
              free ? mass_times(mesh_in, rigid_motions(mesh_in.nodes_m)) : MatrixX::Zero(3 * mesh_in.nodes_m.rows(), 0),
-             mesh_in.nodes_m, options_in.threads) {
+             mesh_in.nodes_m, options_in.threads, law.is_linear() ? options_in.loads_expected : 0) {
   if (!free) check_supported(mesh, boundary.constraints);
   motions = MatrixX(boundary.motions);
   for (Index k = 0; k < motions.cols(); ++k) motions.col(k) = system.prescribed_part(motions.col(k));
