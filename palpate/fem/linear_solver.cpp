@@ -21,6 +21,7 @@ constexpr double kSetUpPerBlock = 7e-8;                    // values, diagonal i
 constexpr double kAnalysisPerEntry = 6e-8;                 // ordering and symbolic analysis, an entry of the matrix
 constexpr double kFirstLookAtMost = 100;                   // steps; residuals may fall hardly at all before
 constexpr int kMixedIterations = 4;                        // single precision factor, up to Poisson ratios of 0.49
+constexpr double kUsualTolerance = 1e-10;                  // that iterations are guessed for
 constexpr int kFirstLookWithAnother = 6;                   // steps, to see how the residual falls
 constexpr double kGuessedFall = 1.5;                       // of log residual a step, with the factor of a matrix nearby
 constexpr Eigen::Index kAnalyseAtOnceBelow = 3000;         // unknowns: the exact flops are worth the ordering
@@ -29,7 +30,9 @@ constexpr Eigen::Index kAnalyseAtOnceBelow = 3000;         // unknowns: the exac
 // entries a row of linear ones (78 and 38), and separators that are as much heavier.
 double guessed_flops(double n, double entries_a_row) { return 0.18 * entries_a_row * n * n; }
 double guessed_panel_values(double n, double entries_a_row) { return 0.19 * entries_a_row * std::pow(n, 1.36); }
-double guessed_iterations(double n, bool rigid_motions) { return rigid_motions ? 60.0 : 5.5 * std::cbrt(n); }
+double guessed_iterations(double n, double entries_a_row, bool rigid_motions) {
+  return rigid_motions ? 1.6 * entries_a_row : 5.5 * std::cbrt(n);
+}
 
 }  // namespace
 
@@ -70,7 +73,7 @@ struct LinearSolver::Impl {
   Another another = Another::none;  // factor of a matrix before
 
   double tolerance = 0;         // of the present solve
-  double known_iterations = 0;  // of the last iterative solve, 0: none yet
+  double known_iterations = 0;  // of the last iterative solve, as if to the usual tolerance; 0: none yet
   int factorisations = 0;
   double steps_left = 0;        // when conjugate gradients last stopped before the end
   double fall_with_another = kGuessedFall;  // of log residual a step, when a factor of another matrix last served
@@ -153,8 +156,10 @@ struct LinearSolver::Impl {
     if (another == Another::none || options.indefinite) return std::numeric_limits<double>::infinity();
     return count * std::max(1.0, std::log(1 / tolerance) / fall_with_another) * step_cost_with_another();
   }
+  /// Residuals fall steadily, so a step of Newton's method with a loose one says little of how many a derivative takes.
+  double digits_wanted() const { return std::log(1 / tolerance) / std::log(1 / kUsualTolerance); }
   double expected_iterations() const {
-    return known_iterations > 0 ? known_iterations : guessed_iterations(unknowns(), !placement.empty());
+    return digits_wanted() * (known_iterations > 0 ? known_iterations : guessed_iterations(unknowns(), entries_a_row(), !placement.empty()));
   }
   double iterative_cost(double count) const {
     if (rigid_state == State::refused) return std::numeric_limits<double>::infinity();
@@ -279,7 +284,7 @@ struct LinearSolver::Impl {
       patience.first_look = static_cast<int>(std::min(kFirstLookAtMost, std::max(patience.worth, 1.5 * expected_iterations())));
     }
     const Outcome outcome = solve_by_steps(LinearMethod::iterative, *rigid, x, start, patience, done);
-    known_iterations = outcome.iterations + steps_left;
+    known_iterations = (outcome.iterations + steps_left) / digits_wanted();
     return outcome;
   }
 
