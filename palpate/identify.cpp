@@ -23,41 +23,15 @@
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/reconstruction/build_object.hpp"
-#include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/free_space.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
-#include "palpate/sensing/lens_scatter.hpp"
-#include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/observe.hpp"
-#include "palpate/sensing/plane_mask.hpp"
-#include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate {
 namespace {
 
 constexpr Index default_tetrahedra = 3000;
-constexpr Index masked_a_step = 1500;  // points under the masks that are kept for figures
-constexpr double most_unseen = 0.1;    // of a surface: beyond that, what the rest may look like is part of the interval
-constexpr double rays_a_frame = 6000;  // beyond that, noise is not what limits E: neighbouring pixels err together
-
-/// Every n-th row and column of an image, so that some thousand rays are left.
-RayCloud thinned_rays(const DepthFrame& frame) {
-  sensing::BackProjectionOptions options;
-  RayCloud rays = sensing::back_project(frame, options);
-  options.stride_px = static_cast<int>(std::floor(std::sqrt(static_cast<double>(rays.range_m.size()) / rays_a_frame)));
-  return options.stride_px > 1 ? sensing::back_project(frame, options) : rays;
-}
-
-/// The object's surroundings: its rest shape and half its size around, where there is a shape.
-std::pair<Vec3, Vec3> surroundings(const Recording& recording) {
-  const Points* rest_m = recording.rest.surface  ? &recording.rest.surface->vertices_m
-                         : recording.rest.volume ? &recording.rest.volume->nodes_m
-                                                 : nullptr;
-  if (rest_m == nullptr || rest_m->rows() == 0) return {Vec3::Constant(-1e3), Vec3::Constant(1e3)};
-  const Vec3 low = rest_m->colwise().minCoeff(), high = rest_m->colwise().maxCoeff();
-  const Vec3 margin = Vec3::Constant(0.5 * (high - low).maxCoeff());
-  return {low - margin, high + margin};
-}
+constexpr double most_unseen = 0.1;  // of a surface: beyond that, what the rest may look like is part of the interval
 
 /// Corners of quadratic tetrahedra alone, renumbered only if midpoints stood between them.
 TetMesh to_linear(const TetMesh& mesh) {
@@ -288,75 +262,6 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
   demand(!model.poisson_fixed || (*model.poisson_fixed > -1 && *model.poisson_fixed <= 0.4995), "poisson_fixed",
          "must lie above -1 and at most at 0.4995");
   return recording;
-}
-
-namespace {
-
-/// Names of the frames' cameras, told by their intrinsics: one that stands at a place, or one that is carried around. "" for a
-/// camera of one frame.
-std::vector<std::string> cameras_of(const std::vector<const DepthFrame*>& frames) {
-  const auto same_place = [&](const DepthFrame& a, const DepthFrame& b) {
-    return a.camera == b.camera && a.T_base_camera.matrix().isApprox(b.T_base_camera.matrix(), 1e-9);
-  };
-  std::vector<bool> stands;
-  for (const DepthFrame* one : frames)
-    stands.push_back(std::count_if(frames.begin(), frames.end(), [&](const DepthFrame* other) { return same_place(*one, *other); }) > 1);
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    std::size_t first = frames.size(), count = 0;
-    for (std::size_t j = 0; j < frames.size(); ++j) {
-      const bool belongs = stands[i] ? same_place(*frames[i], *frames[j]) : !stands[j] && frames[i]->camera == frames[j]->camera;
-      if (belongs && ++count == 1) first = j;
-    }
-    names.push_back(count > 1 ? std::to_string(first) : "");
-  }
-  return names;
-}
-
-}  // namespace
-
-estimation::Inputs observe(const Recording& recording, std::vector<Points>* masked_m) {
-  estimation::Inputs inputs;
-  std::vector<const DepthFrame*> frames;
-  for (const auto& push : recording.pushes)
-    for (const auto& step : push.steps)
-      for (const auto& observation : step.observations)
-        if (const auto* frame = std::get_if<DepthFrame>(&observation)) frames.push_back(frame);
-  const std::vector<std::string> cameras = cameras_of(frames);
-  std::size_t frame_number = 0;
-  const auto [low_m, high_m] = surroundings(recording);
-  if (masked_m != nullptr) masked_m->clear();
-  std::optional<sensing::RobotMask> robot;  // a robot that was recorded without shapes cannot be masked
-  if (recording.robot && sensing::has_shapes(*recording.robot)) robot.emplace(*recording.robot);
-  for (const auto& push : recording.pushes) {
-    for (const auto& step : push.steps) {
-      auto& terms = inputs.emplace_back();
-      if (masked_m != nullptr) masked_m->emplace_back(0, 3);
-      for (const auto& observation : step.observations) {
-        if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
-          auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
-          if (robot && !frame->robot_is_masked && !step.joints_rad.empty()) {
-            masked = sensing::with_mask(masked, robot->mask(*frame, recording.joint_names, step.joints_rad));
-          }
-          if (masked_m != nullptr && masked_m->back().rows() == 0) {
-            masked_m->back() = sensing::masked_points(masked, low_m, high_m, masked_a_step);
-          }
-          terms.push_back(estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad,
-                                                     frame->noise.bias_std_m, sensing::lens_scatter(*frame), cameras[frame_number++],
-                                                     frame->T_base_camera.linear()});
-        } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
-          terms.push_back(*cloud);
-        } else if (const auto* markers = std::get_if<Markers>(&observation)) {
-          terms.push_back(*markers);
-        } else if (const auto* travel = std::get_if<ToolTravel>(&observation)) {
-          terms.push_back(*travel);
-        } else if (const auto* wrench = std::get_if<Wrench>(&observation)) {
-          terms.push_back(*wrench);
-        }
-      }
-    }
-  }
-  return inputs;
 }
 
 estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress,
