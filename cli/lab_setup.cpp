@@ -49,7 +49,7 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
                  "of the bear: its head is stiffer and its back softer by this factor; of the bar: its upper half is stiffer")
       ->check(positive_number());
   app.add_option("--poisson-ratio", arguments.poisson_ratio, "of the true object (drawn from the seed: 0.1 to 0.45)")
-      ->check(CLI::Range(0.0, 0.4999));
+      ->check(CLI::Range(0.0, 0.4998));
   app.add_option("--stands", arguments.stands,
                  "how the object stands on the table (and at the wall); what is not glued can lift off and slide")
       ->check(CLI::IsMember({"glued", "rough"}))
@@ -58,7 +58,20 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
       ->check(positive_number())
       ->capture_default_str();
   app.add_flag("--wall", arguments.wall, "an upright wall behind the object, and a push towards it");
+  app.add_option("--albedo", arguments.albedo, "of the true object, 0 to 1: dark things are noisy to time of flight (default: of the object)")
+      ->check(CLI::Range(0.01, 1.0));
+  app.add_option("--texture", arguments.texture,
+                 "of the true object, 0 (uniform) to 1: passive stereo loses patches of what has little (default: of the object)")
+      ->check(CLI::Range(0.0, 1.0));
   lab::LabOptions& lab = arguments.lab;
+  app.add_option("--ambient-light", arguments.ambient_light, "over what the time-of-flight camera's noise model assumes")
+      ->check(number_from_zero())
+      ->capture_default_str();
+  app.add_option("--camera", arguments.camera, "where the depth camera is: it stands and looks on, or the hand carries it")
+      ->check(CLI::IsMember({"stands", "hand"}))
+      ->capture_default_str();
+  app.add_option("--arm-at", arguments.arm_at, "where the arm stands: x and y in m, and its turn about z in rad (the object stays at 0.6 0 m)")
+      ->expected(3);
   app.add_option("--compliance", lab.compliance_m_per_n, "of the lab's stick and arm, m/N (0.0001: a tenth of a millimetre a newton)")
       ->check(number_from_zero());
   app.add_option("--stated-compliance", lab.stated_compliance_m_per_n, "what the recording says of it, m/N (default: the truth)")
@@ -84,6 +97,8 @@ lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
   options.stands = arguments.stands == "rough" ? ContactLaw::friction : ContactLaw::bonded;
   options.friction_coefficient = arguments.friction_coefficient;
   options.wall = arguments.wall;
+  if (arguments.albedo > 0) options.albedo = arguments.albedo;
+  if (arguments.texture >= 0) options.texture = arguments.texture;
   const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),
                                     [&](const lab::BuiltInObject& row) { return row.name == arguments.object; });
   if (built_in || !std::filesystem::exists(arguments.object)) return lab::make_object(arguments.object, options);
@@ -95,6 +110,12 @@ lab::LabOptions lab_options(const LabArguments& arguments, std::uint64_t seed) {
   lab::LabOptions options = arguments.lab;
   options.seed = seed;
   options.depth = lab::depth_sensor(arguments.depth_sensor);
+  options.depth.ambient_light = arguments.ambient_light;
+  options.camera_on_hand = arguments.camera == "hand";
+  if (arguments.arm_at.size() == 3) {
+    options.T_base_arm.translation() = Vec3(arguments.arm_at[0], arguments.arm_at[1], 0);
+    options.T_base_arm.rotate(Eigen::AngleAxisd(arguments.arm_at[2], Vec3::UnitZ()));
+  }
   options.force = lab::force_sensor(arguments.force_sensor);
   return options;
 }
@@ -107,6 +128,8 @@ nlohmann::json truth_json(const lab::LabRobot& robot) {
                          {"material", object.material},
                          {"description", object.description},
                          {"extra", object.extra},
+                         {"albedo", object.look.albedo},
+                         {"texture", object.look.texture},
                          {"force_scale", robot.true_force_scale()},
                          {"steps", nlohmann::json::array()}};
   for (const lab::TrueRegion& region : object.regions)

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "palpate/lab/object.hpp"
 #include "palpate/lab/robot.hpp"
@@ -31,6 +32,10 @@ struct LabArguments {
   std::string stands = "glued";  ///< or rough
   double friction_coefficient = lab::ObjectOptions().friction_coefficient;
   bool wall = false;
+  double ambient_light = lab::DepthSensorOptions().ambient_light;
+  double albedo = 0, texture = -1;  ///< 0 and below 0: as the object usually is
+  std::vector<double> arm_at;       ///< x and y in metres, turn about z in radians; empty: where the frame begins
+  std::string camera = "stands";    ///< or hand
   lab::LabOptions lab;          ///< what goes wrong in it: compliance, relaxation, slip, sliding
 };
 

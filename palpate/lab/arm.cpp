@@ -71,6 +71,8 @@ RobotModel arm(const ArmOptions& o) {
     j.velocity = 0.5;
     robot.joints.push_back(j);
   };
+  const bool stands_elsewhere = !o.T_base_arm.matrix().isIdentity();
+  if (stands_elsewhere) link("stand", {});
   link("base", {barrel(0.09, 0.15, 0.0, o)});
   link("module_1", {barrel(0.065, 0.13, 0.0, o)});
   link("module_2", {barrel(0.06, 0.34, -0.05, o)});
@@ -84,6 +86,7 @@ RobotModel arm(const ArmOptions& o) {
   link("stick", tool);
   link("tip", {});
   link("camera", {});
+  if (stands_elsewhere) joint("stand_mount", "stand", "base", o.T_base_arm, Vec3::UnitZ(), 0);
   joint("joint_1", "base", "module_1", at(0, 0, 0.15), Vec3::UnitZ(), 2.9);
   joint("joint_2", "module_1", "module_2", at(0, 0, 0.14), Vec3::UnitY(), 2.1);
   joint("joint_3", "module_2", "module_3", at(0, 0, 0.33), Vec3::UnitY(), 2.4);

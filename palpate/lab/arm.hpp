@@ -7,6 +7,7 @@
 namespace palpate::lab {
 
 struct ArmOptions {
+  Pose T_base_arm = Pose::Identity();  ///< where it is screwed down, in the frame that everything is recorded in
   double stick_radius_m = 0.005;
   double stick_length_m = 0.30;
   double pad_radius_m = 0.0;  ///< 0 = the stick alone; else a disc of 8 mm on its end
@@ -14,7 +15,7 @@ struct ArmOptions {
   int rings = 24;
 };
 
-/// Links base, module_1 .. module_5, hand_pan, hand_tilt, stick (fixed), tip (no geometry: origin in the tip's face, z along
+/// Links stand (where the arm does not stand in the origin of the base frame), base, module_1 .. module_5, hand_pan, hand_tilt, stick (fixed), tip (no geometry: origin in the tip's face, z along
 /// the push) and camera (no geometry: optical frame). Joints joint_1 .. joint_5, pan, tilt.
 RobotModel arm(const ArmOptions& options = {});
 

@@ -7,19 +7,16 @@
 #include <vector>
 
 #include "palpate/core/recording.hpp"
+#include "palpate/lab/look.hpp"
 #include "palpate/lab/random.hpp"
 #include "palpate/lab/scene.hpp"
 
 namespace palpate::lab {
 
-/// What a surface is to a camera.
-struct Look {
-  double albedo = 0.5;  ///< share of light that comes back: time of flight is noisier on dark things
-  double texture = 1;   ///< 0 uniform ... 1 as good as a test pattern: what passive stereo needs
-};
-
 struct DepthSensorOptions {
   DepthNoise noise{"realsense_d435", std::numeric_limits<double>::quiet_NaN(), 0.0};
+  double bias_std_m = 0.0;             ///< of one offset of all depths, as sensors of this kind have it
+  double bias_m = 0.0;                 ///< as this one has it
   double correlated_sigma_m = 0.0;     ///< part of the noise that neighbours share, on top of the model's
   double correlation_px = 8.0;         ///< its correlation length (Gaussian kernel)
   bool lateral_jitter = true;          ///< where the model states a lateral noise

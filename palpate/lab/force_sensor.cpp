@@ -59,10 +59,10 @@ ForceSensor::ForceSensor(const ForceSensorOptions& options, Random& once) : opti
       if (i != j) gain_(i, j) = options.cross_talk_std * once.normal();
 }
 
-Vec3 ForceSensor::read(const Vec3& true_force_n, double time_s, Random& noise) const {
+Vec3 ForceSensor::read(const Vec3& true_force_n, const Mat3& R_base_sensor, double time_s, Random& noise) const {
   // A reaction on the tool is the force on the object with the other sign; drivers turn it round, and so the weight too.
   const Vec3 weight_n(0, 0, 9.81 * options_.tool_mass_kg);
-  Vec3 force = scale_ * (gain_ * true_force_n + weight_n) + bias_n_ + drift_n_s_ * time_s + options_.sigma_n * noise.normal3();
+  Vec3 force = scale_ * (gain_ * (R_base_sensor.transpose() * (true_force_n + weight_n))) + bias_n_ + drift_n_s_ * time_s + options_.sigma_n * noise.normal3();
   for (int k = 0; k < 3; ++k) {
     if (options_.unit_n > 0) force(k) = options_.unit_n * std::round(force(k) / options_.unit_n);
     force(k) = std::clamp(force(k), -options_.range_n, options_.range_n);

@@ -18,7 +18,7 @@ struct ForceSensorOptions {
   double drift_n_s = 0.0002;    ///< standard deviation of the drift a second, per axis (about 0.7 N an hour)
   double scale_std = 0.01;      ///< of the common scale error, which a recording states
   double cross_talk_std = 0;    ///< of each entry beside the diagonal
-  double tool_mass_kg = 0.3;    ///< what hangs on it: a constant force in the base frame, part of the tare
+  double tool_mass_kg = 0.3;    ///< what hangs on it: a constant force in the base frame, part of the tare of every push
 };
 
 struct ForceSensorModel {
@@ -36,11 +36,13 @@ ForceSensorOptions force_sensor(std::string_view name);
 /// @throws Error naming the option that is out of range.
 void check(const ForceSensorOptions& options);
 
-/// One sensor as it came out of the box: bias, drift, scale and cross-talk are drawn once.
+/// One sensor as it came out of the box: bias, drift, scale and cross-talk are drawn once, along its own axes.
 class ForceSensor {
  public:
   ForceSensor(const ForceSensorOptions& options, Random& once);
-  Vec3 read(const Vec3& true_force_n, double time_s, Random& noise) const;
+  /// @param true_force_n  of the tool on the object, base frame  @param R_base_sensor  how the sensor stands
+  /// @returns what it says of that along its own axes, the weight that hangs on it included; range and resolution are theirs
+  Vec3 read(const Vec3& true_force_n, const Mat3& R_base_sensor, double time_s, Random& noise) const;
   double scale() const { return scale_; }
 
  private:

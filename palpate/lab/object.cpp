@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/materials.hpp"
@@ -28,6 +29,8 @@ LabObject draw(const std::string& name, const ObjectOptions& o, double stiffer =
   need(!o.young_modulus_pa || *o.young_modulus_pa > 0, "young_modulus_pa", "must be positive");
   need(!o.poisson_ratio || (*o.poisson_ratio >= 0 && *o.poisson_ratio < 0.4999), "poisson_ratio", "must be in [0, 0.4999)");
   need(o.friction_coefficient > 0 && std::isfinite(o.friction_coefficient), "friction_coefficient", "must be positive");
+  need(!o.albedo || (*o.albedo > 0 && *o.albedo <= 1), "albedo", "must be above 0 and at most 1");
+  need(!o.texture || (*o.texture >= 0 && *o.texture <= 1), "texture", "must be between 0 and 1");
   need(o.region_ratio > 0 && std::isfinite(o.region_ratio), "region_ratio", "must be positive");
   need(o.tetrahedra >= 200, "tetrahedra", "must be at least 200");
   need(o.cells_in_radius >= 1, "cells_in_radius", "must be at least 1");
@@ -246,6 +249,8 @@ LabObject animal(const ObjectOptions& o) {
 // No solid: E is the skin's, and a solid model finds an apparent modulus at most.
 LabObject balloon(const ObjectOptions& o) {
   if (o.wall || o.stands != ContactLaw::bonded) throw Error("is glued to the table, without a wall", "balloon");
+  if (o.poisson_ratio || o.material != ObjectOptions{}.material || o.region_ratio != 1)
+    throw Error("is an incompressible skin of one stiffness: it takes no Poisson ratio, no other law and no regions", "balloon");
   LabObject object = draw("balloon", o, 60);
   object.description = "a balloon of 150 mm, a skin of 0.3 mm stretched to twice its size, glued to the table at its foot";
   object.state = RestState::under_pressure;
@@ -274,13 +279,37 @@ LabObject balloon(const ObjectOptions& o) {
 }
 
 constexpr std::array<BuiltInObject, 6> table_of_objects{{
-    {"cube", "foam cube of 150 mm, pressed from above at two sites", cube},
-    {"ball", "ball of 120 mm, from above and slanted", ball},
-    {"bar", "upright bar of 80 x 80 x 160 mm and ten times the stiffness, at its side and its end", bar},
-    {"bear", "sitting plush bear of 200 mm: head, belly, back", bear},
-    {"animal", "animal of 280 mm on four legs: back, flank", animal},
-    {"balloon", "inflated skin of 150 mm, at its top: it has an apparent modulus only", balloon},
+    {"cube", "foam cube of 150 mm, pressed from above at two sites", cube, {0.5, 0.9}},
+    {"ball", "ball of 120 mm, from above and slanted", ball, {0.5, 0.9}},
+    {"bar", "upright bar of 80 x 80 x 160 mm and ten times the stiffness, at its side and its end", bar, {0.5, 0.9}},
+    {"bear", "sitting plush bear of 200 mm: head, belly, back", bear, {0.4, 1}},
+    {"animal", "animal of 280 mm on four legs: back, flank", animal, {0.4, 1}},
+    {"balloon", "inflated skin of 150 mm, at its top: it has an apparent modulus only", balloon, {0.6, 0.7}},
 }};
+
+LabObject looking(LabObject object, const ObjectOptions& o, const Look& usual) {
+  object.look = {o.albedo.value_or(usual.albedo), o.texture.value_or(usual.texture)};
+  return object;
+}
+
+// From the foot: the middle where something is below it, else (a ring, a crooked thing) the highest facet that looks up.
+Vec3 above_middle_or_highest(const LabObject& object, const ObjectOptions& o) {
+  const Points& v = object.surface.vertices_m;
+  const double above_m = v.col(2).maxCoeff() + 1;
+  const Vec3 middle(o.base_centre_m.x(), o.base_centre_m.y(), above_m);
+  if (geometry::TriangleTree(object.surface).cast(middle, -Vec3::UnitZ())) return {0, 0, 0};
+  Vec3 highest = v.row(0);
+  double best_m = -std::numeric_limits<double>::infinity();
+  for (Index t = 0; t < object.surface.triangles.rows(); ++t) {
+    const Vec3 a = v.row(object.surface.triangles(t, 0)), b = v.row(object.surface.triangles(t, 1)), c = v.row(object.surface.triangles(t, 2));
+    const Vec3 centre = (a + b + c) / 3;
+    constexpr double looks_up = 0.8;
+    if (centre.z() <= best_m || (b - a).cross(c - a).normalized().z() < looks_up) continue;
+    best_m = centre.z();
+    highest = centre;
+  }
+  return highest - o.base_centre_m;
+}
 
 }  // namespace
 
@@ -316,7 +345,7 @@ std::span<const BuiltInObject> built_in_objects() { return table_of_objects; }
 LabObject make_object(std::string_view name, const ObjectOptions& options) {
   std::string names;
   for (const BuiltInObject& row : table_of_objects) {
-    if (row.name == name) return row.make(options);
+    if (row.name == name) return looking(row.make(options), options, row.look);
     names += (names.empty() ? "" : ", ") + std::string(row.name);
   }
   throw Error("is no object of the lab (there are: " + names + ") and no mesh file", "object " + std::string(name));
@@ -357,9 +386,9 @@ LabObject object_from_surface(const TriMesh& surface, const std::string& name, c
     stand(object, options);
   }
   size_pushes(object, 0.12 * extent.minCoeff());
-  object.sites = {site(object, options, "top", {0, 0, 0.5 * extent.z()}, -Vec3::UnitZ())};
+  object.sites = {site(object, options, "top", above_middle_or_highest(object, options), -Vec3::UnitZ())};
   make_pressable(object, options);
-  return object;
+  return looking(std::move(object), options, {});
 }
 
 }  // namespace palpate::lab

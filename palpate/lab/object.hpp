@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "palpate/core/mesh.hpp"
+#include "palpate/lab/look.hpp"
 #include "palpate/lab/pressed.hpp"
 #include "palpate/lab/pressed_object.hpp"
 
@@ -39,6 +40,7 @@ struct ObjectOptions {
   double friction_coefficient = 0.6;                 ///< with ContactLaw::friction
   /// An upright wall behind the object, at its outermost points along x; a site more pushes towards it.
   bool wall = false;
+  std::optional<double> albedo, texture;             ///< to a camera (Look); not given: as the object usually is
   Index tetrahedra = 20000;                          ///< of the true mesh; a block's feet ask for more
   int cells_in_radius = 5;                           ///< edges across the pad's radius
 };
@@ -56,6 +58,7 @@ struct LabObject {
   /// ... and at another: what a first trial push would tell.
   double force_step_at(const PushSite& site) const { return site.stiffness * force_step_n; }
   // The truth; nothing that estimates reads it.
+  Look look;
   std::string material;
   double young_modulus_pa = 0, poisson_ratio = 0;
   std::vector<double> extra;
@@ -75,6 +78,7 @@ struct BuiltInObject {
   std::string_view name;
   std::string_view summary;
   LabObject (*make)(const ObjectOptions&);
+  Look look;
 };
 
 /// The table that --help and the tests loop over.

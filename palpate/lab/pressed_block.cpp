@@ -67,6 +67,7 @@ struct PressedBlock::Impl {
     boundary.forces.setFromTriplets(entries.begin(), entries.end());
 
     fem::StaticsOptions statics;
+    if (options.poisson_ratio > 0.45) statics.dilatation = fem::Dilatation::averaged;
     statics.residual_tolerance = 1e-7;  // five orders below the sensors' errors
     statics_ = std::make_unique<fem::Statics>(mesh_, options.material, std::move(boundary), statics);
     half_surface_ = fem::boundary_triangles(mesh_);

@@ -17,8 +17,9 @@
 namespace palpate::lab {
 namespace {
 
-ArmOptions arm_with_pad(double pad_radius_m) {
+ArmOptions arm_with_pad(const Pose& T_base_arm, double pad_radius_m) {
   ArmOptions options;
+  options.T_base_arm = T_base_arm;
   options.pad_radius_m = pad_radius_m;
   return options;
 }
@@ -107,6 +108,8 @@ void check(const LabOptions& o) {
   need(o.stated_compliance_std_m_per_n >= 0, "stated_compliance_std_m_per_n", "must not be negative");
   need(!o.stated_compliance_m_per_n || *o.stated_compliance_m_per_n >= 0, "stated_compliance_m_per_n", "must not be negative");
   need(o.slides_at_n > 0, "slides_at_n", "must be positive");
+  need(!(o.camera_on_hand && o.T_base_camera), "camera_on_hand", "has no place for a camera that stands (T_base_camera)");
+  need(o.T_base_arm.matrix().allFinite(), "T_base_arm", "must be finite");
   check(o.force);
   check(o.depth);
 }
@@ -115,8 +118,10 @@ struct LabRobot::Impl {
   Impl(const LabOptions& given, LabObject object_in)
       : options(given),
         object(std::move(object_in)),
-        mask(arm(arm_with_pad(object.pad_radius_m))),
+        mask(arm(arm_with_pad(given.T_base_arm, object.pad_radius_m))),
         tip(mask.kinematics().link("tip")),
+        hand(mask.kinematics().link("hand_tilt")),
+        hand_camera(mask.kinematics().link("camera")),
         joint_random(given.seed, 1),
         force_random(given.seed, 2),
         depth_random(given.seed, 3) {
@@ -127,6 +132,8 @@ struct LabRobot::Impl {
     const Vec3 turn = options.camera_std_rad * once.normal3();
     T_true_stated.pretranslate(options.camera_std_m * once.normal3());
     if (turn.norm() > 0) T_true_stated.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
+    Random of_camera(options.seed, 5);
+    options.depth.bias_m = options.depth.bias_std_m * of_camera.normal();
     commanded = true_joints = {0, 0.3, 1.2, 0, 1.6, 0, 0.05};
     for (std::size_t i = 0; i < mask.kinematics().robot().links.size(); ++i)
       for (const RobotShape& shape : mask.kinematics().robot().links[i].visual) {
@@ -150,8 +157,31 @@ struct LabRobot::Impl {
                                                            table.point_m + 0.55 * (high(2) - low(2)) * Vec3::UnitZ()));
   }
 
-  Pose tip_of(const std::vector<double>& joints) const {
-    return mask.kinematics().link_poses(mask.kinematics().free_joints(), joints)[std::size_t(tip)];
+  Pose pose_of(Index link, const std::vector<double>& joints) const {
+    return mask.kinematics().link_poses(mask.kinematics().free_joints(), joints)[std::size_t(link)];
+  }
+  Pose tip_of(const std::vector<double>& joints) const { return pose_of(tip, joints); }
+  // Where an image is taken from, as the joints that are read say, and how well that is known.
+  void place_camera(DepthFrame& frame) const {
+    frame.pose_std_m = options.camera_std_m;
+    frame.pose_std_rad = options.camera_std_rad;
+    frame.T_base_camera = T_base_camera;
+    if (!options.camera_on_hand) return;
+    const auto poses = mask.kinematics().link_poses(mask.kinematics().free_joints(), commanded);
+    frame.T_base_camera = poses[std::size_t(hand_camera)];
+    const Mat3 covariance = mask.kinematics().position_covariance_m2(poses, hand_camera, Vec3::Zero(), options.joint_std_rad);
+    frame.pose_std_m = std::hypot(frame.pose_std_m, std::sqrt(covariance.trace() / 3));
+    // Each axis of rotation is about one of three directions.
+    frame.pose_std_rad = std::hypot(frame.pose_std_rad, options.joint_std_rad * std::sqrt(double(commanded.size()) / 3));
+  }
+  Pose true_camera() const { return options.camera_on_hand ? pose_of(hand_camera, true_joints) : T_base_camera; }
+  /// The sensor before a scene of the object, so many bodies of the arm, and planes.
+  DepthSensorOptions sensor_before(std::size_t arm_bodies) const {
+    DepthSensorOptions sensor = options.depth;
+    sensor.looks = {Look{}, object.look};
+    sensor.looks.insert(sensor.looks.end(), arm_bodies, options.arm);
+    sensor.looks.insert(sensor.looks.end(), planes.size(), options.table);
+    return sensor;
   }
   const PushSite& site() const { return object.sites[active]; }
   // How far the encoders' tip has come beyond the object's surface at rest, wherever that has slid to; negative before.
@@ -199,7 +229,7 @@ struct LabRobot::Impl {
   LabOptions options;
   LabObject object;
   sensing::RobotMask mask;
-  Index tip;
+  Index tip, hand, hand_camera;
   std::vector<std::unique_ptr<ForceCurve>> curves;  // a site
   std::size_t active = 0;
   std::unique_ptr<ForceSensor> wrist;
@@ -230,7 +260,8 @@ acquisition::RobotState LabRobot::read() {
   if (lab.slipped()) state.T_base_tip.translation() += 0.005 * state.T_base_tip.linear().col(1);
   const double steady = lab.force();
   const double fading = steady > 0 ? lab.fading_n * std::exp(-(lab.clock_s - lab.moved_s) / lab.options.relaxation_s) : 0;
-  state.force_n = lab.wrist->read((steady + fading) * lab.site().direction, lab.clock_s, lab.force_random);
+  const Mat3 R_true = lab.pose_of(lab.hand, lab.true_joints).linear(), R_read = lab.pose_of(lab.hand, lab.commanded).linear();
+  state.force_n = R_read * lab.wrist->read((steady + fading) * lab.site().direction, R_true, lab.clock_s, lab.force_random);
   return state;
 }
 
@@ -265,9 +296,7 @@ DepthFrame LabRobot::take_depth_image() {
   DepthFrame frame;
   frame.time_s = lab.clock_s;
   frame.camera = lab.camera;
-  frame.T_base_camera = lab.T_base_camera;
-  frame.pose_std_m = lab.options.camera_std_m;
-  frame.pose_std_rad = lab.options.camera_std_rad;
+  lab.place_camera(frame);
   frame.noise = stated_noise(lab.options.depth);
   const auto& names = lab.mask.kinematics().free_joints();
   const auto poses = lab.mask.kinematics().link_poses(names, lab.true_joints);
@@ -285,8 +314,8 @@ DepthFrame LabRobot::take_depth_image() {
     scene.bodies.push_back(arm_trees.back().get());
   }
   scene.planes = lab.planes;
-  frame.depth_m = sense_depth(cast_view(scene, frame.camera, frame.T_base_camera * lab.T_true_stated), frame.camera,
-                              lab.options.depth, lab.depth_random);
+  frame.depth_m = sense_depth(cast_view(scene, frame.camera, lab.true_camera() * lab.T_true_stated), frame.camera,
+                              lab.sensor_before(lab.bodies.size()), lab.depth_random);
   frame.mask = lab.mask.mask(frame, names, lab.commanded);
   return frame;
 }
@@ -326,7 +355,7 @@ std::vector<DepthFrame> LabRobot::look_from(const std::vector<ViewDirection>& di
     const Vec3 turn = lab.options.camera_std_rad * random.normal3();
     if (turn.norm() > 0) T_base_true.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
     T_base_true.pretranslate(lab.options.camera_std_m * random.normal3());
-    frame.depth_m = sense_depth(cast_view(scene, frame.camera, T_base_true), frame.camera, lab.options.depth, random);
+    frame.depth_m = sense_depth(cast_view(scene, frame.camera, T_base_true), frame.camera, lab.sensor_before(0), random);
     frames.push_back(std::move(frame));
   }
   return frames;

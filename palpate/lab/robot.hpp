@@ -22,7 +22,8 @@ struct LabOptions {
   std::uint64_t seed = 1;
   PressedBlockOptions object;                                  ///< the truth where no object is given: a cube
   double joint_std_rad = 0.02 * 3.14159265358979323846 / 180;  ///< repeat accuracy of the modules, new with each motion
-  ForceSensorOptions force;           ///< at the wrist
+  Pose T_base_arm = Pose::Identity();  ///< where the arm stands, in the frame of the recording
+  ForceSensorOptions force;           ///< at the wrist, with the hand's axes
   double relaxation = 0.05;           ///< share of a force's increase that fades after each motion ...
   double relaxation_s = 0.4;          ///< ... with this time constant
   double slip_at_m = 1e9;             ///< travel at which the tip slides off sideways by 5 mm
@@ -33,9 +34,11 @@ struct LabOptions {
   /// where it was pushed to (Coulomb friction; without turning, and the tip keeps its place on the object).
   double slides_at_n = 1e9;
   std::optional<Pose> T_base_camera;  ///< a camera that stands; not given: one that looks at the object from the side
-  double camera_std_m = 0.0005;       ///< error of that pose, drawn once and stated with every image ...
+  bool camera_on_hand = false;        ///< one that the hand carries: it stands where the joints say, and they err
+  double camera_std_m = 0.0005;       ///< error of that pose (of the mount on the hand), drawn once and stated with every image ...
   double camera_std_rad = 0.0005;     ///< ... and of its rotation
-  DepthSensorOptions depth;
+  DepthSensorOptions depth;           ///< its `looks` follow from the three below
+  Look table{0.5, 1}, arm{0.4, 0.5};  ///< to a camera; the object has its own
 };
 
 /// @throws Error naming the option that is out of range.

@@ -3,32 +3,31 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
-#include <vector>
 
 #include "palpate/lab/built_in.hpp"
 
 namespace palpate::lab {
 namespace {
 
-// The lab's own error must be small against what the estimator states (about 1 % in E): travel goes with 1/E.
+// The demo's own error must be at most a fifth of the 1.5 % that the estimator states of its E: travel goes with 1/E. Near the end of
+// the range that nu is drawn from, too, where volume counts most.
 TEST(BuiltIn, RefinementMovesTheTruthLittle) {
   DemoOptions options;
   options.sites_m = {0.0};
+  options.material = "linear";  // one solve a mesh
   options.young_modulus_pa = 15e3;
-  options.poisson_ratio = 0.3;
   options.levels = 1;
   options.depth_m = 0.005;
-  std::vector<double> travel;
-  for (const int cells : {1, 2, 3}) {
-    options.cells_in_radius = cells;
-    travel.push_back(make_demo(options).truth.travel_m[0][1]);
+  for (const double poisson : {0.3, 0.45}) {
+    options.poisson_ratio = poisson;
+    const auto travel_with = [&](int cells) {
+      options.cells_in_radius = cells;
+      return make_demo(options).truth.travel_m[0][1];
+    };
+    const double usual = travel_with(DemoOptions{}.cells_in_radius), fine = travel_with(2 * DemoOptions{}.cells_in_radius);
+    EXPECT_LT(std::abs(usual / fine - 1), 0.003) << "nu " << poisson << ": " << 1e3 * usual << " and " << 1e3 * fine << " mm";
+    EXPECT_NE(usual, fine);
   }
-  RecordProperty("travel_1_mm", std::to_string(1e3 * travel[0]));
-  RecordProperty("travel_2_mm", std::to_string(1e3 * travel[1]));
-  RecordProperty("travel_3_mm", std::to_string(1e3 * travel[2]));
-  EXPECT_LT(std::abs(travel[1] / travel[2] - 1), 0.004);
-  EXPECT_LT(std::abs(travel[1] - travel[2]), std::abs(travel[0] - travel[2]));
 }
 
 }  // namespace

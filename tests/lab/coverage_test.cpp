@@ -34,6 +34,8 @@ struct SceneOfLabs {
   std::function<Lab(std::uint64_t seed)> make;
 };
 
+void PrintTo(const SceneOfLabs& scene, std::ostream* out) { *out << scene.name; }
+
 int from_environment(const char* name, int otherwise) {
   const char* text = std::getenv(name);
   return text ? std::max(1, std::atoi(text)) : otherwise;

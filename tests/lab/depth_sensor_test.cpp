@@ -154,6 +154,33 @@ TEST(DepthSensor, FlyingPixelsStandBetweenTheTwoSidesOfAnEdge) {
   EXPECT_NEAR(flying / 240.0, options.flying_pixel_share, 4 * std::sqrt(0.6 * 0.4 / 240));
 }
 
+// A pixel's sample belongs to a place beside its centre: on a slope that is an error of depth, and none in front of a wall.
+TEST(DepthSensor, JitterAcrossIsSeenOnSlopes) {
+  DepthSensorOptions options;
+  options.noise.model = "realsense_d435";
+  options.depth_unit_m = 0;
+  PerfectView slope = wall(0.8F, 0.6F);
+  for (int column = 0; column < 160; ++column) slope.depth_m.col(column).setConstant(0.8F + 0.002F * float(column));
+  const auto spread_with = [&](bool jitter) {
+    options.lateral_jitter = jitter;
+    Random random(21);
+    const DepthImage off = sense_depth(slope, small_camera(), options, random) - slope.depth_m;
+    return std::sqrt(off.block(1, 1, 118, 158).cast<double>().array().square().mean());
+  };
+  const double across_px = 0.00220941 * small_camera().fx_px;
+  const double axial_m = spread_with(false);
+  EXPECT_NEAR(std::sqrt(std::pow(spread_with(true), 2) - axial_m * axial_m) / (across_px * 0.002), 1, 0.05);
+}
+
+// All depths of one sensor are off alike, and what it states says how far they may be.
+TEST(DepthSensor, OneOffsetOfAllDepths) {
+  DepthSensorOptions options = depth_sensor("azure_kinect");
+  EXPECT_NEAR(stated_noise(options).bias_std_m, 0.0055, 1e-12);
+  options.bias_m = 0.004;
+  Random random(4);
+  EXPECT_NEAR(sense_depth(wall(0.6F), small_camera(), options, random).cast<double>().mean(), 0.604, 1e-4);
+}
+
 TEST(DepthSensor, GrazingSurfacesGiveNothingAndDepthIsQuantised) {
   DepthSensorOptions options;
   Random random(5);
@@ -177,6 +204,7 @@ TEST(DepthSensor, BadOptionsAreRefused) {
   const auto refused = [](auto change) { return refuses([](const auto& o) { check(o); }, DepthSensorOptions{}, change); };
   using O = DepthSensorOptions;
   EXPECT_FALSE(refused([](O&) {}));
+  EXPECT_TRUE(refused([](O& o) { o.bias_std_m = -1; }));
   EXPECT_TRUE(refused([](O& o) { o.correlated_sigma_m = -1; }));
   EXPECT_TRUE(refused([](O& o) { o.correlation_px = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.flying_pixel_share = 1.1; }));

@@ -21,7 +21,7 @@ TEST(ForceSensor, ReadingsShowTheFiguresOfEveryRow) {
     Vec3 mean = Vec3::Zero(), square = Vec3::Zero();
     constexpr int count = 20000;
     for (int i = 0; i < count; ++i) {
-      const Vec3 f = sensor.read(Vec3(1, 2, -10), 0, noise);
+      const Vec3 f = sensor.read(Vec3(1, 2, -10), Mat3::Identity(), 0, noise);
       mean += f / count;
       square += f.cwiseAbs2() / count;
       for (int k = 0; k < 3; ++k) ASSERT_NEAR(f(k) / o.unit_n, std::round(f(k) / o.unit_n), 1e-6);
@@ -29,7 +29,7 @@ TEST(ForceSensor, ReadingsShowTheFiguresOfEveryRow) {
     // Quantisation adds a twelfth of its square.
     const double expected = std::sqrt(o.sigma_n * o.sigma_n + o.unit_n * o.unit_n / 12);
     EXPECT_NEAR(std::sqrt((square - mean.cwiseAbs2()).mean()) / expected, 1, 0.02) << row.name;
-    EXPECT_EQ(sensor.read(Vec3(0, 0, 1e4), 0, noise).z(), o.range_n);
+    EXPECT_EQ(sensor.read(Vec3(0, 0, 1e4), Mat3::Identity(), 0, noise).z(), o.range_n);
   }
   EXPECT_THROW(force_sensor("scales"), Error);
 }
@@ -43,8 +43,8 @@ TEST(ForceSensor, EveryBoxHoldsAnother) {
   for (std::uint64_t seed = 0; seed < boxes; ++seed) {
     Random once(seed), noise(1);
     const ForceSensor sensor(o, once);
-    const Vec3 zero = sensor.read(Vec3::Zero(), 0, noise), later = sensor.read(Vec3::Zero(), 1000, noise),
-               pushed = sensor.read(Vec3(0, 0, -100), 0, noise);
+    const Vec3 zero = sensor.read(Vec3::Zero(), Mat3::Identity(), 0, noise), later = sensor.read(Vec3::Zero(), Mat3::Identity(), 1000, noise),
+               pushed = sensor.read(Vec3(0, 0, -100), Mat3::Identity(), 0, noise);
     bias += zero.squaredNorm() / 3 / boxes;
     drift += ((later - zero) / 1000).squaredNorm() / 3 / boxes;
     scale += std::pow((pushed - zero).z() / -100 - 1, 2) / boxes;
@@ -54,6 +54,27 @@ TEST(ForceSensor, EveryBoxHoldsAnother) {
   EXPECT_NEAR(std::sqrt(drift) / o.drift_n_s, 1, 0.05);
   EXPECT_NEAR(std::sqrt(scale) / o.scale_std, 1, 0.05);
   EXPECT_NEAR(std::sqrt(cross) / o.cross_talk_std, 1, 0.05);
+}
+
+// What errs belongs to the sensor and turns with the wrist; the weight that hangs on it does not.
+TEST(ForceSensor, ErrorsTurnWithTheWrist) {
+  ForceSensorOptions o = force_sensor("schunk_ftcl_050");
+  o.sigma_n = o.unit_n = o.drift_n_s = 0;
+  Random once(5), noise(1);
+  const ForceSensor sensor(o, once);
+  const Mat3 turned = Eigen::AngleAxisd(2.1, Vec3(0.3, -0.8, 0.5).normalized()).toRotationMatrix();
+  const auto base_force = [&](const Mat3& R, const Vec3& push_n) { return Vec3(R * sensor.read(push_n, R, 0, noise)); };
+  // Along the sensor's own axes the same push reads the same, whatever way it stands.
+  const Vec3 push_n(1, -4, 20), weight_n(0, 0, 9.81 * o.tool_mass_kg);
+  const Vec3 upright = sensor.read(push_n - weight_n, Mat3::Identity(), 0, noise),
+             aside = sensor.read(turned * push_n - weight_n, turned, 0, noise);
+  EXPECT_NEAR((upright - aside).norm(), 0, 1e-12);
+  // Without bias, scale and cross-talk the base frame sees push and weight alone.
+  o.bias_n = o.scale_std = o.cross_talk_std = 0;
+  const ForceSensor perfect(o, once);
+  for (const Mat3& R : {Mat3(Mat3::Identity()), turned})
+    EXPECT_NEAR((R * perfect.read(push_n, R, 0, noise) - push_n - weight_n).norm(), 0, 1e-12);
+  EXPECT_GT((base_force(turned, push_n) - base_force(Mat3::Identity(), push_n)).norm(), 0.1) << "its bias has turned";
 }
 
 }  // namespace

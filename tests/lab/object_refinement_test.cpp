@@ -13,8 +13,10 @@ namespace {
 
 struct Case {
   std::string name, object;
+  double most = 0.004;  ///< a fifth of what the estimator states of E (docs/uncertainty.md): 2 % unless said otherwise
   double region_ratio = 1;
 };
+void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 
 class Refinement : public testing::TestWithParam<Case> {};
 
@@ -37,7 +39,7 @@ TEST_P(Refinement, MovesTheTruthLittle) {
   for (std::size_t site = 0; site < make_object(GetParam().object, options).sites.size(); ++site) {
     const double usual = travel_of(ObjectOptions{}.tetrahedra, ObjectOptions{}.cells_in_radius, site),
                  fine = travel_of(2 * ObjectOptions{}.tetrahedra, 8, site);
-    EXPECT_LT(std::abs(usual / fine - 1), 0.005) << "site " << site;  // a fifth of the 2.5 % that the estimator states of E
+    EXPECT_LT(std::abs(usual / fine - 1), GetParam().most) << "site " << site;
   }
 }
 
@@ -45,8 +47,8 @@ TEST_P(Refinement, MovesTheTruthLittle) {
 std::vector<Case> cases() {
   std::vector<Case> all;
   for (const BuiltInObject& row : built_in_objects())
-    if (row.name != "balloon") all.push_back({std::string(row.name), std::string(row.name)});
-  all.push_back({"bear_in_regions", "bear", 1.4});
+    if (row.name != "balloon") all.push_back({std::string(row.name), std::string(row.name), row.name == "bar" ? 0.0023 : row.name == "cube" ? 0.003 : 0.004});
+  all.push_back({"bear_in_regions", "bear", 0.004, 1.4});
   return all;
 }
 INSTANTIATE_TEST_SUITE_P(Objects, Refinement, testing::ValuesIn(cases()), [](const auto& one) { return one.param.name; });

@@ -48,6 +48,23 @@ TEST(DepthNoise, FiguresOfTheSources) {
   EXPECT_NEAR(sigma("realsense_l515", 1.0), 0.0025, 1e-12);
   EXPECT_NEAR(sigma("realsense_l515", 9.0), 0.0155, 1e-12);
   EXPECT_NEAR(sigma("realsense_l515", 0.4), 0.0025, 1e-12);
+  // The fit's figures at ranges that pushes are watched from, by hand: 0.00241809 + 0.00662547 (z - 0.77199589)^2.
+  EXPECT_NEAR(sigma("realsense_d435", 0.5), 0.0029083, 1e-7);
+  EXPECT_NEAR(sigma("realsense_d435", 1.5), 0.0059295, 1e-7);
+  EXPECT_NEAR(sigma("fotonic_g45", 0.7), 0.0263, 1e-12);
+  EXPECT_NEAR(sigma("azure_kinect", 3.86), 0.017, 1e-12);
+  // A tenth of a pixel of 525 over a base of 120 mm: 1.6 mm at a metre, a quarter of that at half of it.
+  EXPECT_NEAR(sigma("bumblebee_stereo", 1.0), 0.0015873, 1e-7);
+  EXPECT_NEAR(sigma("bumblebee_stereo", 0.5), 0.00039683, 1e-8);
+}
+
+// Across, in pixels: 0.8 and 0.035 theta / (pi/2 - theta) (Nguyen et al., their figure 3); the other two in radians.
+TEST(DepthNoise, FiguresAcross) {
+  const auto sigma_px = [](const char* name, double theta) { return depth_noise_model(name).lateral_sigma_px({1.0, theta, 600}); };
+  EXPECT_NEAR(sigma_px("kinect_v1", 0), 0.8, 1e-12);
+  EXPECT_NEAR(sigma_px("kinect_v1", M_PI / 3), 0.87, 1e-12);
+  EXPECT_NEAR(sigma_px("realsense_d435", 0.5), 1.32565, 1e-5);
+  EXPECT_NEAR(sigma_px("fotonic_g45", 0.5), 1.8978, 1e-6);
 }
 
 TEST(DepthNoise, StereoLawIsTheDerivativeOfTheDisparity) {
