@@ -122,6 +122,7 @@ struct LabRobot::Impl {
         tip(mask.kinematics().link("tip")),
         hand(mask.kinematics().link("hand_tilt")),
         hand_camera(mask.kinematics().link("camera")),
+        stick(mask.kinematics().link("stick")),
         joint_random(given.seed, 1),
         force_random(given.seed, 2),
         depth_random(given.seed, 3) {
@@ -219,17 +220,38 @@ struct LabRobot::Impl {
     return *curves[active];
   }
   bool slipped() { return travel() > options.slip_at_m; }
+  static constexpr double left_after_slip = 0.4;  // of the force: a tip that slid off still leans on the object
   double force() {
     const double travelled = travel();
     if (travelled <= 0) return 0;  // nothing has to be solved before contact
     const double steady = curve().force_n(curve().at(travelled));
-    return slipped() ? 0.4 * steady : steady;
+    return slipped() ? left_after_slip * steady : steady;
   }
+  // How the object looks now: as deep as it bears the force.
+  TriMesh shape() {
+    TriMesh out = object.surface;
+    if (double low = 0, high = travel(); high > 0) {
+      if (slipped()) {
+        const double bears_n = force();
+        for (int k = 0; k < 60; ++k) (curve().force_n(curve().at(0.5 * (low + high))) < bears_n ? low : high) = 0.5 * (low + high);
+      }
+      out = curve().surface(curve().at(high));
+    }
+    out.vertices_m.rowwise() += slid_m.transpose();
+    return out;
+  }
+  // Of the stick's end, from where the joints put it: it yields, and where the tip slid off it bends aside.
+  Vec3 tip_is_off_m() {
+    Vec3 off = -options.compliance_m_per_n * force() * site().direction;
+    if (slipped()) off += slid_off_m * tip_of(true_joints).linear().col(1);
+    return off;
+  }
+  static constexpr double slid_off_m = 0.005;
 
   LabOptions options;
   LabObject object;
   sensing::RobotMask mask;
-  Index tip, hand, hand_camera;
+  Index tip, hand, hand_camera, stick;
   std::vector<std::unique_ptr<ForceCurve>> curves;  // a site
   std::size_t active = 0;
   std::unique_ptr<ForceSensor> wrist;
@@ -257,7 +279,7 @@ acquisition::RobotState LabRobot::read() {
   state.time_s = lab.clock_s;
   state.joints_rad = lab.commanded;
   state.T_base_tip = lab.tip_of(lab.commanded);
-  if (lab.slipped()) state.T_base_tip.translation() += 0.005 * state.T_base_tip.linear().col(1);
+  if (lab.slipped()) state.T_base_tip.translation() += Impl::slid_off_m * state.T_base_tip.linear().col(1);
   const double steady = lab.force();
   const double fading = steady > 0 ? lab.fading_n * std::exp(-(lab.clock_s - lab.moved_s) / lab.options.relaxation_s) : 0;
   const Mat3 R_true = lab.pose_of(lab.hand, lab.true_joints).linear(), R_read = lab.pose_of(lab.hand, lab.commanded).linear();
@@ -300,9 +322,8 @@ DepthFrame LabRobot::take_depth_image() {
   frame.noise = stated_noise(lab.options.depth);
   const auto& names = lab.mask.kinematics().free_joints();
   const auto poses = lab.mask.kinematics().link_poses(names, lab.true_joints);
-  TriMesh shape = lab.travel() > 0 ? lab.curve().surface(lab.curve().at(lab.travel())) : lab.object.surface;
-  shape.vertices_m.rowwise() += lab.slid_m.transpose();
-  const geometry::TriangleTree object(std::move(shape));
+  const geometry::TriangleTree object(lab.shape());
+  const Vec3 off_m = lab.tip_is_off_m();
   std::vector<std::unique_ptr<geometry::TriangleTree>> arm_trees;
   Scene scene;
   scene.bodies.push_back(&object);
@@ -310,6 +331,7 @@ DepthFrame LabRobot::take_depth_image() {
     TriMesh posed = mesh;
     for (Eigen::Index v = 0; v < mesh.vertices_m.rows(); ++v)
       posed.vertices_m.row(v) = poses[link] * Vec3(mesh.vertices_m.row(v));
+    if (Index(link) == lab.stick) posed.vertices_m.rowwise() += off_m.transpose();
     arm_trees.push_back(std::make_unique<geometry::TriangleTree>(std::move(posed)));
     scene.bodies.push_back(arm_trees.back().get());
   }

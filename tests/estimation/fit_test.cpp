@@ -240,6 +240,15 @@ TEST(PushedBlockFit, CloudOfAFinerMeshGivesBothParametersWithinTheirIntervals) {
   ASSERT_EQ(answer.covariance.rows(), 2);
 }
 
+// The numbers of an inflated thing are those of the thing, not of its skin, and that is said of no other.
+TEST(PushedBlockFit, OfAnInflatedObjectTheModulusIsApparentOnly) {
+  const PushedBlock truth;
+  Recording recording = pushed_block_recording();
+  EXPECT_FALSE(says(fit(recording, coarse_block(), clouds_of(truth), {}), "apparent_modulus_only"));
+  recording.rest.state = RestState::under_pressure;
+  EXPECT_TRUE(says(fit(recording, coarse_block(), clouds_of(truth), {}), "apparent_modulus_only"));
+}
+
 TEST(PushedBlockFit, FivePercentGrossOutliersMoveLittle) {
   PushedBlock truth;
   const Identification clean = fit(pushed_block_recording(), coarse_block(), clouds_of(truth), {});

@@ -87,6 +87,38 @@ TEST(Mishaps, AnObjectThatSlidesBearsNoMoreThanFrictionAndIsSeenToHaveMoved) {
   }
 }
 
+// What the camera sees of a tip that slid off: the object back where it bears two fifths of the force, and a stick that stands aside.
+TEST(Mishaps, ASlipIsInThePicture) {
+  LabOptions options = quiet();
+  options.depth.noise = {"constant", 1e-6, 0};
+  options.depth.flying_pixel_share = 0;
+  options.depth.depth_unit_m = 0;
+  options.camera_std_m = options.camera_std_rad = 0;
+  LabRobot held(options, small_ball());
+  options.slip_at_m = 0.004;
+  LabRobot slid(options, small_ball());
+  const auto plan = held.plan(0);
+  slid.plan(0);
+  go(held, plan, 0.008);
+  go(slid, plan, 0.008);
+  EXPECT_NEAR(slid.true_force_n(), 0.4 * held.true_force_n(), 1e-6);
+  const DepthFrame before = held.take_depth_image(), after = slid.take_depth_image();
+  // Where the other one bears that force, the ball looks the same but for the stick before it.
+  double low = 0, high = 0.008;
+  for (int k = 0; k < 40; ++k) {
+    go(held, plan, 0.5 * (low + high));
+    (held.true_force_n() < slid.true_force_n() ? low : high) = 0.5 * (low + high);
+  }
+  const DepthFrame alike = held.take_depth_image();
+  const auto differing = [](const DepthFrame& a, const DepthFrame& b) {
+    return ((a.depth_m - b.depth_m).array().abs() > 2e-4F && a.mask.array() == 0 && b.mask.array() == 0).count();
+  };
+  EXPECT_GT(differing(before, after), 500);
+  EXPECT_LT(differing(alike, after), differing(before, after) / 5);
+  // The encoders know of the slide, the stick stands there.
+  EXPECT_GT(((alike.depth_m - after.depth_m).array().abs() > 0.02F).count(), 200);
+}
+
 TEST(Mishaps, AForceThatCreepsIsReported) {
   LabOptions options = quiet();
   options.relaxation = 0.9;

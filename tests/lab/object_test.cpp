@@ -242,6 +242,34 @@ TEST(Object, SeedDrawsTheTruthAndOptionsFixIt) {
   options.material = "linear";
   options.poisson_ratio = 0.5;
   EXPECT_THROW(make_object("cube", options), Error);
+  options = {};
+  options.albedo = 0;
+  EXPECT_THROW(make_object("cube", options), Error);
+  // A skin is what it is: what it cannot take is refused, not passed over.
+  options = {};
+  options.poisson_ratio = 0.3;
+  EXPECT_THROW(make_object("balloon", options), Error);
+  options = {};
+  options.material = "foam";
+  EXPECT_THROW(make_object("balloon", options), Error);
+}
+
+// The foam law (alpha = 4) is that of small strains at first, and softer than a Neo-Hookean solid further in.
+TEST(Object, AFoamTruthSoftens) {
+  ObjectOptions options;
+  options.young_modulus_pa = 15e3;
+  options.poisson_ratio = 0.2;
+  options.cells_in_radius = 3;
+  const auto travel_m = [&](const char* law, double force_n) {
+    options.material = law;
+    const LabObject object = make_object("cube", options);
+    const auto pressed = object.press(object.sites[0]);
+    pressed->press(force_n);
+    return pressed->travel_m();
+  };
+  const double deep_n = 4 * make_object("cube", options).force_step_n, touch_n = 1e-3 * deep_n;
+  EXPECT_NEAR(travel_m("foam", touch_n) / travel_m("linear", touch_n), 1, 2e-3);
+  EXPECT_GT(travel_m("foam", deep_n) / travel_m("neo_hookean", deep_n), 1.02);
 }
 
 TEST(Object, AnySurfaceOfAUserStandsOnTheTable) {
@@ -256,6 +284,12 @@ TEST(Object, AnySurfaceOfAUserStandsOnTheTable) {
   pressed->press(0.2 * object.force_step_n);
   EXPECT_GT(pressed->travel_m(), 1e-4);
   EXPECT_LT(pressed->travel_m(), 1e-2);
+  // Nothing stands above a ring's middle: it is pushed where it is highest.
+  const TriMesh ring = implicit_surface(
+      [](const Vec3& p) { return std::hypot(std::hypot(p.x(), p.y()) - 0.06, p.z() - 0.02) - 0.02; }, {{-0.09, -0.09, -0.01}, {0.09, 0.09, 0.05}, 0.005});
+  const LabObject torus = object_from_surface(ring, "ring", options);
+  EXPECT_NEAR(torus.sites[0].contact_m.z(), options.base_centre_m.z() + 0.04, 1e-3);
+  EXPECT_NEAR((torus.sites[0].contact_m - options.base_centre_m).head<2>().norm(), 0.06, 5e-3);
   TriMesh open = egg;
   open.triangles.conservativeResize(open.triangles.rows() - 1, 3);
   EXPECT_THROW(object_from_surface(open, "open", options), Error);
