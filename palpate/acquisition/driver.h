@@ -41,6 +41,8 @@ struct PalpateRobotState {
   double joints_rad[PALPATE_MAX_JOINTS]; /**< in the order of `joint_names` of the scene */
   struct PalpatePose T_base_tip;         /**< z along the tool, into the object */
   double force_n[3];                     /**< of the tool on the object, base frame; a constant bias is allowed */
+  int has_torque;                        /**< not 0: torque_nm is measured */
+  double torque_nm[3];                   /**< of the tool on the object about the tip, base frame; a constant bias is allowed */
 };
 
 /** The pixels stay the driver's and are valid until its next call. */

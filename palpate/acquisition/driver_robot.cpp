@@ -84,6 +84,10 @@ RobotState DriverRobot::read() {
   state.joints_rad.assign(given.joints_rad, given.joints_rad + given.joints);
   state.force_n = Vec3(given.force_n[0], given.force_n[1], given.force_n[2]);
   if (!state.force_n.allFinite()) failed("read", "force_n: is not finite; is the sensor connected?");
+  if (given.has_torque != 0) {
+    state.torque_nm = Vec3(given.torque_nm[0], given.torque_nm[1], given.torque_nm[2]);
+    if (!state.torque_nm->allFinite()) failed("read", "torque_nm: is not finite; say has_torque = 0 where none is measured");
+  }
   if (!std::all_of(state.joints_rad.begin(), state.joints_rad.end(), [](double q) { return std::isfinite(q); }))
     failed("read", "joints_rad: is not finite");
   if (!std::isfinite(given.time_s) || given.time_s < clock_s_) failed("read", "time_s: the clock must not go back");

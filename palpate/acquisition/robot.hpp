@@ -2,6 +2,7 @@
 // What the push protocol needs of a robot. A driver implements these six calls; the lab's software arm is one of them.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,8 @@ struct RobotState {
   std::vector<double> joints_rad;
   Pose T_base_tip = Pose::Identity();  ///< z along the tool, into the object
   Vec3 force_n = Vec3::Zero();         ///< of the tool on the object, base frame; a constant bias is allowed
+  /// Of the tool on the object about the tip, base frame; a constant bias is allowed. It says where a force acts. Nothing: not measured.
+  std::optional<Vec3> torque_nm;
 };
 
 enum class Motion {

@@ -11,15 +11,28 @@
 namespace palpate::lab {
 namespace {
 
+Vec3 as_read(Vec3 value, double unit, const Vec3& range) {
+  for (int k = 0; k < 3; ++k) {
+    if (unit > 0) value(k) = unit * std::round(value(k) / unit);
+    value(k) = std::clamp(value(k), -range(k), range(k));
+  }
+  return value;
+}
+
 // Noise, drift and cross-talk are not in the sheets that could be had: they are of the size that users of strain-gauge sensors
-// report. Ranges and resolutions are the makers'.
+// report. Ranges and resolutions are the makers' where a source is named.
 constexpr std::array<ForceSensorModel, 4> table{{
     {"generic", "a good strain-gauge sensor without cross-talk", {}},
     {"schunk_ftcl_050", "range 300 N: Frank et al. 2010, section V; the rest of the size usual in its class",
-     {0.08, 0.05, 300, 1.0, 0.0003, 0.015, 0.01, 0.3}},
-    {"ati_gamma", "ATI Gamma SI-32-2.5: range 32 N across, resolution 6.25 mN (manual 9620-05); the rest of the size usual",
-     {0.01, 0.00625, 32, 0.5, 0.0001, 0.01, 0.005, 0.3}},
-    {"ideal", "none such: for tests of the rest", {0.001, 0.0001, 1000, 1.0, 0, 0.01, 0, 0.3}},
+     {.sigma_n = 0.08, .unit_n = 0.05, .range_n = 300, .range_along_n = 300, .bias_n = 1.0, .drift_n_s = 0.0003, .scale_std = 0.015,
+      .cross_talk_std = 0.01, .torque_sigma_nm = 0.004, .torque_unit_nm = 0.001, .torque_range_nm = 7}},
+    {"ati_gamma", "ATI Gamma SI-32-2.5: ranges 32 N across, 100 N along and 2.5 N m, resolutions 6.25 mN and 0.5 mN m (manual 9620-05); "
+                  "the rest of the size usual",
+     {.sigma_n = 0.01, .unit_n = 0.00625, .range_n = 32, .range_along_n = 100, .bias_n = 0.5, .drift_n_s = 0.0001, .scale_std = 0.01,
+      .cross_talk_std = 0.005, .torque_sigma_nm = 0.0005, .torque_unit_nm = 0.0005, .torque_range_nm = 2.5}},
+    {"ideal", "none such: for tests of the rest",
+     {.sigma_n = 0.001, .unit_n = 0.0001, .range_n = 1000, .range_along_n = 1000, .bias_n = 1.0, .drift_n_s = 0, .scale_std = 0.01,
+      .torque_sigma_nm = 1e-5, .torque_unit_nm = 0, .torque_range_nm = 100}},
 }};
 
 }  // namespace
@@ -46,13 +59,19 @@ void check(const ForceSensorOptions& o) {
   need(o.drift_n_s >= 0, "drift_n_s", "must not be negative");
   need(o.scale_std >= 0 && o.scale_std < 0.3, "scale_std", "must be in [0, 0.3)");
   need(o.cross_talk_std >= 0 && o.cross_talk_std < 0.3, "cross_talk_std", "must be in [0, 0.3)");
+  need(o.range_along_n > 0, "range_along_n", "must be positive");
+  need(o.torque_sigma_nm >= 0, "torque_sigma_nm", "must not be negative");
+  need(o.torque_unit_nm >= 0, "torque_unit_nm", "must not be negative");
+  need(o.torque_range_nm > 0, "torque_range_nm", "must be positive");
+  need(o.torque_bias_nm >= 0, "torque_bias_nm", "must not be negative");
   need(o.tool_mass_kg >= 0, "tool_mass_kg", "must not be negative");
 }
 
-ForceSensor::ForceSensor(const ForceSensorOptions& options, Random& once) : options_(options) {
+ForceSensor::ForceSensor(const ForceSensorOptions& options, Random& once, Random of_torque) : options_(options) {
   check(options);
   bias_n_ = options.bias_n * once.normal3();
   drift_n_s_ = options.drift_n_s * once.normal3();
+  torque_bias_nm_ = options.torque_bias_nm * of_torque.normal3();
   scale_ = 1 + options.scale_std * once.normal();
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
@@ -63,11 +82,15 @@ Vec3 ForceSensor::read(const Vec3& true_force_n, const Mat3& R_base_sensor, doub
   // A reaction on the tool is the force on the object with the other sign; drivers turn it round, and so the weight too.
   const Vec3 weight_n(0, 0, 9.81 * options_.tool_mass_kg);
   Vec3 force = scale_ * (gain_ * (R_base_sensor.transpose() * (true_force_n + weight_n))) + bias_n_ + drift_n_s_ * time_s + options_.sigma_n * noise.normal3();
-  for (int k = 0; k < 3; ++k) {
-    if (options_.unit_n > 0) force(k) = options_.unit_n * std::round(force(k) / options_.unit_n);
-    force(k) = std::clamp(force(k), -options_.range_n, options_.range_n);
-  }
-  return force;
+  const double across_n = options_.range_n;
+  return as_read(force, options_.unit_n, Vec3(across_n, across_n, options_.range_along_n));
+}
+
+Vec3 ForceSensor::read_torque(const Vec3& true_torque_nm, const Mat3& R_base_sensor, Random& noise) const {
+  const Vec3 weight_n(0, 0, 9.81 * options_.tool_mass_kg), centre_m(0, 0, options_.tool_centre_m);
+  const Vec3 along_axes = R_base_sensor.transpose() * true_torque_nm + centre_m.cross(Vec3(R_base_sensor.transpose() * weight_n));
+  const Vec3 torque = scale_ * along_axes + torque_bias_nm_ + options_.torque_sigma_nm * noise.normal3();
+  return as_read(torque, options_.torque_unit_nm, Vec3::Constant(options_.torque_range_nm));
 }
 
 }  // namespace palpate::lab

@@ -125,11 +125,12 @@ struct LabRobot::Impl {
         stick(mask.kinematics().link("stick")),
         joint_random(given.seed, 1),
         force_random(given.seed, 2),
-        depth_random(given.seed, 3) {
+        depth_random(given.seed, 3),
+        torque_random(given.seed, 7) {
     if (object.sites.empty() || !object.press) throw Error("needs a site and a truth", "LabObject");
     curves.resize(object.sites.size());
     Random once(options.seed, 0);
-    wrist = std::make_unique<ForceSensor>(options.force, once);
+    wrist = std::make_unique<ForceSensor>(options.force, once, Random(given.seed, 6));
     const Vec3 turn = options.camera_std_rad * once.normal3();
     T_true_stated.pretranslate(options.camera_std_m * once.normal3());
     if (turn.norm() > 0) T_true_stated.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
@@ -246,6 +247,12 @@ struct LabRobot::Impl {
     if (slipped()) off += slid_off_m * tip_of(true_joints).linear().col(1);
     return off;
   }
+  // The middle of the pad's pressure, which lies on the object.
+  Vec3 force_acts_at_m() {
+    Vec3 at_m = site().contact_m + slid_m + std::max(0.0, travel()) * site().direction;
+    if (slipped()) at_m += slid_off_m * tip_of(true_joints).linear().col(1);
+    return at_m;
+  }
   static constexpr double slid_off_m = 0.005;
 
   LabOptions options;
@@ -257,7 +264,7 @@ struct LabRobot::Impl {
   std::unique_ptr<ForceSensor> wrist;
   Plane table;
   std::vector<Plane> planes;  // the table, and what is upright
-  Random joint_random, force_random, depth_random;
+  Random joint_random, force_random, depth_random, torque_random;
   std::vector<double> commanded, true_joints;
   std::vector<std::pair<std::size_t, TriMesh>> bodies;  // link, mesh in its frame
   Camera camera;
@@ -282,8 +289,13 @@ acquisition::RobotState LabRobot::read() {
   if (lab.slipped()) state.T_base_tip.translation() += Impl::slid_off_m * state.T_base_tip.linear().col(1);
   const double steady = lab.force();
   const double fading = steady > 0 ? lab.fading_n * std::exp(-(lab.clock_s - lab.moved_s) / lab.options.relaxation_s) : 0;
-  const Mat3 R_true = lab.pose_of(lab.hand, lab.true_joints).linear(), R_read = lab.pose_of(lab.hand, lab.commanded).linear();
-  state.force_n = R_read * lab.wrist->read((steady + fading) * lab.site().direction, R_true, lab.clock_s, lab.force_random);
+  const Pose stands = lab.pose_of(lab.hand, lab.true_joints), said = lab.pose_of(lab.hand, lab.commanded);
+  const Vec3 force_n = (steady + fading) * lab.site().direction, acts_m = lab.force_acts_at_m();
+  state.force_n = said.linear() * lab.wrist->read(force_n, stands.linear(), lab.clock_s, lab.force_random);
+  // About the tip, as a driver reckons it from what joints and sensor say.
+  const Vec3 at_wrist_nm =
+      said.linear() * lab.wrist->read_torque((acts_m - stands.translation()).cross(force_n), stands.linear(), lab.torque_random);
+  state.torque_nm = at_wrist_nm - (state.T_base_tip.translation() - said.translation()).cross(state.force_n);
   return state;
 }
 

@@ -29,7 +29,9 @@ TEST(ForceSensor, ReadingsShowTheFiguresOfEveryRow) {
     // Quantisation adds a twelfth of its square.
     const double expected = std::sqrt(o.sigma_n * o.sigma_n + o.unit_n * o.unit_n / 12);
     EXPECT_NEAR(std::sqrt((square - mean.cwiseAbs2()).mean()) / expected, 1, 0.02) << row.name;
-    EXPECT_EQ(sensor.read(Vec3(0, 0, 1e4), Mat3::Identity(), 0, noise).z(), o.range_n);
+    EXPECT_EQ(sensor.read(Vec3(0, 0, 1e4), Mat3::Identity(), 0, noise).z(), o.range_along_n);
+    EXPECT_EQ(sensor.read(Vec3(1e4, 0, 0), Mat3::Identity(), 0, noise).x(), o.range_n);
+    EXPECT_EQ(sensor.read_torque(Vec3(0, -1e3, 0), Mat3::Identity(), noise).y(), -o.torque_range_nm);
   }
   EXPECT_THROW(force_sensor("scales"), Error);
 }
@@ -74,6 +76,11 @@ TEST(ForceSensor, ErrorsTurnWithTheWrist) {
   const ForceSensor perfect(o, once);
   for (const Mat3& R : {Mat3(Mat3::Identity()), turned})
     EXPECT_NEAR((R * perfect.read(push_n, R, 0, noise) - push_n - weight_n).norm(), 0, 1e-12);
+  // The weight hangs 0.15 m along the hand: its torque is what levers say, and a push's is what it is.
+  o.torque_sigma_nm = o.torque_unit_nm = o.torque_bias_nm = 0;
+  const ForceSensor exact(o, once);
+  const Vec3 torque_nm(0.3, -0.2, 0.1), lever_m = turned * Vec3(0, 0, o.tool_centre_m);
+  EXPECT_NEAR((turned * exact.read_torque(torque_nm, turned, noise) - torque_nm - lever_m.cross(weight_n)).norm(), 0, 1e-12);
   EXPECT_GT((base_force(turned, push_n) - base_force(Mat3::Identity(), push_n)).norm(), 0.1) << "its bias has turned";
 }
 

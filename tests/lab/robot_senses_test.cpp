@@ -139,6 +139,31 @@ TEST(RobotSenses, WhatAJointErrsByIsStatedForTheCameraThatItCarries) {
   EXPECT_GT(std::sqrt(square), 0.3 * stated);
 }
 
+// Torque about the tip over force: how far beside the tip the force acts. Here the tip errs by what the joints do, a slip by 5 mm.
+TEST(RobotSenses, TorqueSaysWhereTheForceActs) {
+  LabOptions options = with_sensor("realsense_d435");
+  options.force = force_sensor("ideal");
+  options.force.bias_n = options.force.scale_std = options.force.torque_bias_nm = 0;
+  options.force.tool_mass_kg = 0;
+  options.relaxation = 0;
+  options.joint_std_rad = 0;
+  LabRobot robot = robot_with(options);
+  const acquisition::PushPlan plan = robot.plan();
+  const auto torque_with_tip = [&](double aside_m, double deep_m) {
+    Pose tip = Pose::Identity();
+    tip.linear() = plan.R_base_tip;
+    tip.translation() = plan.contact_m + deep_m * plan.direction + aside_m * Vec3::UnitY();
+    EXPECT_EQ(robot.move(tip, 0.1), acquisition::Motion::done);
+    return robot.read();
+  };
+  const acquisition::RobotState straight = torque_with_tip(0, 0.008), aside = torque_with_tip(0.004, 0.008);
+  ASSERT_TRUE(straight.torque_nm && aside.torque_nm);
+  EXPECT_GT(straight.force_n.norm(), 2);
+  EXPECT_LT(straight.torque_nm->norm() / straight.force_n.norm(), 2e-4);
+  // The pad is soft and stays on the object where it was put: the tip stands 4 mm beside the middle of its pressure.
+  EXPECT_NEAR((*aside.torque_nm + 0.004 * Vec3::UnitY().cross(aside.force_n)).norm() / aside.force_n.norm(), 0, 2e-4);
+}
+
 TEST(RobotSenses, AnArmThatStandsElsewhereMakesTheSamePush) {
   const auto push_of = [](const LabOptions& options) {
     LabRobot robot = robot_with(options);
