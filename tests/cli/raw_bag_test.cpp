@@ -8,6 +8,7 @@
 
 #include "io/read_back.hpp"
 #include "io/recording_folder.hpp"
+#include "io/rosbag2_metadata.hpp"
 
 namespace palpate::io {
 namespace {
@@ -24,7 +25,10 @@ TEST(RawBag, GivesTheStepsOfTheProtocol) {
   ASSERT_EQ(std::system(command.c_str()), 0) << folder.get("err");
   const Recording protocol = read_recording(folder.path() / "folder");
   BagMapping mapping = read_mapping(folder.path() / "raw/mapping.yaml");
-  const SensorStreams streams = read_streams(read_bag(folder.path() / "raw"), mapping);
+  const MessageSource bag = read_bag(folder.path() / "raw");
+  EXPECT_TRUE(bag.warnings.empty()) << bag.warnings.front();
+  EXPECT_EQ(rosbag2_metadata(folder.path() / "raw").messages, bag.messages.size());
+  const SensorStreams streams = read_streams(bag, mapping);
   const Recording found = acquisition::recording_from(mapping.plan, streams).recording;
   EXPECT_TRUE(check_recording(found).empty());
   ASSERT_EQ(found.pushes.size(), protocol.pushes.size());
