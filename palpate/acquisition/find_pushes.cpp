@@ -80,7 +80,8 @@ class Onset {
   bool holds(std::size_t i, const ForceSums& sums, const FreeAir& air, double threshold_n) {
     if (air.samples == 0) return false;
     constexpr double recent_s = 0.3;
-    const std::size_t recent = std::min(first_after(track_, track_.samples[i].time_s - recent_s), i >= confirm_samples ? i + 1 - confirm_samples : 0);
+    const std::size_t recent = std::min(first_after(track_, track_.samples[i].time_s - recent_s),
+                                        i >= confirm_samples ? i + 1 - confirm_samples : 0);
     const double count = double(i + 1 - recent);
     const double risen_n = (sums.mean(recent, i + 1) - air.mean_n).dot(track_.direction[i]);
     const double noise_n = significant * air.std_n * std::sqrt(1 / count + 1 / double(air.samples));

@@ -118,6 +118,19 @@ TEST(FromStreams, TimesAndMarksChooseTheSteps) {
   EXPECT_TRUE(marked[0].steps[2].unloading) << "the mark says so";
 }
 
+TEST(FromStreams, PushesAndContactsThatAreNotAsManyAreSaid) {
+  StreamPlan described = plan();
+  described.pushes = {described.any_push};
+  described.pushes[0].name = "head";
+  EXPECT_TRUE(recording_from(described, lab()).notes.empty());
+  described.pushes.push_back(described.any_push);
+  described.pushes[1].name = "foot";
+  const FromStreams made = recording_from(described, lab());
+  EXPECT_EQ(made.recording.pushes.at(0).name, "head");
+  EXPECT_THAT(made.notes, testing::Contains(testing::AllOf(HasSubstr("pushes in steps.pushes: 2, contacts found in the force: 1"),
+                                                           HasSubstr("the last pushes have no contact"))));
+}
+
 TEST(FromStreams, AForceOnItsWayIsThatOfTheImage) {
   StreamPlan moving = plan();
   moving.steps_by = StepsBy::times;
