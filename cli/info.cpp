@@ -273,8 +273,8 @@ int look(Session& session, const Arguments& given) {
   const std::size_t left_out = all.contains("bag") ? all["bag"]["left_out"].size() : 0;
   if (problems.empty())
     session.say(left_out == 0 ? "nothing is wrong with it"
-                              : fmt::format("nothing is wrong with what the mapping names; {} topic{} of use left out",
-                                            left_out, left_out == 1 ? " is" : "s are"));
+                              : fmt::format("nothing is wrong with what the mapping names; {} left out",
+                                            left_out == 1 ? "1 topic of use is" : fmt::format("{} topics of use are", left_out)));
   session.result(all);
   return problems.empty() ? exit_done : exit_input;
 }

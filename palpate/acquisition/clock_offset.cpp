@@ -72,7 +72,13 @@ ClockOffset find_offset(const RunningSum& motion, std::span<const Change> change
     const double curvature = (before - 2 * here + after) / (width * width);
     if (curvature > 0) {
       found.offset_s += std::clamp((before - after) / (2 * width * curvature), -width, width);
-      found.std_s = 1 / std::sqrt(curvature);
+      // Or over all offsets, each as likely as it is: few images have other peaks that are nearly as high.
+      double weights = 0, squares = 0;
+      for (int k = 0; k <= 2 * half; ++k) {
+        const double weight = std::exp(here - cost(k)), off_s = (k - half) * step_s - found.offset_s;
+        weights += weight, squares += weight * off_s * off_s;
+      }
+      found.std_s = std::max(1 / std::sqrt(curvature), std::sqrt(squares / weights));
       found.usable = found.correlation > least_correlation && found.std_s < 0.25 * largest_s;
     }
   }

@@ -24,7 +24,7 @@ struct Change {
 struct ClockOffset {
   std::string sensor;      ///< for messages
   double offset_s = 0;     ///< added to the sensor's times
-  double std_s = 0;        ///< from the width of the likelihood's peak
+  double std_s = 0;        ///< the width of the likelihood's peak, or of all of it where that is more
   double correlation = 0;  ///< at the peak
   bool usable = false;     ///< a clear peak inside the range that was searched
 };
