@@ -4,6 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "cli/mistyped.hpp"
 #include "cli/paths.hpp"
 #include "palpate/acquisition/from_streams.hpp"
 #include "palpate/core/error.hpp"
@@ -11,6 +14,7 @@
 #include "palpate/io/file.hpp"
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
+#include "palpate/sensing/depth_noise.hpp"
 
 namespace palpate::cli {
 
@@ -22,23 +26,53 @@ fs::path mapping_of(const fs::path& bag) {
   return fs::is_regular_file(beside, code) ? beside : fs::path();
 }
 
-Recording load_recording_unchecked(Session& session, const fs::path& path, const fs::path& given) {
+namespace {
+
+/// A mistyped sensor would only show when its noise is first asked for, far from the file.
+void check_noise(const io::BagMapping& mapping) {
+  std::vector<std::string> names{"constant"};
+  for (const sensing::DepthNoiseModel& one : sensing::depth_noise_models()) names.emplace_back(one.name);
+  for (const io::MappedCamera& camera : mapping.cameras) {
+    const std::string& model = camera.like.noise.model;
+    if (std::find(names.begin(), names.end(), model) != names.end()) continue;
+    const auto meant = did_you_mean(model, names);
+    throw Error(fmt::format("no noise model is called '{}';{} they are {}", model.substr(0, 60),
+                            meant ? fmt::format(" did you mean '{}'?", *meant) : "", fmt::join(names, ", ")),
+                camera.noise_where);
+  }
+}
+
+}  // namespace
+
+std::string to_words(const acquisition::ClockOffset& clock) {
+  if (!clock.usable) return "not to be told, nothing taken off";
+  const double taken_s = acquisition::believed_offset_s(clock);
+  return fmt::format("{:+.1f} +- {:.1f} ms against the arm's (correlation {:.2f}), {}", 1e3 * clock.offset_s,
+                     1e3 * clock.std_s, clock.correlation,
+                     taken_s == 0 ? std::string("no evidence of any: nothing taken off")
+                                  : fmt::format("{:+.1f} ms taken off", 1e3 * taken_s));
+}
+
+Recording load_recording_unchecked(Session& session, const fs::path& path, const fs::path& given,
+                                   std::vector<acquisition::ClockOffset>* clocks) {
   must_exist(path, "a recording is a folder with recording.yaml in it, or a bag (docs/recording-format.md)");
   if (!io::is_bag(path)) {
     if (!given.empty()) throw Error("is a recording; only a bag needs a mapping", path.string());
     return io::read_recording_unchecked(path);
   }
   const fs::path file = given.empty() ? mapping_of(path) : given;
-  if (file.empty())
+  if (file.empty()) {
+    io::read_bag(path);  // or it only has the name of one, and says so
     throw Error("is a bag: say what its topics mean with --mapping FILE; `palpate info` suggests one", path.string());
+  }
   io::BagMapping mapping = io::read_mapping(file);
+  check_noise(mapping);
   const io::MessageSource bag = io::read_bag(path);
   const SensorStreams streams = io::read_streams(bag, mapping);
   acquisition::FromStreams made = acquisition::recording_from(mapping.plan, streams);
   for (const acquisition::ClockOffset& clock : made.clocks)
-    if (clock.usable)
-      session.say(fmt::format("clock      {}: {:+.1f} +- {:.1f} ms against the arm's (correlation {:.2f}), taken off",
-                              clock.sensor, 1e3 * clock.offset_s, 1e3 * clock.std_s, clock.correlation));
+    if (clock.usable) session.say(fmt::format("clock      {}: {}", clock.sensor, to_words(clock)));
+  if (clocks != nullptr) *clocks = made.clocks;
   for (const std::string& note : made.notes) session.warn(note);
   std::error_code code;
   if (fs::is_regular_file(path, code))
@@ -46,8 +80,9 @@ Recording load_recording_unchecked(Session& session, const fs::path& path, const
   return std::move(made.recording);
 }
 
-Recording load_recording(Session& session, const fs::path& path, const fs::path& mapping) {
-  Recording recording = load_recording_unchecked(session, path, mapping);
+Recording load_recording(Session& session, const fs::path& path, const fs::path& mapping,
+                         std::vector<acquisition::ClockOffset>* clocks) {
+  Recording recording = load_recording_unchecked(session, path, mapping, clocks);
   const auto problems = io::check_recording(recording);
   if (!problems.empty()) {
     const std::string more =

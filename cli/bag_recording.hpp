@@ -2,8 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "cli/session.hpp"
+#include "palpate/acquisition/clock_offset.hpp"
 #include "palpate/core/recording.hpp"
 
 namespace palpate::cli {
@@ -11,11 +14,17 @@ namespace palpate::cli {
 /// What a verb is given as its recording: a folder with recording.yaml, or a bag with a mapping (given, or mapping.yaml in
 /// the bag's folder). Says what was found in a bag: offsets of clocks, steps that were left out. @throws Error; also for
 /// what check_recording finds.
-Recording load_recording(Session& session, const std::filesystem::path& path, const std::filesystem::path& mapping);
+/// @param clocks  if given, the offsets that were estimated between a bag's clocks
+Recording load_recording(Session& session, const std::filesystem::path& path, const std::filesystem::path& mapping,
+                         std::vector<acquisition::ClockOffset>* clocks = nullptr);
 
 /// The same, unchecked.
 Recording load_recording_unchecked(Session& session, const std::filesystem::path& path,
-                                   const std::filesystem::path& mapping);
+                                   const std::filesystem::path& mapping,
+                                   std::vector<acquisition::ClockOffset>* clocks = nullptr);
+
+/// "+45.9 +- 52.2 ms against the arm's (correlation 0.61), nothing taken off", for people and provenance.
+std::string to_words(const acquisition::ClockOffset& clock);
 
 /// The mapping that belongs to a bag when none is given: mapping.yaml in its folder, or beside the file. Empty = none.
 std::filesystem::path mapping_of(const std::filesystem::path& bag);

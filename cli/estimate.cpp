@@ -122,7 +122,8 @@ int estimate(Session& session, const Options& given) {
     return show ? show(stage, share) : true;
   };
   progress("read", 0);
-  const Recording recording = load_recording(session, given.recording, given.mapping);
+  std::vector<acquisition::ClockOffset> clocks;
+  const Recording recording = load_recording(session, given.recording, given.mapping, &clocks);
   for (const auto& warning : recording.warnings) session.warn(warning);
   if (given.material.empty()) check_material(recording.model.material, given.recording.string() + ": model.material");
   IdentifyOptions options = identify_options(given, session);
@@ -131,6 +132,7 @@ int estimate(Session& session, const Options& given) {
   Identification& answer = found.answer;
   answer.provenance["recording path"] = std::filesystem::absolute(given.recording).lexically_normal().string();
   answer.provenance["seed"] = std::to_string(session.seed);
+  for (const acquisition::ClockOffset& one : clocks) answer.provenance["clock of " + one.sensor] = to_words(one);
   progress("write", 0);
   if (answer.termination == Termination::cancelled) {
     session.warn("stopped before the end: nothing was written");

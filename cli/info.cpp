@@ -244,23 +244,37 @@ struct Arguments {
 int look(Session& session, const Arguments& given) {
   json all;
   if (io::is_bag(given.recording)) {
-    const bool has_mapping = !given.mapping.empty() || !mapping_of(given.recording).empty();
-    const json bag = look_into_bag(session, given.recording, !has_mapping);
-    if (!has_mapping) {
+    const std::filesystem::path mapping = given.mapping.empty() ? mapping_of(given.recording) : given.mapping;
+    const json bag = look_into_bag(session, given.recording, mapping);
+    if (mapping.empty()) {
       session.result(bag);
       return exit_done;
     }
     all["bag"] = bag;
   }
-  Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
+  std::vector<acquisition::ClockOffset> clocks;
+  Recording recording = load_recording_unchecked(session, given.recording, given.mapping, &clocks);
   for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
   std::vector<io::Problem> problems = io::check_recording(recording);
   if (const auto wrong = wrong_material(recording.model.material)) problems.push_back({"model.material", *wrong});
   all.update(described(recording, problems));
+  all["clocks"] = json::array();
+  for (const acquisition::ClockOffset& clock : clocks)
+    all["clocks"].push_back({{"sensor", clock.sensor},
+                             {"offset_s", clock.offset_s},
+                             {"std_s", clock.std_s},
+                             {"correlation", clock.correlation},
+                             {"usable", clock.usable},
+                             {"taken_off_s", acquisition::believed_offset_s(clock)},
+                             {"left_std_s", acquisition::left_std_s(clock)}});
   tell(session, recording, all);
   for (const std::string& warning : recording.warnings) session.warn(warning);
   for (const io::Problem& problem : problems) session.warn(fmt::format("wrong      {}: {}", problem.where, problem.what));
-  if (problems.empty()) session.say("nothing is wrong with it");
+  const std::size_t left_out = all.contains("bag") ? all["bag"]["left_out"].size() : 0;
+  if (problems.empty())
+    session.say(left_out == 0 ? "nothing is wrong with it"
+                              : fmt::format("nothing is wrong with what the mapping names; {} left out",
+                                            left_out == 1 ? "1 topic of use is" : fmt::format("{} topics of use are", left_out)));
   session.result(all);
   return problems.empty() ? exit_done : exit_input;
 }

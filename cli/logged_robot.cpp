@@ -19,10 +19,7 @@ std::int64_t stamp_of(double time_s) { return 1'000'000'000 + std::llround(time_
 }  // namespace
 
 void LoggedRobot::put(const std::string& topic, const std::string& type, double time_s, const std::string& data) {
-  auto channel = channels_.find(topic);
-  if (channel == channels_.end())
-    channel = channels_.emplace(topic, mcap_.add_channel(topic, type, io::ros_type(type).definition)).first;
-  mcap_.add_message(channel->second, static_cast<std::uint64_t>(stamp_of(time_s)), data);
+  bag_.put(topic, type, stamp_of(time_s), data);
 }
 
 acquisition::RobotState LoggedRobot::read() {
@@ -75,7 +72,7 @@ void LoggedRobot::write_bag(const Recording& scene, const std::filesystem::path&
       "steps: {{by: detection, travel_sigma_m: {}, travel_offset_std_m: 0.0005}}\n",
       robot_.travel_sigma_m());
   io::write_file(folder / "mapping.yaml", mapping);
-  io::write_file(folder / (folder.filename().string() + ".mcap"), mcap_.finish());
+  bag_.write(folder);
 }
 
 }  // namespace palpate::cli

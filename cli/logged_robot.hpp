@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "palpate/acquisition/robot.hpp"
-#include "palpate/io/mcap.hpp"
+#include "palpate/io/bag_folder.hpp"
 
 namespace palpate::cli {
 
@@ -32,7 +31,7 @@ class LoggedRobot : public acquisition::Robot {
   /// True when every image so far said which of its pixels show the robot.
   bool is_masked() const { return masked_; }
 
-  /// Writes FOLDER/FOLDER.mcap and FOLDER/mapping.yaml, by which steps are found in it again.
+  /// Writes a folder of rosbag2 and FOLDER/mapping.yaml, by which steps are found in it again.
   /// @param scene  object, supports, tools and robot, without pushes
   void write_bag(const Recording& scene, const std::filesystem::path& folder);
 
@@ -40,8 +39,7 @@ class LoggedRobot : public acquisition::Robot {
   void put(const std::string& topic, const std::string& type, double time_s, const std::string& data);
 
   acquisition::Robot& robot_;
-  io::McapWriter mcap_;
-  std::map<std::string, std::uint16_t> channels_;
+  io::BagFolder bag_;
   DepthFrame camera_;  ///< of the last image, without its pixels
   std::vector<std::string> joint_names_;
   double later_s_ = 0;

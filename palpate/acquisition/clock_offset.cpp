@@ -35,10 +35,22 @@ double RunningSum::at(double time_s) const {
   return (1 - share) * values[i - 1] + share * values[i];
 }
 
+double believed_offset_s(const ClockOffset& found) {
+  if (!found.usable || !(std::abs(found.offset_s) > found.std_s)) return 0;
+  return found.offset_s - found.std_s * found.std_s / found.offset_s;
+}
+
+double left_std_s(const ClockOffset& found) {
+  return found.usable ? std::hypot(found.std_s, found.offset_s - believed_offset_s(found)) : 0;
+}
+
 ClockOffset find_offset(const RunningSum& motion, std::span<const Change> changes, double largest_s, double overlap,
                         double step_s) {
   if (!(largest_s > 0 && step_s > 0 && overlap >= 1))
     throw Error("must be positive", "find_offset: largest_s, step_s, overlap");
+  constexpr double most_steps = 5e5;
+  if (!(largest_s / step_s <= most_steps))
+    throw Error("is more than half a million steps of the search; search less far", "find_offset: largest_s");
   ClockOffset found;
   if (motion.times_s.size() < 2 || changes.size() < fewest_changes) return found;
   const int half = static_cast<int>(std::ceil(largest_s / step_s));
@@ -60,7 +72,13 @@ ClockOffset find_offset(const RunningSum& motion, std::span<const Change> change
     const double curvature = (before - 2 * here + after) / (width * width);
     if (curvature > 0) {
       found.offset_s += std::clamp((before - after) / (2 * width * curvature), -width, width);
-      found.std_s = 1 / std::sqrt(curvature);
+      // Or over all offsets, each as likely as it is: few images have other peaks that are nearly as high.
+      double weights = 0, squares = 0;
+      for (int k = 0; k <= 2 * half; ++k) {
+        const double weight = std::exp(here - cost(k)), off_s = (k - half) * step_s - found.offset_s;
+        weights += weight, squares += weight * off_s * off_s;
+      }
+      found.std_s = std::max(1 / std::sqrt(curvature), std::sqrt(squares / weights));
       found.usable = found.correlation > least_correlation && found.std_s < 0.25 * largest_s;
     }
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "palpate/core/error.hpp"
@@ -10,7 +11,7 @@
 namespace palpate::acquisition {
 namespace {
 
-constexpr int confirm_samples = 3;
+constexpr std::size_t confirm_samples = 3;
 constexpr double noise_factor = 5;
 constexpr double guard_s = 0.1;  // before the contact is noticed, the force may have risen already
 
@@ -55,6 +56,54 @@ struct FreeAir {
   double std_n = 0;
   std::size_t samples = 0;
   double time_s = 0;  // its middle
+  Vec3 mean_n = Vec3::Zero();  // the tare, but where nothing is to be tared
+  std::size_t end = 0;         // its last sample, excluded
+};
+
+/// A contact is noticed at the threshold, which a soft object reaches millimetres after it was touched: back to where the force left
+/// the noise of the air.
+std::size_t traced_back(const Track& track, const ForceSums& sums, const FreeAir& air, std::size_t noticed) {
+  const double noise_n = 2 * air.std_n / std::sqrt(double(confirm_samples));
+  std::size_t first = noticed;
+  while (first > air.end + confirm_samples &&
+         (sums.mean(first - confirm_samples, first) - air.tare_n).dot(track.direction[noticed]) > noise_n)
+    --first;
+  return first;
+}
+
+/// A force that leaves the free air while the tool comes nearer is perhaps the beginning of a contact. The air that follows is not
+/// taken for free: mean and spread of a soft object's slow rise would go along with it, and the threshold would never be reached.
+class Onset {
+ public:
+  explicit Onset(const Track& track) : track_(track) {}
+  /// True while the air before the onset is to be kept.
+  bool holds(std::size_t i, const ForceSums& sums, const FreeAir& air, double threshold_n) {
+    if (air.samples == 0) return false;
+    constexpr double recent_s = 0.3;
+    const std::size_t recent = std::min(first_after(track_, track_.samples[i].time_s - recent_s),
+                                        i >= confirm_samples ? i + 1 - confirm_samples : 0);
+    const double count = double(i + 1 - recent);
+    const double risen_n = (sums.mean(recent, i + 1) - air.mean_n).dot(track_.direction[i]);
+    const double noise_n = significant * air.std_n * std::sqrt(1 / count + 1 / double(air.samples));
+    // A sensor drifts as well, but not by that much within the time of the tare.
+    const bool rises = risen_n > std::max(noise_n, least_share * threshold_n);
+    if (!rises || (since_ && left(i))) since_.reset();
+    if (rises && !since_ && approaches(track_, i)) since_ = i;
+    return since_.has_value();
+  }
+  void forget() { since_.reset(); }
+
+ private:
+  /// Back, or aside: it was no contact, or is one no longer.
+  bool left(std::size_t i) const {
+    constexpr double clear_m = 0.002;
+    const Vec3 moved = track_.samples[i].tip_m - track_.samples[*since_].tip_m;
+    const double along = moved.dot(track_.direction[*since_]);
+    return along < -clear_m || (moved - along * track_.direction[*since_]).norm() > clear_m + std::abs(along);
+  }
+  static constexpr double significant = 3, least_share = 0.2;
+  const Track& track_;
+  std::optional<std::size_t> since_;
 };
 
 /// From the free air before a push to that between it and the next one, which begins with sample `next`.
@@ -94,8 +143,8 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
                   plan.source + ": wrench.tare");
     fixed = {sums.mean(a, b), sums.std_of(a, b), b - a};
   }
-  std::size_t free_since = 0, window_begin = 0, window_end = 0;
-  int run = 0;
+  Onset onset(track);
+  std::size_t free_since = 0, window_begin = 0, window_end = 0, run = 0;
   bool touching = false;
   FreeAir air = fixed;
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -107,10 +156,11 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
       window_begin = std::max(window_begin, free_since);
       const bool enough =
           window_end > window_begin && samples[window_end - 1].time_s - samples[window_begin].time_s > 0.5 * plan.tare_s;
-      if (run == 0 && enough)
-        air = {plan.tare == Tare::none ? Vec3(Vec3::Zero()) : sums.mean(window_begin, window_end),
-               sums.std_of(window_begin, window_end), window_end - window_begin,
-               0.5 * (samples[window_begin].time_s + samples[window_end - 1].time_s)};
+      if (run == 0 && enough && !onset.holds(i, sums, air, plan.contact_threshold_n)) {
+        const Vec3 mean = sums.mean(window_begin, window_end);
+        air = {plan.tare == Tare::none ? Vec3(Vec3::Zero()) : mean, sums.std_of(window_begin, window_end),
+               window_end - window_begin, 0.5 * (samples[window_begin].time_s + samples[window_end - 1].time_s), mean, window_end};
+      }
       if (air.samples == 0) {
         if (plan.tare == Tare::before_contact) continue;  // nothing to compare with yet
       }
@@ -123,8 +173,9 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
     if (run < confirm_samples) continue;
     run = 0;
     touching = !touching;
-    const std::size_t first = i + 1 - confirm_samples;
+    const std::size_t noticed = i + 1 - confirm_samples;
     if (touching) {
+      const std::size_t first = plan.tare == Tare::before_contact ? traced_back(track, sums, air, noticed) : noticed;
       ContactSpan span;
       span.begin = first;
       span.end = samples.size();
@@ -136,7 +187,8 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
       span.direction = track.direction[first];
       spans.push_back(span);
     } else {
-      spans.back().end = first;
+      spans.back().end = noticed;
+      onset.forget();
       free_since = window_begin = window_end = i + 1;
       if (plan.tare == Tare::before_contact) air.samples = 0;  // drift: the next push has its own
     }

@@ -28,9 +28,10 @@ struct ContactSpan {
 };
 
 /// Contact begins where the force along the push exceeds the plan's threshold and five standard deviations of the free air
-/// before it, three samples in a row, while the tip comes nearer, and ends below half of that. Spans that are closer than
-/// `hold_s` are one. The free air after a push is `tare_s` of it once the tip has left the contact, with the tool as it was: a
-/// heavy one that turns would pass for drift.
+/// before it, three samples in a row, while the tip comes nearer, and ends below half of that. What follows the first rise
+/// that is beyond noise and a fifth of the threshold is no free air; one of less than about half the threshold within
+/// `tare_s` passes for drift. Spans that are closer than `hold_s` are one. The free air after a push is `tare_s` of it once
+/// the tip has left the contact, with the tool as it was: a heavy one that turns would pass for drift.
 std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& plan);
 
 struct StillTime {

@@ -20,10 +20,13 @@ void demand_frame(const FrameTree& tree, const StreamPlan& plan, const std::stri
   if (frame == plan.base_frame || tree.connects(plan.base_frame, frame)) return;
   std::string known;
   for (const std::string& one : tree.frames()) known += (known.empty() ? "" : ", ") + one;
+  const auto written = [&](const std::string& where) { return where.empty() ? plan.source + ": frames" : where; };
+  if (!known.empty() && !tree.knows(plan.base_frame))
+    throw Error("no transform names the base frame '" + plan.base_frame + "'; frames in the bag: " + known, written(plan.base_where));
   throw Error("the frame '" + frame + "' (" + key + ") is not connected to the base frame '" + plan.base_frame +
                   "' by any transform; frames in the bag: " + (known.empty() ? "none" : known) +
                   ". A robot description with joint states helps too",
-              plan.source + ": frames");
+              written(frame == plan.tip_frame ? plan.tip_where : ""));
 }
 
 /// Way of the tip so far, signed along its own axis or as a length.

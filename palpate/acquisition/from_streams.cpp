@@ -69,14 +69,13 @@ class Assembly {
     if (!clock.estimate) return clock.offset_s;
     const ClockOffset found = estimate();
     out_.clocks.push_back(found);
-    if (found.usable) {
-      double& left_s = out_.recording.time_offset_std_s;
-      left_s = std::hypot(left_s, found.std_s);
-      return found.offset_s;
-    }
-    out_.notes.push_back("the clock of " + found.sensor +
-                         " could not be aligned with the arm's (too little that both saw): taken as it is");
-    return 0;
+    double& left_s = out_.recording.time_offset_std_s;
+    left_s = std::hypot(left_s, left_std_s(found));
+    if (!found.usable)
+      out_.notes.push_back("the clock of " + found.sensor +
+                           " could not be aligned with the arm's (too little that both saw): taken as it is; state in time_offset_std_s "
+                           "how far it may be off");
+    return believed_offset_s(found);
   }
 
   void align_clocks() {
@@ -98,6 +97,7 @@ class Assembly {
     if (plan_.steps_by == StepsBy::marks) {
       for (const MarkSample& mark : streams_.marks) marked(mark, all);
       if (all.empty()) throw Error("there is no mark in the bag", plan_.source + ": topics.marks");
+      compare_names(all);
     } else {
       for (const PlannedPush& push : plan_.pushes) {
         PushTimes& one = all.emplace_back(PushTimes{push, {}, nullptr});
@@ -128,6 +128,25 @@ class Assembly {
     found->steps.push_back(step);
   }
 
+  /// Of marks and mapping each has to name the same pushes.
+  void compare_names(const std::vector<PushTimes>& marked) {
+    std::string names;
+    for (const PushTimes& one : marked) {
+      names += (names.empty() ? "'" : ", '") + one.plan.name + "'";
+      const bool planned = std::any_of(plan_.pushes.begin(), plan_.pushes.end(),
+                                       [&](const PlannedPush& push) { return push.name == one.plan.name; });
+      if (!planned && !plan_.pushes.empty())
+        out_.notes.push_back("the marks name the push '" + one.plan.name +
+                             "', which steps.pushes does not describe: it is taken as steps says");
+    }
+    for (const PlannedPush& push : plan_.pushes) {
+      if (std::none_of(marked.begin(), marked.end(), [&](const PushTimes& one) { return one.plan.name == push.name; }))
+        throw Error("no mark names the push '" + push.name + "'; the marks name " + names, where_of(push));
+    }
+  }
+
+  std::string where_of(const PlannedPush& push) const { return push.where.empty() ? plan_.source + ": steps.pushes" : push.where; }
+
   /// The contact that most of the push's steps fall into.
   const ContactSpan* span_of(const PushTimes& push) const {
     const ContactSpan* best = nullptr;
@@ -145,6 +164,12 @@ class Assembly {
 
   std::vector<PushTimes> detected() {
     std::vector<PushTimes> all;
+    if (!plan_.pushes.empty() && plan_.pushes.size() != spans_.size())
+      out_.notes.push_back("pushes in steps.pushes: " + std::to_string(plan_.pushes.size()) +
+                           ", contacts found in the force: " + std::to_string(spans_.size()) +
+                           "; they are taken for each other in their order, so that " +
+                           (plan_.pushes.size() > spans_.size() ? "the last pushes have no contact" : "the last contacts have no description") +
+                           ". Look at steps.contact_threshold_n, or give the times (steps: {by: times})");
     for (std::size_t k = 0; k < spans_.size(); ++k) {
       const ContactSpan& span = spans_[k];
       PushTimes push;
@@ -208,7 +233,8 @@ class Assembly {
     if (plan_.tare != Tare::none && touches) {
       if (times.span == nullptr)
         throw Error("push '" + push.name +
-                        "': no contact was found in the force, so that it cannot be tared before it; give wrench.tare",
+                        "': no contact was found in the force at its steps, so that it cannot be tared before it; look at their times, or "
+                        "give wrench.tare",
                     plan_.source + ": wrench");
       tare = times.span->tare_n;
       if (push.force_tare_std_n == 0)
@@ -216,8 +242,8 @@ class Assembly {
             times.span->free_air_std_n / std::sqrt(double(std::max<std::size_t>(1, times.span->free_air_samples)));
     }
     if (!plan.contact_m && times.span == nullptr && touches)
-      throw Error("push '" + push.name + "': no contact was found in the force; give its contact_m",
-                  plan_.source + ": steps.pushes");
+      throw Error("push '" + push.name + "': no contact was found in the force at its steps; look at their times, or give its contact_m",
+                  where_of(plan));
     const Vec3 contact = plan.contact_m ? *plan.contact_m : times.span != nullptr ? times.span->contact_m : Vec3::Zero();
     Vec3 direction = plan.direction ? *plan.direction : Vec3::Zero();
     const ForceDrift drift = times.span != nullptr ? times.span->drift : ForceDrift();
@@ -240,7 +266,7 @@ class Assembly {
         else if (tip)
           direction = tip->linear().col(2).normalized();
         else
-          throw Error("push '" + push.name + "': give its direction", plan_.source + ": steps.pushes");
+          throw Error("push '" + push.name + "': give its direction", where_of(plan));
       }
       Step step;
       step.time_s = at.time_s;
@@ -407,9 +433,12 @@ class Assembly {
       return joints.empty() || std::find(names.begin(), names.end(), one) == names.end();
     });
     if (missing != free.end() || !base) {
+      const auto& heard = streams_.joint_names;
+      const bool is_heard = base && std::find(heard.begin(), heard.end(), *missing) != heard.end();
       out_.notes.push_back("the robot is not masked at " + seconds(frame.time_s) + ": " +
-                           (base ? "its joint '" + *missing + "' is not in the joint states"
-                                 : "the pose of '" + root + "' is not known"));
+                           (is_heard ? "there is no joint state near that time"
+                            : base   ? "its joint '" + *missing + "' is not in the joint states"
+                                     : "the pose of '" + root + "' is not known"));
       return frame;
     }
     return sensing::with_mask(frame, mask_->mask(frame, names, joints, *base));

@@ -81,6 +81,7 @@ struct ClockPlan {
 
 struct PlannedPush {
   std::string name, site, tool;
+  std::string where;  ///< file, line and field, for messages
   std::optional<Vec3> contact_m;  ///< not given: the tip where the force first rose
   std::optional<Vec3> direction;  ///< not given: z of the tip's frame
   double force_tare_std_n = 0, travel_offset_std_m = 0, contact_std_m = 0;
@@ -105,6 +106,7 @@ enum class Tare {
 struct StreamPlan {
   Recording recording;
   std::string base_frame, tip_frame, wrench_frame;  ///< wrench_frame: empty = what the messages say
+  std::string base_where, tip_where;                ///< file, line and field, for messages
   ClockPlan camera_clock, wrench_clock;
   double largest_offset_s = 0.5;  ///< searched on both sides of zero
 

@@ -14,6 +14,9 @@ constexpr std::pair<const char*, StepsBy> ways[] = {
     {"times", StepsBy::times}, {"marks", StepsBy::marks}, {"detection", StepsBy::detection}};
 constexpr std::pair<const char*, bool> reports[] = {{"force_on_sensor", false}, {"force_on_object", true}};
 constexpr std::pair<const char*, bool> stamps[] = {{"header", false}, {"log", true}};
+/// What is searched at all: every 2 ms of it is tried.
+constexpr PhysicalRange search{0.01, 10, "s", "clocks that are further apart: give the offset as a number, or take stamp: log"};
+constexpr PhysicalRange window{1e-3, 60, "s", "it is the time over which the force of one step is averaged"};
 
 MappedTopic topic_of(const YamlField& field) {
   const std::string name = field.text();
@@ -38,7 +41,9 @@ void read_depth(const YamlField& list, BagMapping& mapping) {
     if (const auto straight = keys.optional("rectified")) camera.rectified = straight->boolean();
     camera.like.pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std);
     camera.like.pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);
-    camera.like.noise = read_depth_noise(keys.required("noise", "e.g. {model: constant, sigma_m: 0.002}"));
+    const YamlField noise = keys.required("noise", "e.g. {model: constant, sigma_m: 0.002}");
+    camera.like.noise = read_depth_noise(noise);
+    camera.noise_where = YamlKeys(noise).required("model").where();
     keys.finish();
     mapping.cameras.push_back(std::move(camera));
   }
@@ -76,8 +81,10 @@ void read_topics(const YamlField& field, BagMapping& mapping) {
 
 void read_frames(const YamlField& field, StreamPlan& plan) {
   YamlKeys keys(field);
-  plan.base_frame = keys.required("base", "the frame that meshes, planes and answers are given in").text();
-  plan.tip_frame = keys.required("tip", "the frame of the tool's tip, z along the tool and into the object").text();
+  const YamlField base = keys.required("base", "the frame that meshes, planes and answers are given in"),
+                  tip = keys.required("tip", "the frame of the tool's tip, z along the tool and into the object");
+  plan.base_frame = base.text(), plan.base_where = base.where();
+  plan.tip_frame = tip.text(), plan.tip_where = tip.where();
   plan.wrench_frame = keys.text_or("wrench", "");
   keys.finish();
 }
@@ -99,7 +106,7 @@ void read_clocks(const YamlField& field, BagMapping& mapping) {
   if (const auto stamp = keys.optional("stamp")) mapping.use_log_time = stamp->choice<bool>(stamps);
   mapping.plan.camera_clock = read_clock(keys, "camera_offset_s");
   mapping.plan.wrench_clock = read_clock(keys, "wrench_offset_s");
-  if (const auto most = keys.optional("largest_offset_s")) mapping.plan.largest_offset_s = most->positive();
+  if (const auto most = keys.optional("largest_offset_s")) mapping.plan.largest_offset_s = most->within(search);
   keys.finish();
 }
 
@@ -161,7 +168,7 @@ void read_steps(const YamlField& field, BagMapping& mapping) {
   const YamlField by = keys.required("by", "times, marks or detection");
   plan.steps_by = by.choice<StepsBy>(ways);
   if (plan.steps_by == StepsBy::marks && !mapping.marks) by.fail("needs the topic of the marks: topics.marks");
-  if (const auto value = keys.optional("window_s")) plan.window_s = value->positive();
+  if (const auto value = keys.optional("window_s")) plan.window_s = value->within(window);
   if (const auto value = keys.optional("image_gap_s")) plan.image_gap_s = value->positive();
   if (const auto value = keys.optional("contact_threshold_n")) plan.contact_threshold_n = value->positive();
   if (const auto value = keys.optional("still_m_s")) plan.still_m_s = value->positive();
@@ -176,6 +183,7 @@ void read_steps(const YamlField& field, BagMapping& mapping) {
     for (const YamlField& item : pushes->items()) {
       YamlKeys inner(item);
       PlannedPush push = plan.any_push;
+      push.where = item.where();
       const std::string otherwise = "push " + std::to_string(plan.pushes.size() + 1);
       push.name = plan.steps_by == StepsBy::marks ? inner.required("name", "as the marks name it").text()
                                                   : inner.text_or("name", otherwise);

@@ -22,6 +22,7 @@ struct MappedCamera {
   std::optional<MappedTopic> mask;
   std::string frame;  ///< empty = what the images say
   DepthFrame like;    ///< noise and pose priors
+  std::string noise_where;         ///< of the noise's model: file, line and field
   std::optional<bool> mask_robot;  ///< absent: where its description, joints and pose are known
   std::optional<bool> rectified;   ///< absent: told by the topic's name
 };

@@ -47,9 +47,11 @@ class StreamReader {
         if (message.topic == i) found.messages.push_back(&message);
       return found;
     }
-    if (std::find(names.begin(), names.end(), mapped.name) != names.end())
-      throw Error("the topic '" + mapped.name + "' is of type " + mismatch_ + "; " + types.front() + " is expected",
-                  mapped.where);
+    if (std::find(names.begin(), names.end(), mapped.name) != names.end()) {
+      std::string expected;
+      for (const std::string& one : types) expected += (expected.empty() ? "" : " or ") + one;
+      throw Error("the topic '" + mapped.name + "' is of type " + mismatch_ + "; " + expected + " is expected", mapped.where);
+    }
     const auto near = nearest_word(mapped.name, names);
     throw Error("the bag has no topic '" + mapped.name + "'" + (near ? "; did you mean '" + *near + "'?" : "") +
                     " (`palpate info` lists them)",
@@ -175,6 +177,55 @@ void read_transforms(const StreamReader& reader, const StreamReader::Topic& topi
   });
 }
 
+/// What the first whole message of a topic says of itself; nothing where all are damaged.
+template <typename Decode>
+auto first_whole(const StreamReader& reader, const StreamReader::Topic& topic, Decode decode)
+    -> std::optional<decltype(decode(std::string_view(), std::string(), MessageEncoding::cdr))> {
+  for (const Message* message : topic.messages) {
+    try {
+      return decode(message->data, reader.where(topic), topic.about->encoding);
+    } catch (const Error&) {  // counted where all are read
+    }
+  }
+  return std::nullopt;
+}
+
+/// A topic of the right type that holds something else would only show as an image less in every step.
+void demand_depth(const StreamReader& reader, const StreamReader::Topic& images, const MappedTopic& mapped, const Camera& camera) {
+  if (images.about->type == "sensor_msgs/msg/CompressedImage") {
+    const auto format = first_whole(reader, images, decode_compressed_format);
+    if (format && format->find("compressedDepth") == std::string::npos)
+      throw Error(
+          "the images of '" + mapped.name + "' are of format '" + format->substr(0, 40) + "'; depth is compressedDepth",
+          mapped.where);
+    return;
+  }
+  const auto kind = first_whole(reader, images, decode_image_kind);
+  if (!kind) return;
+  if (!kind->is_depth())
+    throw Error("the images of '" + mapped.name + "' are of encoding '" + kind->encoding.substr(0, 20) + "'; depth is 16UC1 or 32FC1" +
+                    (kind->is_mask() ? ". Is it the mask?" : ""),
+                mapped.where);
+  if (kind->rows != static_cast<std::size_t>(camera.height_px) || kind->columns != static_cast<std::size_t>(camera.width_px))
+    throw Error("the images of '" + mapped.name + "' have " + std::to_string(kind->columns) + " x " + std::to_string(kind->rows) +
+                    " pixels, their CameraInfo says " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) +
+                    "; is it the CameraInfo of another topic?",
+                mapped.where);
+}
+
+void demand_mask(const StreamReader& reader, const StreamReader::Topic& masks, const MappedTopic& mapped, const Camera& camera) {
+  const auto kind = first_whole(reader, masks, decode_image_kind);
+  if (!kind) return;
+  if (!kind->is_mask())
+    throw Error("the images of '" + mapped.name + "' are of encoding '" + kind->encoding.substr(0, 20) +
+                    "'; a mask is mono8 or 8UC1",
+                mapped.where);
+  if (kind->rows != static_cast<std::size_t>(camera.height_px) || kind->columns != static_cast<std::size_t>(camera.width_px))
+    throw Error("the mask has " + std::to_string(kind->columns) + " x " + std::to_string(kind->rows) + " pixels, the image " +
+                    std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px),
+                mapped.where);
+}
+
 void read_camera(const StreamReader& reader, const MappedCamera& mapped, const MessageSource& bag, SensorStreams& streams) {
   const auto images = reader.topic(mapped.image, {"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"});
   const auto infos = reader.topic(mapped.info, {"sensor_msgs/msg/CameraInfo"});
@@ -197,6 +248,7 @@ void read_camera(const StreamReader& reader, const MappedCamera& mapped, const M
                                  ", by its name, though its CameraInfo has a distortion; say so with rectified: true or false");
   }
 
+  demand_depth(reader, images, mapped.image, camera.like.camera);
   struct Kept {
     std::shared_ptr<const void> memory;
     MessageEncoding encoding = MessageEncoding::cdr;
@@ -234,6 +286,7 @@ void read_camera(const StreamReader& reader, const MappedCamera& mapped, const M
   };
   if (mapped.mask) {
     const auto masks = reader.topic(*mapped.mask, {"sensor_msgs/msg/Image"});
+    demand_mask(reader, masks, *mapped.mask, about);
     kept->mask_encoding = masks.about->encoding;
     std::map<double, std::string_view> by_time;
     reader.each(masks, streams.warnings, [&](const Message& message) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
+#include <string_view>
 
 #include "palpate/core/error.hpp"
 #include "palpate/io/ros_messages.hpp"
@@ -53,6 +55,20 @@ const SurveyedTopic* first_of(const BagSurvey& survey, const std::string& use) {
   return nullptr;
 }
 
+/// The raw topic that image_transport packs into this one, if it is such a one.
+std::string packed_of(const std::string& topic) {
+  constexpr std::string_view packed = "/compressedDepth";
+  return topic.ends_with(packed) ? topic.substr(0, topic.size() - packed.size()) : std::string();
+}
+
+/// The same pictures stand in the bag unpacked as well.
+bool is_repeated(const BagSurvey& survey, const SurveyedTopic& depth) {
+  const std::string raw = packed_of(depth.name);
+  return !raw.empty() && std::any_of(survey.topics.begin(), survey.topics.end(), [&](const SurveyedTopic& one) {
+    return one.name == raw && one.use == "depth images" && one.messages > 0;
+  });
+}
+
 constexpr const char* fill_in = "FILL_IN";  // what the bag does not tell and its owner has to
 
 const SurveyedTopic* camera_info_of(const BagSurvey& survey, const std::string& image) {
@@ -90,7 +106,7 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
   std::string depth, clouds;
   for (const SurveyedTopic& topic : survey.topics) {
     if (topic.messages == 0) continue;
-    if (topic.use == "depth images") {
+    if (topic.use == "depth images" && !is_repeated(survey, topic)) {
       const SurveyedTopic* info = camera_info_of(survey, topic.name);
       depth += "    - {image: " + topic.name + ", info: " + (info ? info->name : std::string(fill_in)) +
                ", noise: {model: constant, sigma_m: 0.003}}   # check: noise of the sensor\n";
@@ -111,6 +127,46 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
 }
 
 }  // namespace
+
+std::vector<UnusedTopic> unused_topics(const BagSurvey& found, const BagMapping& mapping) {
+  std::set<std::string> taken;
+  const auto take = [&](const std::optional<MappedTopic>& topic) {
+    if (topic) taken.insert(topic->name);
+  };
+  for (const auto& one : {mapping.wrench, mapping.joints, mapping.robot_description, mapping.marks}) take(one);
+  for (const MappedTopic& one : mapping.transforms) taken.insert(one.name);
+  for (const MappedCamera& camera : mapping.cameras) {
+    for (const MappedTopic& one : {camera.image, camera.info}) taken.insert(one.name);
+    take(camera.mask);
+    taken.insert(packed_of(camera.image.name));                    // the same pictures
+    taken.insert(camera.image.name + "/compressedDepth");
+  }
+  for (const MappedCloud& cloud : mapping.clouds) taken.insert(cloud.topic.name);
+  const bool has_robot = mapping.plan.recording.robot || mapping.robot_description || first_of(found, "robot description");
+  // A robot has many cameras; missed are those of its depth images.
+  const auto of_unused = [&](const SurveyedTopic& info) {
+    return std::any_of(found.topics.begin(), found.topics.end(), [&](const SurveyedTopic& depth) {
+      return depth.use == "depth images" && !taken.contains(depth.name) && camera_info_of(found, depth.name) == &info;
+    });
+  };
+  std::vector<UnusedTopic> unused;
+  for (const SurveyedTopic& topic : found.topics) {
+    if (topic.messages == 0 || taken.contains(topic.name)) continue;
+    const auto named = [&](const char* part) { return topic.name.find(part) != std::string::npos; };
+    const char* key = topic.use == "force"                                               ? "topics.wrench"
+                      : topic.use == "joints" && has_robot                               ? "topics.joints"
+                      : topic.use == "transforms" && !mapping.transforms.empty()         ? "topics.transforms"
+                      : topic.use == "robot description" && !mapping.plan.recording.robot ? "topics.robot_description"
+                      : topic.use == "depth images" && !is_repeated(found, topic)        ? "topics.depth"
+                      : topic.use == "camera" && of_unused(topic)                        ? "topics.depth"
+                      : topic.use == "grey images" && named("mask")                      ? "topics.depth"
+                      : topic.use == "clouds" && mapping.cameras.empty()                 ? "topics.clouds"
+                      : topic.use == "texts" && named("mark")                            ? "topics.marks"
+                                                                                         : nullptr;
+    if (key != nullptr) unused.push_back({topic.name, topic.use, key});
+  }
+  return unused;
+}
 
 BagSurvey survey(const MessageSource& bag) {
   BagSurvey result;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/io/bag_mapping.hpp"
 #include "palpate/io/message_source.hpp"
 
 namespace palpate::io {
@@ -27,5 +28,12 @@ struct BagSurvey {
 };
 
 BagSurvey survey(const MessageSource& bag);
+
+/// A topic that a recording could be made with and that the mapping leaves alone.
+struct UnusedTopic {
+  std::string topic, use, key;  ///< key: of the mapping, that would take it
+};
+/// Pictures that the mapping takes in another form (raw and packed, depth and clouds of it) are not missed.
+std::vector<UnusedTopic> unused_topics(const BagSurvey& found, const BagMapping& mapping);
 
 }  // namespace palpate::io

@@ -5,11 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "palpate/core/error.hpp"
+#include "palpate/io/bag_folder.hpp"
 #include "palpate/io/file.hpp"
-#include "palpate/io/mcap.hpp"
 #include "palpate/io/recording_writer.hpp"
 #include "palpate/io/ros_messages.hpp"
 #include "palpate/io/urdf.hpp"
@@ -50,24 +49,14 @@ class BagWriter {
       put("/robot_description", "std_msgs/msg/String", time_ns_, encode(files.at("robot.urdf")));
     }
     for (const Push& push : recording_.pushes) add_push(push);
-    const std::string stem = folder.filename().string(), file = stem + "_0.mcap";
     const std::string head = "format: palpate-mapping/1\n" + object_text(recording_, folder);
     write_file(folder / "mapping.yaml", head + mapping_text());
-    write_file(folder / file, mcap_.finish());
-    write_file(folder / "metadata.yaml", metadata_text(file));
+    bag_.write(folder);
   }
 
  private:
   void put(const std::string& topic, const std::string& type, std::int64_t time_ns, const std::string& data) {
-    auto channel = channels_.find(topic);
-    if (channel == channels_.end()) {
-      const std::uint16_t id = mcap_.add_channel(topic, type, ros_type(type).definition);
-      channel = channels_.emplace(topic, Channel{id, type, 0}).first;
-    }
-    mcap_.add_message(channel->second.id, static_cast<std::uint64_t>(time_ns), data);
-    ++channel->second.messages;
-    first_ns_ = std::min(first_ns_, time_ns);
-    last_ns_ = std::max(last_ns_, time_ns);
+    bag_.put(topic, type, time_ns, data);
   }
 
   void add_push(const Push& push) {
@@ -189,7 +178,7 @@ class BagWriter {
   }
 
   void put_cloud(const PointCloud& cloud, const Step& step) {
-    const bool first = channels_.count("/points") == 0;
+    const bool first = !bag_.has("/points");
     if (cloud.sigma_m.size() != 1) refuse("the points of a cloud differ in their standard deviation", step);
     if (first) cloud_ = cloud;
     if (cloud.sigma_m[0] != cloud_.sigma_m[0] || cloud.pose_std_m != cloud_.pose_std_m ||
@@ -200,7 +189,7 @@ class BagWriter {
 
   std::string mapping_text() const {
     std::string text = "topics:\n  wrench: /wrench\n  marks: /palpate/marks\n";
-    if (channels_.count("/joint_states")) text += "  joints: /joint_states\n";
+    if (bag_.has("/joint_states")) text += "  joints: /joint_states\n";
     if (!cameras_.empty()) text += "  depth:\n";
     for (const BagCamera& camera : cameras_) {
       YamlLine line;
@@ -210,7 +199,7 @@ class BagWriter {
       line.number_unless(0, "pose_std_m", camera.like.pose_std_m).number_unless(0, "pose_std_rad", camera.like.pose_std_rad);
       text += "    - " + line.str() + "\n";
     }
-    if (channels_.count("/points")) {
+    if (bag_.has("/points")) {
       YamlLine line;
       line.put("topic", "/points").number("sigma_m", cloud_.sigma_m[0]);
       line.number_unless(0, "pose_std_m", cloud_.pose_std_m).number_unless(0, "pose_std_rad", cloud_.pose_std_rad);
@@ -223,35 +212,12 @@ class BagWriter {
     return text + "  pushes:\n" + pushes_;
   }
 
-  std::string metadata_text(const std::string& file) const {
-    std::uint64_t total = 0;
-    std::string topics;
-    for (const auto& [name, channel] : channels_) {
-      total += channel.messages;
-      topics += fmt::format(
-          "    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: cdr\n"
-          "        offered_qos_profiles: \"\"\n      message_count: {}\n",
-          name, channel.type, channel.messages);
-    }
-    return fmt::format(
-        "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {}\n"
-        "  starting_time:\n    nanoseconds_since_epoch: {}\n  message_count: {}\n  topics_with_message_count:\n{}"
-        "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - {}\n",
-        std::max<std::int64_t>(0, last_ns_ - first_ns_), first_ns_, total, topics, file);
-  }
-
-  struct Channel {
-    std::uint16_t id;
-    std::string type;
-    std::uint64_t messages;
-  };
   const Recording& recording_;
-  McapWriter mcap_;
-  std::map<std::string, Channel> channels_;
+  BagFolder bag_;
   std::vector<BagCamera> cameras_;
   PointCloud cloud_;
   std::string pushes_;
-  std::int64_t time_ns_ = second_ns, first_ns_ = std::numeric_limits<std::int64_t>::max(), last_ns_ = 0;
+  std::int64_t time_ns_ = second_ns;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <optional>
 
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_formats.hpp"
@@ -106,7 +107,13 @@ MessageSource read_bag_file(const fs::path& path) {
     if (!unpacked) throw Error("is damaged: it cannot be unpacked", path.string());
     bytes = std::move(*unpacked);
   }
-  return parse_bag(std::move(bytes), path.string());
+  MessageSource source = parse_bag(std::move(bytes), path.string());
+  // A database that was not closed: its last messages lie beside it.
+  const fs::path log = path.string() + "-wal";
+  std::error_code code;
+  if (fs::exists(log, code) && fs::file_size(log, code) > 0)
+    source.warnings.push_back("what is in '" + log.filename().string() + "' is not read; open the file once with sqlite3 to fold it in");
+  return source;
 }
 
 MessageSource read_bag_folder(const fs::path& folder) {
@@ -120,6 +127,7 @@ MessageSource read_bag_folder(const fs::path& folder) {
     warnings.push_back("there is no metadata.yaml (was the recorder cut off?): all bag files of the folder are read");
   }
   std::vector<MessageSource> sources;
+  std::optional<Error> unread;
   for (const std::string& file : metadata.files) {
     // Old versions of rosbag2 put the folder's name in front.
     const fs::path path = fs::exists(folder / file, code) ? folder / file : folder / fs::path(file).filename();
@@ -127,13 +135,16 @@ MessageSource read_bag_folder(const fs::path& folder) {
       warnings.push_back("the file '" + file + "' is not there");
       continue;
     }
-    sources.push_back(read_bag_file(path));
-    const fs::path log = path.string() + "-wal";
-    if (fs::exists(log, code) && fs::file_size(log, code) > 0)
-      sources.back().warnings.push_back("what is in '" + log.filename().string() +
-                                        "' is not read; open the file once with sqlite3 to fold it in");
+    try {
+      sources.push_back(read_bag_file(path));
+    } catch (const Error& error) {  // a recorder that was cut off leaves its last file empty; the others are whole
+      warnings.push_back("the file '" + path.filename().string() + "' is left out: it " + error.message());
+      unread = error;
+      continue;
+    }
     if (metadata.packed_messages) sources.back() = with_unpacked_messages(std::move(sources.back()));
   }
+  if (sources.empty() && unread) throw Error(*unread);
   if (sources.empty()) throw Error("holds no bag file (.mcap, .db3, .bag)", folder.string());
   MessageSource result = joined(std::move(sources), folder.string());
   result.warnings.insert(result.warnings.begin(), warnings.begin(), warnings.end());

@@ -248,6 +248,21 @@ RosHeader decode_header(std::string_view message, const std::string& where, Mess
   return header_of(in);
 }
 
+RosImageKind decode_image_kind(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
+  header_of(in);
+  RosImageKind kind;
+  kind.rows = in.number<std::uint32_t>(), kind.columns = in.number<std::uint32_t>();
+  kind.encoding = in.text();
+  return kind;
+}
+
+std::string decode_compressed_format(std::string_view message, const std::string& where, MessageEncoding encoding) {
+  MessageReader in(message, encoding, where);
+  header_of(in);
+  return in.text();
+}
+
 MaskImage decode_mask(std::string_view message, const std::string& where, MessageEncoding encoding) {
   MessageReader in(message, encoding, where);
   header_of(in);

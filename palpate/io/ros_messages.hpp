@@ -73,6 +73,16 @@ std::string decode_string(std::string_view message, const std::string& where,
 
 /// Time and frame of any message that begins with a header, without the rest.
 RosHeader decode_header(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+/// Size and encoding of an Image ("16UC1"), without its pixels.
+struct RosImageKind {
+  std::size_t rows = 0, columns = 0;
+  std::string encoding;
+  bool is_depth() const { return encoding == "16UC1" || encoding == "mono16" || encoding == "32FC1"; }
+  bool is_mask() const { return encoding == "mono8" || encoding == "8UC1"; }
+};
+RosImageKind decode_image_kind(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
+/// The format of a CompressedImage, e.g. "16UC1; compressedDepth png".
+std::string decode_compressed_format(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
 /// An image of 8 bits: 1 where it is not zero.
 MaskImage decode_mask(std::string_view message, const std::string& where, MessageEncoding encoding = MessageEncoding::cdr);
 

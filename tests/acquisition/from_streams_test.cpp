@@ -118,6 +118,19 @@ TEST(FromStreams, TimesAndMarksChooseTheSteps) {
   EXPECT_TRUE(marked[0].steps[2].unloading) << "the mark says so";
 }
 
+TEST(FromStreams, PushesAndContactsThatAreNotAsManyAreSaid) {
+  StreamPlan described = plan();
+  described.pushes = {described.any_push};
+  described.pushes[0].name = "head";
+  EXPECT_TRUE(recording_from(described, lab()).notes.empty());
+  described.pushes.push_back(described.any_push);
+  described.pushes[1].name = "foot";
+  const FromStreams made = recording_from(described, lab());
+  EXPECT_EQ(made.recording.pushes.at(0).name, "head");
+  EXPECT_THAT(made.notes, testing::Contains(testing::AllOf(HasSubstr("pushes in steps.pushes: 2, contacts found in the force: 1"),
+                                                           HasSubstr("the last pushes have no contact"))));
+}
+
 TEST(FromStreams, AForceOnItsWayIsThatOfTheImage) {
   StreamPlan moving = plan();
   moving.steps_by = StepsBy::times;
@@ -244,6 +257,51 @@ TEST(FindContacts, ADriftingBiasIsTaredAnewForEachPush) {
   EXPECT_NEAR(spans[0].tare_n.z(), -0.01 * 9.4, 0.005);
   EXPECT_NEAR(spans[1].tare_n.z(), -0.01 * 39.4, 0.005);
   EXPECT_NEAR(track.samples[spans[1].begin].time_s, 40, 0.05);
+}
+
+/// An arm that comes down at 5 mm/s and stands every 10 mm, on objects so soft that the force takes up to two seconds to reach
+/// the threshold of contact: what rises before that is no free air.
+TEST(FindContacts, ASlowRiseIsNotTakenForFreeAir) {
+  constexpr double noise_n = 0.055, period_s = 1 / 35.0, speed_m_s = 0.005, contact_s = 5, bias_n = 3.4;
+  for (const double rate_n_s : {0.2, 0.4, 0.8, 1.6, 5.0}) {
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    Track track;
+    const auto depth_m = [&](double time) {  // down for 12 s, standing 2 s of every 4, and up again
+      const double gone = std::min(time, 24 - time), whole = std::floor(gone / 4);
+      return speed_m_s * (2 * whole + std::min(2.0, gone - 4 * whole));
+    };
+    const double touching_m = depth_m(contact_s), stiffness = rate_n_s / speed_m_s;
+    for (double time = 0; time < 24; time += period_s) {
+      const double pressing = stiffness * std::max(0.0, depth_m(time) - touching_m);
+      const Vec3 noise(normal(random), normal(random), normal(random));
+      track.samples.push_back({time, Vec3(-0.3, -0.7, bias_n - pressing) + noise_n * noise, Vec3(0, 0, -depth_m(time))});
+      track.direction.push_back(-Vec3::UnitZ());
+    }
+    const auto spans = find_contacts(track, plan());
+    ASSERT_EQ(spans.size(), 1u) << rate_n_s;
+    EXPECT_NEAR(spans[0].tare_n.z(), bias_n, 0.04) << rate_n_s << ": 35 samples of 0.055 N";
+    EXPECT_LT(spans[0].free_air_std_n, 1.5 * noise_n) << rate_n_s;
+    EXPECT_LT(stiffness * (-spans[0].contact_m.z() - touching_m), 0.3 + 3 * noise_n) << rate_n_s << ": the threshold and some noise";
+  }
+}
+
+/// A cable that pulls a little more from one moment on, while the tool comes down in free air: back or aside, it is forgotten.
+TEST(FindContacts, AnOnsetThatWasNoneIsForgottenWhereTheToolWentElsewhere) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  Track track;
+  for (double time = 0; time < 30; time += 0.02) {
+    const double pulls = time > 5 ? 0.15 : 0, aside_m = 0.02 * std::clamp(time - 10, 0.0, 3.0);
+    const double lowered_m = 0.002 * std::min(time, 8.0), depth_m = 0.01 * std::clamp(time - 20, 0.0, 2.0);
+    track.samples.push_back({time, Vec3(0, 0, -pulls - 400 * depth_m) + 0.02 * Vec3(normal(random), normal(random), normal(random)),
+                             Vec3(aside_m, 0, -lowered_m - depth_m)});
+    track.direction.push_back(-Vec3::UnitZ());
+  }
+  const auto spans = find_contacts(track, plan());
+  ASSERT_EQ(spans.size(), 1u);
+  EXPECT_NEAR(track.samples[spans[0].begin].time_s, 20, 0.2);
+  EXPECT_NEAR(spans[0].tare_n.z(), -0.15, 0.01);
 }
 
 }  // namespace

@@ -129,6 +129,11 @@ TEST(FromStreams, TheRobotIsMaskedWhereItStandsAndOnceAndOnlyIfItIsWanted) {
   streams.cameras[0].mask_robot = true;
   streams.joint_names = {"gripper", "finger"};
   EXPECT_THAT(recording_from(masked, streams).notes, testing::Contains(HasSubstr("joint 'lift' is not in the joint states")));
+  streams.joint_names = {"gripper", "lift"};
+  std::erase_if(streams.joints, [](const JointSample& one) { return one.time_s > 10; });
+  const auto notes = recording_from(masked, streams).notes;
+  EXPECT_THAT(notes, testing::Contains(HasSubstr("there is no joint state near that time")));
+  EXPECT_THAT(notes, testing::Not(testing::Contains(HasSubstr("is not in the joint states"))));
 }
 
 }  // namespace

@@ -234,6 +234,35 @@ TEST(Bags, ADatabaseThatWasLeftInWriteAheadModeIsRead) {
   EXPECT_EQ(parse_bag(bytes, "a").messages.size(), 25u);
 }
 
+TEST(Bags, WhatLiesBesideADatabaseThatWasNotClosedIsSaid) {
+  const TemporaryFolder folder("bag_wal");
+  folder.put("x.db3", sqlite_bytes(mixed(50)));
+  EXPECT_TRUE(read_bag(folder.path() / "x.db3").warnings.empty());
+  folder.put("x.db3-wal", "pages");
+  for (const auto& path : {folder.path() / "x.db3", folder.path()})
+    EXPECT_THAT(read_bag(path).warnings, testing::Contains(HasSubstr("'x.db3-wal' is not read"))) << path;
+}
+
+/// A recorder that was cut off leaves its last file empty, or with nothing but its first bytes.
+TEST(Bags, AnEmptyFileOfAFolderCostsNothingElse) {
+  for (const char* last : {"", "\x89MCAP0\r\n"}) {
+    const TemporaryFolder folder("bag_empty_part");
+    folder.put("part_0.mcap", mcap_bytes(mixed(50), McapWriter::Compression::zstd));
+    folder.put("part_1.mcap", last);
+    folder.put("metadata.yaml", "rosbag2_bagfile_information:\n  relative_file_paths: [part_0.mcap, part_1.mcap]\n");
+    const MessageSource bag = read_bag(folder.path());
+    EXPECT_EQ(bag.messages.size(), 25u);
+    EXPECT_THAT(bag.warnings, testing::ElementsAre(HasSubstr("'part_1.mcap' is left out: it is ")));
+    std::filesystem::remove(folder.path() / "part_0.mcap");
+    try {
+      read_bag(folder.path());
+      FAIL() << "nothing is left";
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("part_1.mcap"));
+    }
+  }
+}
+
 TEST(Bags, AMissingFolderIsAnError) {
   EXPECT_FALSE(is_bag("/nowhere/at/all"));
   EXPECT_THROW(read_bag("/nowhere/at/all"), Error);

@@ -12,6 +12,7 @@
 #include "io/made_up_recording.hpp"
 #include "io/read_back.hpp"
 #include "io/recording_folder.hpp"
+#include "io/rosbag2_metadata.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
@@ -74,6 +75,23 @@ TEST(BagWrite, ComesBackAsItWas) {
       EXPECT_EQ(read.pose_std_m, seen.pose_std_m);
     }
   }
+}
+
+TEST(BagWrite, TheFolderIsWhatRosbag2Demands) {
+  const TemporaryFolder folder("bag_metadata");
+  write_bag(made_up(), folder.path() / "a bag: of #1");
+  const Rosbag2Metadata about = rosbag2_metadata(folder.path() / "a bag: of #1");
+  const MessageSource bag = read_bag(folder.path() / "a bag: of #1");
+  EXPECT_TRUE(bag.warnings.empty()) << bag.warnings.front();
+  EXPECT_EQ(about.storage, "mcap");
+  EXPECT_EQ(about.messages, bag.messages.size());
+  for (const MessageTopic& topic : bag.topics) EXPECT_EQ(about.topics.at(topic.name), topic.messages);
+  ASSERT_EQ(about.files.size(), 1u);
+  EXPECT_EQ(about.paths, std::vector<std::string>{about.files[0].path});
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "a bag: of #1" / about.paths[0]));
+  EXPECT_EQ(about.files[0].messages, bag.messages.size());
+  EXPECT_EQ(about.files[0].start_ns, bag.messages.front().log_time_ns);
+  EXPECT_EQ(about.files[0].duration_ns, bag.messages.back().log_time_ns - bag.messages.front().log_time_ns);
 }
 
 TEST(BagWrite, APushThatTouchedNothingComesBackAsOne) {

@@ -7,7 +7,9 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "io/made_up_recording.hpp"
 #include "io/recording_folder.hpp"
+#include "palpate/io/bag_write.hpp"
 
 namespace palpate::io {
 namespace {
@@ -87,6 +89,77 @@ TEST(InfoOfABag, ListsItsTopics) {
   EXPECT_EQ(all["topics"][0]["topic"], "/wrench");
   EXPECT_EQ(all["topics"][0]["messages"], 12);
   EXPECT_EQ(all["topics"][0]["understood"], true);
+}
+
+/// What is said of a bag; arguments behind it.
+Outcome told_of(const TemporaryFolder& folder, const std::string& verb, const std::string& name) {
+  const std::string base = folder.path().string();
+  const int status = std::system(("'" + std::string(PALPATE_CLI) + "' " + verb + " --json '" + base + "/" + name + "' > '" +
+                                  base + "/out' 2> '" + base + "/err'")
+                                     .c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, folder.get("out"), folder.get("err")};
+}
+
+TEST(InfoOfABag, WhatHoldsNoMessageIsRefusedByName) {
+  if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  const TemporaryFolder folder("no_bag");
+  folder.put("magic.bag", "#ROSBAG V2.0\n");
+  folder.put("garbage.bag", "#ROSBAG V2.0\n" + std::string(300, '\x07'));
+  folder.put("text.bag", "not a bag at all");
+  folder.put("magic.mcap", std::string("\x89MCAP0\r\n") + std::string("\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 17));
+  folder.put("picture.mcap", std::string("\x89PNG\r\n\x1a\n") + std::string(100, ' '));
+  for (const std::string name : {"magic.bag", "garbage.bag", "text.bag", "magic.mcap", "picture.mcap"}) {
+    for (const std::string& verb : {std::string("info"), "estimate -o '" + folder.path().string() + "/result'"}) {
+      const Outcome outcome = told_of(folder, verb, name);
+      EXPECT_EQ(outcome.code, 3) << verb << " " << name;
+      EXPECT_NE(outcome.err.find(name), std::string::npos) << outcome.err;
+      EXPECT_EQ(outcome.err.find("FILL_IN"), std::string::npos) << name;
+      if (name != "picture.mcap" && name != "text.bag") continue;
+      EXPECT_NE(outcome.err.find("does not start as a bag does"), std::string::npos) << verb << outcome.err;
+    }
+  }
+}
+
+TEST(InfoOfABag, SaysWhatTheMappingLeavesAloneAndWhatItsClocksAre) {
+  if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  const TemporaryFolder folder("left_out");
+  Recording recording = made_up();
+  for (Push& push : recording.pushes)
+    for (Step& step : push.steps)
+      for (Observation& one : step.observations)
+        if (auto* cloud = std::get_if<PointCloud>(&one)) cloud->points_m.setConstant(0.0625);
+  write_bag(recording, folder.path() / "bag");
+  const std::string text = folder.get("bag/mapping.yaml");
+  Outcome outcome = told_of(folder, "info", "bag");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(nlohmann::json::parse(outcome.out)["bag"]["left_out"].empty()) << outcome.out;
+  EXPECT_NE(outcome.err.find("nothing is wrong with it"), std::string::npos);
+
+  std::string blind = text;
+  blind.erase(blind.find("  depth:\n"), blind.find("  clouds:\n") - blind.find("  depth:\n"));
+  folder.put("bag/mapping.yaml", blind);
+  outcome = told_of(folder, "info", "bag");
+  const nlohmann::json left_out = nlohmann::json::parse(outcome.out)["bag"]["left_out"];
+  ASSERT_EQ(left_out.size(), 3u) << outcome.out;
+  EXPECT_EQ(left_out[1]["topic"], "/camera_1/depth/image");
+  EXPECT_EQ(left_out[1]["key"], "topics.depth");
+  EXPECT_NE(outcome.err.find("left out   /camera_1/depth/image (depth images)"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("nothing is wrong with it"), std::string::npos) << outcome.err;
+
+  folder.put("bag/mapping.yaml", text + "clocks: {camera_offset_s: estimate}\n");
+  const nlohmann::json clocks = nlohmann::json::parse(told_of(folder, "info", "bag").out)["clocks"];
+  ASSERT_EQ(clocks.size(), 1u);
+  EXPECT_EQ(clocks[0]["sensor"], "/camera_1/depth/image");
+  EXPECT_EQ(clocks[0]["usable"], false);
+  EXPECT_EQ(clocks[0]["taken_off_s"], 0.0);
+
+  folder.put("bag/mapping.yaml", replaced(text, "model: \"constant\", sigma_m: 0.002", "model: realsense_d345"));
+  outcome = told_of(folder, "info", "bag");
+  EXPECT_EQ(outcome.code, 3);
+  const nlohmann::json error = nlohmann::json::parse(outcome.out)["error"];
+  EXPECT_NE(error["where"].get<std::string>().find("topics.depth[0].noise.model"), std::string::npos) << outcome.out;
+  EXPECT_NE(error["where"].get<std::string>().find("mapping.yaml:"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("did you mean 'realsense_d435'?"), std::string::npos) << outcome.out;
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "io/broken_bytes.hpp"
+#include "io/compressed_depth.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/ros_messages.hpp"
 
@@ -137,6 +138,21 @@ TEST(RosMessages, ComeBackAsTheyWereWritten) {
   EXPECT_EQ(decode_string(encode(std::string("<robot/>")), "m"), "<robot/>");
 }
 
+TEST(RosMessages, CompressedDepthIsMillimetresOrInverse) {
+  DepthImage depth = DepthImage::Random(6, 8).cwiseAbs() * 4 + DepthImage::Constant(6, 8, 0.3f);
+  depth(1, 2) = 0;  // no data
+  const DepthImage whole = decode_compressed_depth(compressed_depth_message(header, depth), "m").depth_m;
+  const RosImage inverse = decode_compressed_depth(compressed_depth_message(header, depth, true), "m");
+  EXPECT_EQ(inverse.header.frame, "camera");
+  for (Eigen::Index i = 0; i < depth.size(); ++i) {
+    const float was = depth.data()[i];
+    EXPECT_NEAR(whole.data()[i], was, 0.0005001) << "millimetres";
+    // Half a unit of the inverse is depth^2 / (2 A).
+    EXPECT_NEAR(inverse.depth_m.data()[i], was, was * was / inverse_a * 0.51 + 1e-6) << i;
+  }
+  EXPECT_EQ(inverse.depth_m(1, 2), 0);
+}
+
 /// Bytes laid out by hand from the rules of CDR: each number aligned to its size, strings with length and NUL.
 TEST(RosMessages, AlignmentIsThatOfCdr) {
   const std::string expected =
@@ -161,10 +177,13 @@ TEST(RosMessages, DamageIsSurvivedAndCutsAreRefused) {
        [](std::string_view bytes, const std::string& name) { decode_wrench(bytes, name); }},
       {encode(std::vector<RosTransform>{{header, "tip", Pose::Identity()}}),
        [](std::string_view bytes, const std::string& name) { decode_transforms(bytes, name); }},
-      {encode(RosImage{header, DepthImage::Constant(9, 9, 1.5f)}),
+      {compressed_depth_message(header, DepthImage::Constant(9, 9, 1.5f)),
+       [](std::string_view bytes, const std::string& name) { decode_compressed_depth(bytes, name); }},
+      {compressed_depth_message(header, DepthImage::Constant(9, 9, 1.5f), true),
        [](std::string_view bytes, const std::string& name) { decode_compressed_depth(bytes, name); }},
   };
   for (const auto& [bytes, reader] : all) {
+    EXPECT_FALSE(refuses(reader, bytes)) << "whole, it is read";
     survives(reader, damaged(bytes, 200));
     for (std::size_t eighth = 1; eighth < 7; ++eighth)
       EXPECT_TRUE(refuses(reader, bytes.substr(0, bytes.size() * eighth / 8)));

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// What both of our bags are: a folder of rosbag2 with one MCAP file and metadata.yaml.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "palpate/io/mcap.hpp"
+
+namespace palpate::io {
+
+class BagFolder {
+ public:
+  /// @param type  one of ros_types()
+  void put(const std::string& topic, const std::string& type, std::int64_t time_ns, std::string_view data);
+  bool has(const std::string& topic) const { return topics_.contains(topic); }
+  /// Writes NAME_0.mcap and metadata.yaml into the folder NAME, which is there. Nothing may be put after.
+  void write(const std::filesystem::path& folder);
+
+ private:
+  struct Topic {
+    std::uint16_t channel = 0;
+    std::string type;
+    std::uint64_t messages = 0;
+  };
+  std::string metadata_text(const std::string& file) const;
+
+  McapWriter mcap_;
+  std::map<std::string, Topic> topics_;
+  std::int64_t first_ns_ = std::numeric_limits<std::int64_t>::max(), last_ns_ = 0;
+};
+
+}  // namespace palpate::io
