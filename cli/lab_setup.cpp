@@ -58,6 +58,9 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
       ->check(positive_number())
       ->capture_default_str();
   app.add_flag("--wall", arguments.wall, "an upright wall behind the object, and a push towards it");
+  app.add_option("--tip", arguments.tip, "what presses: a round soft pad, or a stiff flat face of that size (punch; smooth, its contact is solved for)")
+      ->check(CLI::IsMember({"pad", "punch"}))
+      ->capture_default_str();
   app.add_option("--albedo", arguments.albedo, "of the true object, 0 to 1: dark things are noisy to time of flight (default: of the object)")
       ->check(CLI::Range(0.01, 1.0));
   app.add_option("--texture", arguments.texture,
@@ -97,6 +100,7 @@ lab::LabObject lab_object(const LabArguments& arguments, std::uint64_t seed) {
   options.stands = arguments.stands == "rough" ? ContactLaw::friction : ContactLaw::bonded;
   options.friction_coefficient = arguments.friction_coefficient;
   options.wall = arguments.wall;
+  options.punch = arguments.tip == "punch";
   if (arguments.albedo > 0) options.albedo = arguments.albedo;
   if (arguments.texture >= 0) options.texture = arguments.texture;
   const bool built_in = std::any_of(lab::built_in_objects().begin(), lab::built_in_objects().end(),

@@ -32,6 +32,7 @@ struct LabArguments {
   std::string stands = "glued";  ///< or rough
   double friction_coefficient = lab::ObjectOptions().friction_coefficient;
   bool wall = false;
+  std::string tip = "pad";  ///< or punch
   double ambient_light = lab::DepthSensorOptions().ambient_light;
   double albedo = 0, texture = -1;  ///< 0 and below 0: as the object usually is
   std::vector<double> arm_at;       ///< x and y in metres, turn about z in radians; empty: where the frame begins

@@ -99,11 +99,15 @@ using Observation = std::variant<DepthFrame, PointCloud, Markers, ToolTravel, Wr
 
 enum class ToolShape { vertices, sphere, disc, capsule, edge, mesh, platen };
 
+/// How a measured force is spread over the patch of a disc: by a soft pad evenly, by a stiff flat face as under a punch.
+enum class Pressure { uniform, punch };
+
 struct Tool {
   std::string name;
   ToolShape shape = ToolShape::sphere;
   double radius_m = 0;  ///< sphere, disc, capsule; edge: half width of its contact strip
   double radius_std_m = 0;  ///< sphere, disc: prior on the radius of the patch that its force acts on; 0 = exactly known
+  Pressure pressure = Pressure::uniform;  ///< disc whose force is given
   double length_m = 0;  ///< capsule, edge
   std::optional<TriMesh> mesh;
   std::vector<Index> vertices;  ///< ToolShape::vertices: 0-based nodes that the force is spread over equally

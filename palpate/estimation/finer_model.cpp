@@ -55,7 +55,7 @@ std::vector<RoundContact> round_contacts(const Recording& recording) {
           if (known) continue;
           const bool bar = tool.shape == ToolShape::capsule || tool.shape == ToolShape::edge;
           contacts.push_back(
-              {{load.contact_m, tool.radius_m, bar ? Vec3(0.5 * tool.length_m * tool.axis) : Vec3(Vec3::Zero())},
+              {{load.contact_m, tool.radius_m, bar ? Vec3(0.5 * tool.length_m * tool.axis) : Vec3(Vec3::Zero()), tool.pressure},
                *load.force_n});
         }
       }

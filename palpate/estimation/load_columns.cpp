@@ -37,7 +37,7 @@ Eigen::SparseMatrix<double> load_columns(const TetMesh& mesh, const Tool& tool, 
       return fem::spread_over_nodes(static_cast<Index>(mesh.nodes_m.rows()), tool.vertices);
     case ToolShape::sphere:
     case ToolShape::disc:
-      return fem::spread_over_patch(mesh, touched_m(load), tool.radius_m);
+      return fem::spread_over_patch(mesh, {touched_m(load), tool.radius_m, Vec3::Zero(), tool.pressure});
     case ToolShape::edge:
     case ToolShape::capsule:
       return along_line(mesh, touched_m(load), tool.axis, tool.length_m);

@@ -38,6 +38,7 @@ struct ContactPatch {
   Vec3 centre_m = Vec3::Zero();
   double radius_m = 0;
   Vec3 half_length_m = Vec3::Zero();
+  Pressure pressure = Pressure::uniform;
   double distance_m(const Vec3& x_m) const;  ///< of a point to the segment
 };
 Eigen::SparseMatrix<double> spread_over_patch(const TetMesh& mesh, const ContactPatch& where);

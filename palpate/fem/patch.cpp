@@ -62,7 +62,8 @@ class Patch {
         std::sqrt(std::max({(xa - middle).squaredNorm(), (xb - middle).squaredNorm(), (xc - middle).squaredNorm()}));
     const double distance = where_.distance_m(middle);
     if (distance > radius_ + 1.1 * reach) return;
-    const bool inside = distance < radius_ - 1.1 * reach;
+    // Under a punch the pressure rises towards the rim: only pieces that are far from it are taken whole.
+    const bool inside = distance < radius_ - (where_.pressure == Pressure::punch ? 4.0 : 1.1) * reach;
     if (depth < kDepth && !(inside && depth >= (faces_.cols() == 6 ? 2 : 0))) {
       const Vec3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
       add(face, a, ab, ca, depth + 1, sum);
@@ -76,7 +77,16 @@ class Patch {
     const double area = 0.5 * (xb - xa).cross(xc - xa).norm();
     const Eigen::Index n = faces_.cols();
     for (const Vec3& l : {Vec3(0.5 * (a + b)), Vec3(0.5 * (b + c)), Vec3(0.5 * (c + a))})
-      sum += area / 3 * face_shape(static_cast<Index>(n), l);
+      sum += area / 3 * pressure(where_.distance_m(at(face, l)), 0.5 * reach) * face_shape(static_cast<Index>(n), l);
+  }
+  // Relative, as a mean over a ring of this half width: under a flat rigid punch 1 / sqrt(1 - r^2 / a^2) (Boussinesq; Johnson,
+  // Contact Mechanics, 3.36), which has no value at the rim but an integral.
+  double pressure(double r, double half_width) const {
+    if (where_.pressure == Pressure::uniform) return 1;
+    const double a = radius_, inner = std::clamp(r - half_width, 0.0, a), outer = std::min(r + half_width, a);
+    if (!(outer > inner)) return 0;
+    const auto left = [&](double at) { return std::sqrt(std::max(0.0, 1 - at * at / (a * a))); };
+    return 2 * a * a * (left(inner) - left(outer)) / (outer * outer - inner * inner);
   }
 
   const TetMesh& mesh_;

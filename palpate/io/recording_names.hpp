@@ -29,6 +29,7 @@ inline constexpr Names<RegionSelection, 4> region_names = {{{"box", RegionSelect
                                                             {"points", RegionSelection::points},
                                                             {"elements", RegionSelection::elements},
                                                             {"rest", RegionSelection::rest}}};
+inline constexpr Names<Pressure, 2> pressure_names = {{{"uniform", Pressure::uniform}, {"punch", Pressure::punch}}};
 inline constexpr Names<ToolShape, 7> tool_names = {{{"vertices", ToolShape::vertices},
                                                     {"sphere", ToolShape::sphere},
                                                     {"disc", ToolShape::disc},

@@ -253,6 +253,8 @@ void read_tools(const YamlField& field, RecordingContext& context) {
       if (tool.radius_std_m > tool.radius_m)
         keys.required("radius_std_m").fail("is larger than the radius itself; it is a standard deviation in metres");
     }
+    if (tool.shape == ToolShape::disc)
+      if (const auto pressure = keys.optional("pressure")) tool.pressure = pressure->choice<Pressure>(pressure_names);
     if (tool.shape == ToolShape::edge) tool.radius_m = keys.within_or("radius_m", 0, ranges::strip_half_width);
     if (long_one) {
       tool.length_m = size(keys.required("length_m"), ranges::tool_length);

@@ -243,6 +243,7 @@ std::string RecordingWriter::Pages::tool_text(const Tool& tool, std::size_t numb
     case ToolShape::sphere:
     case ToolShape::disc:
       line.number("radius_m", tool.radius_m).number_unless(0, "radius_std_m", tool.radius_std_m);
+      if (tool.pressure != Pressure::uniform) line.put("pressure", name_of(pressure_names, tool.pressure));
       break;
     case ToolShape::capsule:
     case ToolShape::edge:

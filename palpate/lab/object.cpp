@@ -101,6 +101,7 @@ void size_pushes(LabObject& object, double pad_radius_m) {
 }
 
 void make_pressable(LabObject& object, const ObjectOptions& o) {
+  object.punch = o.punch;
   if (o.wall) {
     const double height_m = object.surface.vertices_m.col(2).maxCoeff() - o.base_centre_m.z();
     object.sites.push_back(site(object, o, "to the wall", {0, 0, 0.6 * height_m}, Vec3(0.94, 0, -0.34)));
@@ -112,7 +113,7 @@ void make_pressable(LabObject& object, const ObjectOptions& o) {
 // others on one as for any object.
 void make_pressable_block(LabObject& object, const ObjectOptions& o, const Vec3& size_m) {
   make_pressable(object, o);
-  if (!object.regions.empty() || o.wall || o.stands != ContactLaw::bonded) return;
+  if (!object.regions.empty() || o.wall || o.punch || o.stands != ContactLaw::bonded) return;
   PressedBlockOptions block;
   block.size_m = size_m;
   block.pad_radius_m = object.pad_radius_m;
@@ -249,6 +250,7 @@ LabObject animal(const ObjectOptions& o) {
 // No solid: E is the skin's, and a solid model finds an apparent modulus at most.
 LabObject balloon(const ObjectOptions& o) {
   if (o.wall || o.stands != ContactLaw::bonded) throw Error("is glued to the table, without a wall", "balloon");
+  if (o.punch) throw Error("is pressed by a soft pad only", "balloon");
   if (o.poisson_ratio || o.material != ObjectOptions{}.material || o.region_ratio != 1)
     throw Error("is an incompressible skin of one stiffness: it takes no Poisson ratio, no other law and no regions", "balloon");
   LabObject object = draw("balloon", o, 60);
@@ -318,6 +320,7 @@ PressedObjectOptions pressed_options(const LabObject& object, const ObjectOption
   pressed.surface = object.surface;
   pressed.supports = object.supports;
   pressed.pad_radius_m = object.pad_radius_m;
+  pressed.punch = object.punch;
   pressed.material = object.material;
   pressed.young_modulus_pa = object.young_modulus_pa;
   pressed.poisson_ratio = object.poisson_ratio;

@@ -40,6 +40,7 @@ struct ObjectOptions {
   double friction_coefficient = 0.6;                 ///< with ContactLaw::friction
   /// An upright wall behind the object, at its outermost points along x; a site more pushes towards it.
   bool wall = false;
+  bool punch = false;                                ///< a stiff flat face presses, not a soft pad: contact is solved for
   std::optional<double> albedo, texture;             ///< to a camera (Look); not given: as the object usually is
   Index tetrahedra = 20000;                          ///< of the true mesh; a block's feet ask for more
   int cells_in_radius = 5;                           ///< edges across the pad's radius
@@ -53,6 +54,7 @@ struct LabObject {
   std::vector<Support> supports;
   std::vector<PushSite> sites;
   double pad_radius_m = 0.02;
+  bool punch = false;          ///< not a soft pad but a stiff flat face of that radius
   double travel_limit_m = 0.01;  ///< as deep as its own truth bears under a soft pad
   double force_step_n = 1;       ///< a quarter of about the force that this takes at a site of stiffness 1, ...
   /// ... and at another: what a first trial push would tell.

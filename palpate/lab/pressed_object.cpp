@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "palpate/core/error.hpp"
@@ -181,6 +182,16 @@ struct PressedObject::Impl {
       throw Error("no support touches the object", "PressedObjectOptions.supports");
     curve_boundary(mesh, options.surface, stays);
 
+    if (options.punch) {
+      if (options.opposed_m) throw Error("has no opposed one: two soft pads press a free object", "PressedObjectOptions.punch");
+      fem::RigidContact face;
+      face.name = "punch";
+      face.shape = fem::disc_shape(options.pad_radius_m);
+      face.T_base_tool = fem::tool_pose(options.contact_m, options.direction);
+      face.free_axes = fem::along(options.direction);
+      punch = contacts.size();
+      contacts.push_back(face);
+    }
     const Eigen::SparseMatrix<double> columns = fem::spread_over_patch(mesh, options.contact_m, options.pad_radius_m);
     VectorX along = columns * options.direction;  // per newton
     share = shares_of(columns);
@@ -236,10 +247,17 @@ struct PressedObject::Impl {
     };
     if (resting) {
       fem::ContactLoads loads = resting->no_loads();
-      loads.force_coefficients(0) = force_n;
+      if (punch)
+        loads.wrench[*punch].head<3>() = force_n * options.direction;
+      else
+        loads.force_coefficients(0) = force_n;
       fem::ContactEquilibrium state =
           resting->solve(options.young_modulus_pa, options.poisson_ratio, loads, lies.converged ? &lies : nullptr, extra);
       take(state);
+      // The layer that stands for contact gives way where a stiff face does not.
+      if (punch)
+        punch_travel_m = options.direction.dot(state.touches[*punch].T_base_tool.translation() - options.contact_m) -
+                         resting->layer_travel_m(state)(Eigen::Index(*punch));
       lies = std::move(state);
       return;
     }
@@ -254,7 +272,7 @@ struct PressedObject::Impl {
       if (shares(n) != 0) moved += shares(n) * displacement_m.segment<3>(3 * n).dot(options.direction);
     return moved;
   }
-  double travel_m() const { return moved_m(share) - moved_m(opposed_share); }
+  double travel_m() const { return punch ? punch_travel_m : moved_m(share) - moved_m(opposed_share); }
 
   TriMesh surface() const {
     TriMesh moved = options.surface;
@@ -281,6 +299,8 @@ struct PressedObject::Impl {
   std::unique_ptr<fem::Statics> statics;         // held ...
   std::unique_ptr<fem::ContactStatics> resting;  // ... or on what only pushes
   fem::ContactEquilibrium lies;                  // there, last
+  std::optional<std::size_t> punch;              // which contact
+  double punch_travel_m = 0;
 };
 
 PressedObject::PressedObject(const PressedObjectOptions& options) : impl_(std::make_unique<Impl>(options)) {}

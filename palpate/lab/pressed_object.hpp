@@ -26,6 +26,7 @@ struct PressedObjectOptions {
   std::vector<Support> supports;
   Vec3 contact_m = Vec3::Zero();  ///< on the surface
   Vec3 direction = -Vec3::UnitZ();
+  bool punch = false;         ///< a stiff flat face presses in place of a soft pad: contact is solved for
   double pad_radius_m = 0.02;
   std::string material = "neo_hookean";
   double young_modulus_pa = 15e3, poisson_ratio = 0.3;

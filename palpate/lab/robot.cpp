@@ -399,7 +399,8 @@ Recording LabRobot::scene() const {
   const Impl& lab = *impl_;
   Recording recording;
   recording.name = lab.object.name;
-  recording.description = "Simulated: palpate's software arm presses " + lab.object.description + " with a round soft pad";
+  recording.description = "Simulated: palpate's software arm presses " + lab.object.description +
+                          (lab.object.punch ? " with a stiff round face" : " with a round soft pad");
   recording.rest.surface = lab.object.surface;
   recording.rest.state = lab.object.state;
   recording.supports = lab.object.supports;
@@ -410,6 +411,10 @@ Recording LabRobot::scene() const {
   pad.name = "stick";
   pad.shape = ToolShape::disc;
   pad.radius_m = lab.object.pad_radius_m;
+  if (lab.object.punch) {
+    pad.pressure = Pressure::punch;
+    pad.contact = ContactLaw::frictionless;
+  }
   pad.compliance_m_per_n = lab.options.stated_compliance_m_per_n.value_or(lab.options.compliance_m_per_n);
   pad.compliance_std_m_per_n = lab.options.stated_compliance_std_m_per_n;
   recording.tools.push_back(pad);

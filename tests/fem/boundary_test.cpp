@@ -43,6 +43,24 @@ TEST_P(Patch, SpreadsLikeADisc) {
   }
 }
 
+// Of the same resultant and middle, with the second moment of 1 / sqrt(1 - r^2 / a^2): two thirds of a^2, where a disc's is a half.
+TEST(Patch, OfAPunchIsHeavierAtTheRim) {
+  const TetMesh mesh = to_quadratic(block_mesh(8, 8, 2, {0.1, 0.1, 0.04}));
+  const Vec3 centre(0.043, 0.057, 0.04);
+  for (const double radius : {0.013, 0.021}) {
+    const VectorX share = shares(spread_over_patch(mesh, {centre, radius, Vec3::Zero(), Pressure::punch}));
+    EXPECT_NEAR(share.sum(), 1, 1e-12);
+    Vec3 middle = Vec3::Zero();
+    double second = 0;
+    for (Index i = 0; i < share.size(); ++i) {
+      middle += share(i) * node_position(mesh, i);
+      second += share(i) * (node_position(mesh, i) - centre).squaredNorm();
+    }
+    EXPECT_LT((middle - centre).norm(), 2e-3 * radius);
+    EXPECT_NEAR(second / (radius * radius), 2.0 / 3, 4e-3);
+  }
+}
+
 TEST(Patch, LeavesTheFarSideOfAThinPlateAlone) {
   const TetMesh mesh = block_mesh(10, 10, 1, {0.1, 0.1, 0.005});
   const VectorX share = shares(spread_over_patch(mesh, {0.05, 0.05, 0.005}, 0.02));

@@ -143,6 +143,33 @@ TEST(HalfSpaceLoad, DiscPressureConverges) {
   EXPECT_LT(last, 0.01);
 }
 
+// The pressure of a flat rigid punch moves its disc down as one, by F (1 - nu^2) / (2 a E): what a punch does, without a search for contact.
+TEST(HalfSpaceLoad, PunchPressureMovesItsDiscAsOne) {
+  const double radius = 0.01, expected = 1 / (2 * radius * kPlaneModulus);
+  double last = 1;
+  for (double edge : {0.01, 0.005, 0.0025}) {
+    HalfSpace half(edge, 1.1 * radius, 1, true);
+    half.boundary.forces = spread_over_patch(half.mesh, {Vec3::Zero(), radius, Vec3::Zero(), Pressure::punch});
+    const Statics body(half.mesh, "linear", half.boundary);
+    const Equilibrium e = body.solve(kYoung, kPoisson, Vec3(0, 0, 1), VectorX::Ones(1));
+    const double error = std::abs(half.boundary.forces.col(2).dot(e.displacement_m) / expected - 1);
+    EXPECT_LT(error, last) << edge;
+    last = error;
+    double least = 1e300, most = 0;
+    for (Index i = 0; i < half.mesh.nodes_m.rows(); ++i) {
+      if (half.mesh.nodes_m(i, 2) > 1e-9 || half.mesh.nodes_m.row(i).norm() > 0.8 * radius) continue;
+      least = std::min(least, e.displacement_m(3 * i + 2) / expected);
+      most = std::max(most, e.displacement_m(3 * i + 2) / expected);
+    }
+    RecordProperty("error_edge_" + std::to_string(edge), std::to_string(error) + ", " + std::to_string(least) + " to " + std::to_string(most));
+    if (edge < 0.003) {
+      EXPECT_GT(least, 0.98);
+      EXPECT_LT(most, 1.02);
+    }
+  }
+  EXPECT_LT(last, 0.015);
+}
+
 // A sphere given as triangles is the sphere.
 TEST(HalfSpaceContact, MeshToolIsTheShapeItWasMadeOf) {
   const double radius = 0.03, force = 0.3;
