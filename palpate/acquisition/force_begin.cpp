@@ -26,7 +26,9 @@ double force_began_before_m(std::span<const sensing::ContactSample> samples, con
   };
   const double step_m = 0.1 * search.increment_m;
   look(-2 * step_m, search.farthest_m, step_m);
-  if (search.finest_m < search.increment_m) look(best_m - 2 * step_m, best_m + 2 * step_m, 0.1 * search.finest_m);
+  // What is left up to a limit may be a motion of next to nothing.
+  const double finer_m = std::max(0.1 * search.finest_m, 0.02 * step_m);
+  if (finer_m < step_m) look(best_m - 2 * step_m, best_m + 2 * step_m, finer_m);
   return best_m;
 }
 

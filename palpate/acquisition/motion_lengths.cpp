@@ -42,7 +42,7 @@ void MotionLengths::touched(double at_m, double motion_m) {
 
 void MotionLengths::moved(double length_m, double risen_n) {
   last_m_ = length_m;
-  finest_m_ = std::min(finest_m_, length_m);
+  finest_m_ = std::min(finest_m_, std::max(shortest_m(), length_m));
   risen_n_m_ = risen_n / length_m;
   const double force_std_n = std::numbers::sqrt2 * force_std_n_, length_std_m = std::numbers::sqrt2 * travel_sigma_m_;
   sure_risen_n_m_ = (risen_n - 5 * force_std_n) / (length_m + 3 * length_std_m);

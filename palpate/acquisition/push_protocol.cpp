@@ -47,8 +47,7 @@ class PushRun {
       let_go();
       throw;
     }
-    const double over_n = report_.highest_force_n - options_.force_limit_n;
-    report_.overshoot_n = over_n > 5 * free_air_std_n_ ? over_n : 0;
+    say_what_was_too_much();
     return report_;
   }
 
@@ -64,6 +63,13 @@ class PushRun {
     }
     if (report_.stop != StopReason::user) retreat();
     if (report_.stop == StopReason::user) robot_.stop();  // where it is: only the user knows why
+  }
+
+  void say_what_was_too_much() {
+    const double over_n = std::max(report_.highest_force_n, peak_n_) - options_.force_limit_n;
+    if (over_n <= 5 * free_air_std_n_) return;
+    report_.overshoot_n = over_n;
+    report_.highest_force_n = options_.force_limit_n + over_n;
   }
 
   void told(const Stopped& stop) {
@@ -95,7 +101,13 @@ class PushRun {
   Vec3 force(const RobotState& state) const { return state.force_n - report_.tare_n; }
   double pressing(const RobotState& state) const { return along(force(state)); }
   double travel(const RobotState& state) const { return along(state.T_base_tip.translation() - report_.contact_m); }
-  sensing::ContactSample sample(const RobotState& state) const {
+  RobotState look() {
+    const RobotState state = robot_.read();
+    peak_n_ = std::max(peak_n_, pressing(state));
+    return state;
+  }
+  sensing::ContactSample sample(const RobotState& state) {
+    peak_n_ = std::max(peak_n_, pressing(state));
     return {state.time_s, force(state), state.T_base_tip.translation()};
   }
 
@@ -178,10 +190,10 @@ class PushRun {
       if (!contact) continue;
       const double touched_n = along(samples.back().force_n);
       if (lengths_.is_hard_touch(touched_n, motion_m)) {  // back to where nothing was felt, and once more
-        report_.highest_force_n = std::max(report_.highest_force_n, touched_n);
         samples.resize(*contact);
         fine_until_m = at_m_ + options_.increment_m;
         move_to(at_m_ - motion_m, options_.approach_speed_m_s);
+        look();
         motion_m = lengths_.after_hard_touch_m(touched_n, motion_m);
         continue;
       }
@@ -234,6 +246,7 @@ class PushRun {
       if (lengths_.is_far_beyond(now, at_m_)) {
         move_to(at_m_ - lengths_.take_back_m(now), options_.push_speed_m_s);
         robot_.wait(options_.sample_period_s);
+        recorded_at_m_.reset();  // the arm comes to no place twice
         continue;
       }
       top_n_ = std::max(top_n_, now);
@@ -249,8 +262,10 @@ class PushRun {
       if (now >= std::min(target, options_.force_limit_n)) {
         // The motion that got there was picked for its own error, too: the tip stands deeper than the encoders say more often
         // than not. Of one more motion nothing is known yet.
-        if (has_room_for_one_more(state)) advance(state);
-        if (lengths_.is_far_beyond(along(history_.back().force_n), at_m_)) continue;
+        if (has_room_for_one_more(state)) {
+          advance(state);
+          if (lengths_.is_far_beyond(along(history_.back().force_n), at_m_)) continue;
+        }
         target += options_.force_step_n;
         if (travel(robot_.read()) < options_.travel_limit_m - 1e-9) settle_and_record(false);  // else as the last one
         continue;
@@ -425,13 +440,13 @@ class PushRun {
     for (int k = first_way_back(); k <= options_.unloading_steps; ++k) {
       const double target = way_back_n(k);
       for (;;) {
-        const RobotState state = robot_.read();
-        if (!(pressing(state) > target) || !(travel(robot_.read()) > 0)) break;
+        const RobotState state = look();
+        if (!(pressing(state) > target) || !(travel(look()) > 0)) break;
         step_back(state);
       }
-      const RobotState there = robot_.read();  // once more, for the same reason as on the way in
+      const RobotState there = look();  // once more, for the same reason as on the way in
       if (pressing(there) - 2 * lengths_.stiffness_n_m(seen(there)) * back_m(there) > lost_n()) step_back(there);
-      if (pressing(robot_.read()) < lost_n()) break;  // the object stayed behind: nothing left to record under load
+      if (pressing(look()) < lost_n()) break;  // the object stayed behind: nothing left to record under load
       settle_and_record(true);
     }
   }
@@ -473,8 +488,8 @@ class PushRun {
   bool loaded_ = false;       // a step under load is recorded
   bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
   double at_m_ = 0;           // commanded, along the push from the expected contact
-  double top_n_ = 0;                           // the highest force of the rise
-  std::optional<double> recorded_at_m_;        // of the last loaded step
+  double top_n_ = 0, peak_n_ = 0;  // the highest force of the rise, and of all
+  std::optional<double> recorded_at_m_;  // of the last loaded step
   int next_index_ = 0;
   std::optional<DepthFrame> before_;  // the untouched object
 };

@@ -376,7 +376,7 @@ TEST(PushProtocol, TheStepAtTheLimitIsRecordedHoweverLowThatIs) {
     ASSERT_EQ(loaded_n.size(), limit_n > 2 ? 2u : 1u) << limit_n;
     EXPECT_NEAR(loaded_n.back(), limit_n, 0.15 * limit_n + 0.05);
     for (const double f : back_n) EXPECT_LT(f, loaded_n.back());
-    EXPECT_LT(result.report.overshoot_n, 0.2 + 0.05) << "an increment";
+    EXPECT_LT(result.report.overshoot_n, 0.25) << "an increment and noise";
   }
   for (const double limit_m : {0.0004, 0.002}) {
     SpringRobot robot;
@@ -436,6 +436,23 @@ TEST(PushProtocol, WhereNothingAnnouncedTheForceItIsTakenBackAndSaid) {
   double top_n = 0;
   for (const Step& step : result.push.steps) top_n = std::max(top_n, force(step));
   EXPECT_NEAR(top_n, 8, 1.3);
+}
+
+// An arm that errs by several force steps a motion still records what it reached.
+TEST(PushProtocol, AStiffContactUnderAnArmThatErrsIsRecordedToo) {
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    SpringRobot robot;
+    robot.generator.seed(seed);
+    robot.stiffness_n_m = 2e4;
+    robot.repeat_std_m = 3e-4;
+    robot.relaxation = 0;
+    const Result result = run(robot);
+    if (result.report.stop != StopReason::force_limit) continue;  // lost again by an error: said
+    double top_n = 0;
+    for (const Step& step : result.push.steps) top_n = std::max(top_n, force(step));
+    EXPECT_GT(top_n, 7.8) << seed;
+    EXPECT_NEAR(result.report.overshoot_n, std::max(0.0, robot.highest_n - 8), 0.2) << seed;
+  }
 }
 
 TEST(PushProtocol, SoftObjectsAreFeltEveryIncrement) {
