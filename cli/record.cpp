@@ -124,7 +124,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
                     {"highest_force_n", report.highest_force_n},
                     {"deepest_m", report.deepest_m},
                     {"unsettled", report.unsettled},
-                    {"came_back", report.came_back}});
+                    {"came_back", report.compared ? nlohmann::json(report.came_back) : nlohmann::json()}});
     steps += report.steps;
     fine = fine && (report.stop == acquisition::StopReason::force_limit || report.stop == acquisition::StopReason::travel_limit ||
                     report.stop == acquisition::StopReason::slip || report.stop == acquisition::StopReason::contact_lost);

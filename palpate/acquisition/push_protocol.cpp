@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numbers>
 #include <optional>
 #include <vector>
 
+#include "palpate/acquisition/force_begin.hpp"
+#include "palpate/acquisition/motion_lengths.hpp"
+#include "palpate/acquisition/recorded_part.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/rest_change.hpp"
 
@@ -25,48 +28,86 @@ class PushRun {
       : robot_(robot), plan_(plan), options_(options), on_step_(on_step), keep_going_(keep_going) {
     push_.name = plan.name;
     push_.site = plan.site;
-    if (so_far)
-      for (const Step& step : so_far->steps) {
-        ++next_index_;
-        const double force = step.loads.empty() || !step.loads[0].force_n ? 0 : step.loads[0].force_n->dot(plan.direction);
-        recorded_unloading_ = recorded_unloading_ || step.unloading;
-        recorded_force_n_ = std::max(recorded_force_n_, force);
-        for (const Observation& seen : step.observations)
-          if (const auto* encoder = std::get_if<ToolTravel>(&seen))
-            recorded_travel_m_ = std::max(recorded_travel_m_, encoder->travel_m);
-        recorded_rest_ = recorded_rest_ || force == 0;
-        recorded_again_ = recorded_again_ || (step.unloading && force == 0);
-        if (force == 0 && !step.unloading)
-          for (const Observation& seen : step.observations)
-            if (const auto* frame = std::get_if<DepthFrame>(&seen)) before_ = *frame;
-      }
+    if (!so_far) return;
+    recorded_ = recorded_part(*so_far, plan.direction);
+    next_index_ = recorded_.steps;
+    before_ = recorded_.before;
+    report_.highest_force_n = recorded_.force_n;
+    report_.deepest_m = recorded_.travel_m;
   }
 
   PushReport run() {
-    try {
-      look_at_rest();
-      const Stopped stop = press();
-      report_.stop = stop.reason;
-      report_.message = stop.message;
-      if (stop.reason == StopReason::force_limit || stop.reason == StopReason::travel_limit) go_back_step_by_step();
-    } catch (const Stopped& stop) {
-      report_.stop = stop.reason;
-      report_.message = stop.message;
+    if (recorded_.again) {
+      told({StopReason::force_limit, "nothing of it was missing"});
+      return report_;
     }
-    if (report_.stop == StopReason::user)
-      robot_.stop();  // where it is: only the user knows why
-    else
-      retreat();
+    try {
+      push();
+    } catch (...) {
+      let_go();
+      throw;
+    }
+    say_what_was_too_much();
     return report_;
   }
 
  private:
+  void push() {
+    try {
+      look_at_rest();
+      const Stopped stop = is_pressed_already() ? Stopped{StopReason::force_limit, "only the look after it was missing"} : press();
+      told(stop);
+      if (stop.reason == StopReason::force_limit || stop.reason == StopReason::travel_limit) go_back_step_by_step();
+    } catch (const Stopped& stop) {
+      told(stop);
+    }
+    if (report_.stop != StopReason::user) retreat();
+    if (report_.stop == StopReason::user) robot_.stop();  // where it is: only the user knows why
+  }
+
+  void say_what_was_too_much() {
+    const double over_n = std::max(report_.highest_force_n, peak_n_) - options_.force_limit_n;
+    if (over_n <= 5 * free_air_std_n_) return;
+    report_.overshoot_n = over_n;
+    report_.highest_force_n = options_.force_limit_n + over_n;
+  }
+
+  void told(const Stopped& stop) {
+    report_.stop = stop.reason;
+    report_.message = stop.message;
+  }
+
+  // Something broke: the robot, or whoever records. The object must not stay pressed, and what the way back itself throws says
+  // less than what broke first.
+  void let_go() noexcept {
+    const auto quietly = [](auto&& act) {
+      try {
+        return act();
+      } catch (...) {
+        return false;
+      }
+    };
+    quietly([&] { return robot_.stop(), true; });
+    if (!in_front_) return;  // the tip has not been on the push's line yet: nobody knows what lies between
+    // All the way, or as much of it as the robot does; a user who wants it to stand is still obeyed.
+    for (const double share : {1.0, 0.5, 0.25, 0.125}) {
+      if (quietly([&] { return keep_going_ && !keep_going_(); })) return;
+      const double back_m = share * (at_m_ + options_.start_distance_m);
+      if (quietly([&] { return robot_.move(pose_at(at_m_ - back_m), options_.approach_speed_m_s) == Motion::done; })) return;
+    }
+  }
+
   double along(const Vec3& v) const { return plan_.direction.dot(v); }
   Vec3 force(const RobotState& state) const { return state.force_n - report_.tare_n; }
   double pressing(const RobotState& state) const { return along(force(state)); }
-  double stiffness_n_m(const RobotState& state) const { return pressing(state) / std::max(travel(state), options_.increment_m); }
   double travel(const RobotState& state) const { return along(state.T_base_tip.translation() - report_.contact_m); }
-  sensing::ContactSample sample(const RobotState& state) const {
+  RobotState look() {
+    const RobotState state = robot_.read();
+    peak_n_ = std::max(peak_n_, pressing(state));
+    return state;
+  }
+  sensing::ContactSample sample(const RobotState& state) {
+    peak_n_ = std::max(peak_n_, pressing(state));
     return {state.time_s, force(state), state.T_base_tip.translation()};
   }
 
@@ -74,14 +115,19 @@ class PushRun {
     if (keep_going_ && !keep_going_()) throw Stopped{StopReason::user, "stopped on request"};
   }
 
-  void move_to(double distance_m, double speed_m_s) {
-    ask_user();
+  Pose pose_at(double distance_m) const {
     Pose pose = Pose::Identity();
     pose.linear() = plan_.R_base_tip;
     pose.translation() = plan_.contact_m + distance_m * plan_.direction;
-    if (robot_.move(pose, speed_m_s) == Motion::refused)
+    return pose;
+  }
+
+  void move_to(double distance_m, double speed_m_s) {
+    ask_user();
+    if (robot_.move(pose_at(distance_m), speed_m_s) == Motion::refused)
       throw Stopped{StopReason::robot_limit, "the robot refused to move on: a limit, or out of reach"};
     at_m_ = distance_m;
+    in_front_ = true;
   }
 
   struct FreeAir {
@@ -94,6 +140,7 @@ class PushRun {
     FreeAir air;
     std::vector<Vec3> forces;
     for (int i = 0; i < options_.free_air_samples; ++i) {
+      ask_user();
       robot_.wait(options_.sample_period_s);
       air.last = robot_.read();
       forces.push_back(air.last.force_n);
@@ -113,29 +160,58 @@ class PushRun {
     report_.tare_n = air.mean_n;
     tared_at_s_ = air.time_s;
     free_air_std_n_ = air.std_n;
-    push_.force_tare_std_n = free_air_std_n_ / std::sqrt(double(options_.free_air_samples));
-    push_.travel_offset_std_m = travel_offset_std_m(options_, robot_.travel_sigma_m());
-    if (!recorded_rest_) record(air.last, {}, 0, false);
+    const double travel_sigma_m = robot_.travel_sigma_m();
+    lengths_.state_noise(free_air_std_n_, travel_sigma_m);
+    // A push that goes on is one push with one statement.
+    push_.force_tare_std_n = std::max(free_air_std_n_ / std::sqrt(double(options_.free_air_samples)), recorded_.force_tare_std_n);
+    push_.travel_offset_std_m = std::max(travel_offset_std_m(options_, travel_sigma_m), recorded_.travel_offset_std_m);
+    if (!recorded_.rest) record(air.last, {}, 0, false);
   }
+
+  // Of an earlier run: the last step of the rise stands on the record, and a way back still has to start from it.
+  bool top_is_recorded() const {
+    if (recorded_.unloading) return true;
+    return recorded_.force_n > 0 && (recorded_.force_n >= options_.force_limit_n - 0.5 * options_.force_step_n ||
+                                     recorded_.travel_m >= options_.travel_limit_m - options_.increment_m);
+  }
+  bool is_pressed_already() const { return top_is_recorded() && first_way_back() > options_.unloading_steps; }
 
   void approach() {
     std::vector<sensing::ContactSample> samples;
+    double motion_m = options_.increment_m, fine_until_m = -options_.start_distance_m;
     while (at_m_ < options_.search_distance_m) {
-      move_to(at_m_ + options_.increment_m, options_.approach_speed_m_s);
+      if (at_m_ > fine_until_m) motion_m = options_.increment_m;
+      move_to(at_m_ + motion_m, options_.approach_speed_m_s);
       for (int i = 0; i < options_.contact.confirm_samples; ++i) {
         robot_.wait(options_.sample_period_s);
         samples.push_back(sample(robot_.read()));
       }
       const auto contact = sensing::find_contact(samples, plan_.direction, free_air_std_n_, options_.contact);
       if (!contact) continue;
-      report_.contact_m = samples[*contact].tip_m;
-      begins_late_ = true;
-      approach_.assign(samples.begin(), samples.begin() + std::ptrdiff_t(*contact));
-      history_.assign(samples.begin() + std::ptrdiff_t(*contact), samples.end());
+      const double touched_n = along(samples.back().force_n);
+      if (lengths_.is_hard_touch(touched_n, motion_m)) {  // back to where nothing was felt, and once more
+        samples.resize(*contact);
+        fine_until_m = at_m_ + options_.increment_m;
+        move_to(at_m_ - motion_m, options_.approach_speed_m_s);
+        look();
+        motion_m = lengths_.after_hard_touch_m(touched_n, motion_m);
+        continue;
+      }
+      touched(samples, *contact, motion_m);
       return;
     }
     throw Stopped{StopReason::no_contact, "no contact within " + std::to_string(1000 * options_.search_distance_m) +
                                               " mm beyond the expected surface"};
+  }
+
+  void touched(const std::vector<sensing::ContactSample>& samples, std::size_t contact, double motion_m) {
+    noticed_m_ = samples[contact].tip_m;
+    // Encoders are absolute: what goes on counts from the zero that the recorded travels have.
+    report_.contact_m = recorded_.contact_m.value_or(noticed_m_);
+    begins_late_ = true;
+    approach_.assign(samples.begin(), samples.begin() + std::ptrdiff_t(contact));
+    history_.assign(samples.begin() + std::ptrdiff_t(contact), samples.end());
+    lengths_.touched(at_m_, motion_m);
   }
 
   // A first touch of little more than noise may be lost to the arm's own repeat error: the approach then goes on.
@@ -146,7 +222,7 @@ class PushRun {
       try {
         return rise();
       } catch (const Stopped& stop) {
-        const bool hardly_touched = !loaded_ && recorded_force_n_ == 0 && report_.highest_force_n < options_.force_step_n;
+        const bool hardly_touched = !loaded_ && recorded_.force_n == 0 && top_n_ < options_.force_step_n;
         if (stop.reason != StopReason::contact_lost || !hardly_touched || touch == touches) throw;
       }
     }
@@ -156,30 +232,40 @@ class PushRun {
   double lost_n() const {
     return 0.5 * std::max(options_.contact.threshold_n, options_.contact.noise_factor * free_air_std_n_);
   }
+  double step_n() const { return std::min(options_.force_step_n, options_.force_limit_n); }
 
   Stopped rise() {
-    double target = std::max(options_.force_step_n, recorded_force_n_ + options_.force_step_n);
-    if (recorded_unloading_) return {StopReason::force_limit, "the rise was recorded before"};
-    // The last step of the rise may stand on the record already; the way back still has to start from it.
-    const bool top_recorded = recorded_force_n_ >= options_.force_limit_n - 0.5 * options_.force_step_n ||
-                              recorded_travel_m_ >= options_.travel_limit_m - options_.increment_m;
+    const bool top_recorded = top_is_recorded();
+    double target = std::max(options_.force_step_n, recorded_.force_n + options_.force_step_n);
+    if (top_recorded) target = options_.force_limit_n;
     for (;;) {
       const RobotState state = robot_.read();
       const double now = pressing(state);
       report_.highest_force_n = std::max(report_.highest_force_n, now);
       report_.deepest_m = std::max(report_.deepest_m, travel(state));
+      if (lengths_.is_far_beyond(now, at_m_)) {
+        move_to(at_m_ - lengths_.take_back_m(now), options_.push_speed_m_s);
+        robot_.wait(options_.sample_period_s);
+        recorded_at_m_.reset();  // the arm comes to no place twice
+        continue;
+      }
+      top_n_ = std::max(top_n_, now);
+      if (recorded_.contact_m && now >= step_n()) begin_where_the_force_began();  // as early as in the part that is recorded
       if (now >= options_.force_limit_n) {
-        if (!top_recorded) settle_and_record(false);
+        end_rise(top_recorded);
         return {StopReason::force_limit, "the force reached its limit"};
       }
       if (travel(state) >= options_.travel_limit_m - 1e-9) {
-        if (!top_recorded) settle_and_record(false);
+        end_rise(top_recorded);
         return {StopReason::travel_limit, "the travel reached its limit"};
       }
       if (now >= std::min(target, options_.force_limit_n)) {
         // The motion that got there was picked for its own error, too: the tip stands deeper than the encoders say more often
         // than not. Of one more motion nothing is known yet.
-        if (has_room_for_one_more(state)) advance(state);
+        if (has_room_for_one_more(state)) {
+          advance(state);
+          if (lengths_.is_far_beyond(along(history_.back().force_n), at_m_)) continue;
+        }
         target += options_.force_step_n;
         if (travel(robot_.read()) < options_.travel_limit_m - 1e-9) settle_and_record(false);  // else as the last one
         continue;
@@ -188,87 +274,113 @@ class PushRun {
     }
   }
 
+  // What an earlier run has on record is not recorded again, but the way back starts from it as it did: settled.
+  void end_rise(bool top_recorded) {
+    if (top_recorded)
+      settle(false);
+    else
+      settle_and_record(false);
+  }
+
   void advance(const RobotState& state) {
-    move_to(at_m_ + std::min(options_.increment_m, options_.travel_limit_m - travel(state)), options_.push_speed_m_s);
+    const double from_m = at_m_;
+    move_to(at_m_ + std::min(next_m(state), options_.travel_limit_m - travel(state)), options_.push_speed_m_s);
     robot_.wait(options_.sample_period_s);
     history_.push_back(sample(robot_.read()));
+    lengths_.moved(at_m_ - from_m, along(history_.back().force_n) - pressing(state));
     watch_out();
   }
 
+  MotionLengths::Seen seen(const RobotState& state) const { return {pressing(state), travel(state)}; }
+  double next_m(const RobotState& state) const { return lengths_.next_m(seen(state), at_m_); }
+
   // Even if the object is twice as stiff there as it was up to here.
   bool has_room_for_one_more(const RobotState& state) const {
-    return pressing(state) + 2 * stiffness_n_m(state) * options_.increment_m < options_.force_limit_n;
+    return pressing(state) + 2 * lengths_.stiffness_n_m(seen(state)) * next_m(state) < options_.force_limit_n;
   }
 
   void watch_out() const {
     // Below the first step, the arm's own repeat error moves the force of a soft object by more than slip would.
     sensing::SlipOptions slip = options_.slip;
-    slip.least_force_n = std::max(slip.least_force_n, options_.force_step_n);
+    slip.least_force_n = std::max(slip.least_force_n, step_n());
     const sensing::PushEvent event = sensing::watch(history_, plan_.direction, lost_n(), slip);
     if (event == sensing::PushEvent::none) return;
     throw Stopped{event == sensing::PushEvent::contact_lost ? StopReason::contact_lost : StopReason::slip,
                   sensing::to_words(event)};
   }
 
-  void settle_and_record(bool unloading) {
-    if (recorded_at_m_ == at_m_) return;  // nothing moved since: it would be the same step once more
-    recorded_at_m_ = at_m_;
+  struct Settled {
+    RobotState last;
+    Vec3 mean_n = Vec3::Zero();
+    double sigma_n = 0;
+    bool settled = false;
+  };
+  Settled settle(bool unloading) {
     std::vector<sensing::ContactSample> samples;
     const double start = robot_.read().time_s;
     sensing::Settling state;
-    RobotState last;
+    Settled out;
     do {
       ask_user();
       robot_.wait(options_.sample_period_s);
-      last = robot_.read();
-      samples.push_back(sample(last));
+      out.last = robot_.read();
+      samples.push_back(sample(out.last));
       state = sensing::settling(samples, plan_.direction, options_.settling);
-    } while (!state.settled && last.time_s - start < options_.settling_timeout_s);
-    if (!state.settled) report_.unsettled.push_back(next_index_);
+    } while (!state.settled && out.last.time_s - start < options_.settling_timeout_s);
+    out.settled = state.settled;
     // The recorded force is the mean over the last window, as `settling` sees it.
-    Vec3 mean = Vec3::Zero(), square = Vec3::Zero();
+    Vec3 square = Vec3::Zero();
     double count = 0;
-    for (auto s = samples.rbegin(); s != samples.rend() && s->time_s >= last.time_s - options_.settling.window_s; ++s) {
-      mean += s->force_n;
+    for (auto s = samples.rbegin(); s != samples.rend() && s->time_s >= out.last.time_s - options_.settling.window_s; ++s) {
+      out.mean_n += s->force_n;
       square += s->force_n.cwiseAbs2();
       ++count;
     }
-    mean /= count;
-    const Vec3 variance = (square / count - mean.cwiseAbs2()).cwiseMax(0.0);
-    const double sigma = std::sqrt(std::max(variance.mean(), free_air_std_n_ * free_air_std_n_ * 0.01) / count);
+    out.mean_n /= count;
+    const Vec3 variance = (square / count - out.mean_n.cwiseAbs2()).cwiseMax(0.0);
+    out.sigma_n = std::sqrt(std::max(variance.mean(), free_air_std_n_ * free_air_std_n_ * 0.01) / count);
     history_.insert(history_.end(), samples.begin(), samples.end());
     if (!unloading) watch_out();
-    loaded_ = true;
     begin_where_the_force_began();
-    report_.deepest_m = std::max(report_.deepest_m, travel(last));  // as it is recorded: a touch of one step tells a stiffness
-    record(last, mean, sigma, unloading);
+    report_.deepest_m = std::max(report_.deepest_m, travel(out.last));  // as it is recorded: a touch of one step tells a stiffness
+    return out;
   }
 
-  // Contact is noticed late, by what the threshold needs. Where the force really began is where the best line through zero
-  // ends among all samples of the approach and of the rise: force k (depth - begin) beyond it, none before. Travel counts from
-  // there.
+  void settle_and_record(bool unloading) {
+    if (recorded_at_m_ == at_m_) return;  // nothing moved since: it would be the same step once more
+    recorded_at_m_ = at_m_;
+    const Settled step = settle(unloading);
+    if (!step.settled) report_.unsettled.push_back(next_index_);
+    loaded_ = true;
+    record(step.last, step.mean_n, std::hypot(step.sigma_n, second_tare_std_n()), unloading);
+  }
+
+  // The push states one error of its force's zero, but its parts before and after a cut have two tares, whose errors are
+  // independent. Steps that go on carry the difference, so much each that the mean over all that may follow carries it once.
+  double second_tare_std_n() const {
+    if (recorded_.force_n == 0) return 0;
+    const double levels = std::ceil(std::max(0.0, options_.force_limit_n - recorded_.force_n) / options_.force_step_n);
+    return std::sqrt(2 * std::max(1.0, levels + options_.unloading_steps)) * push_.force_tare_std_n;
+  }
+
+  // Contact is noticed late, by what the threshold needs: travel counts from where the force really began.
   void begin_where_the_force_began() {
     if (!begins_late_) return;
     begins_late_ = false;
     approach_.insert(approach_.end(), history_.begin(), history_.end());
-    const auto depth_of = [&](const sensing::ContactSample& s) { return plan_.direction.dot(s.tip_m - report_.contact_m); };
-    const double least_m = -0.2 * options_.increment_m, step_m = 0.1 * options_.increment_m;
-    double best_m = 0, least_squares = std::numeric_limits<double>::infinity();
-    for (double late_m = least_m; late_m < options_.search_distance_m; late_m += step_m) {
-      double products = 0, squares = 0, total = 0;
-      for (const auto& s : approach_) {
-        const double force = along(s.force_n), beyond = std::max(0.0, depth_of(s) + late_m);
-        products += force * beyond;
-        squares += beyond * beyond;
-        total += force * force;
-      }
-      const double left = squares > 0 ? total - products * products / squares : total;
-      if (left >= least_squares) continue;
-      least_squares = left;
-      best_m = late_m;
-    }
-    report_.contact_m -= best_m * plan_.direction;
+    const ForceBeginSearch search{options_.search_distance_m, options_.increment_m, lengths_.finest_m()};
+    const Vec3 began_m = noticed_m_ - force_began_before_m(approach_, noticed_m_, plan_.direction, search) * plan_.direction;
     approach_.clear();
+    if (!recorded_.contact_m) {
+      report_.contact_m = began_m;
+      return;
+    }
+    // Each of the two is known as well as the push states; what is beyond that has moved since.
+    const double moved_m = along(began_m - *recorded_.contact_m);
+    if (std::abs(moved_m) > 4 * std::numbers::sqrt2 * push_.travel_offset_std_m)
+      throw Stopped{StopReason::moved, "contact begins " + std::to_string(1000 * std::abs(moved_m)) + " mm " +
+                                           (moved_m > 0 ? "deeper" : "earlier") +
+                                           " than in the part that is recorded: object or arm moved in between; push there anew"};
   }
 
   void record(const RobotState& state, const std::optional<Vec3>& force_n, double sigma_n, bool unloading) {
@@ -306,27 +418,42 @@ class PushRun {
     const DepthFrame& before = *before_;
     if (before.depth_m.rows() != after.depth_m.rows() || before.depth_m.cols() != after.depth_m.cols()) return;
     if (!before.T_base_camera.isApprox(after.T_base_camera, 1e-6)) return;
+    report_.compared = true;
     report_.changed_share = sensing::changed_share(before, after);
     report_.came_back = report_.changed_share <= options_.changed_share;
   }
 
+  // Equally spaced in force below the highest.
+  double way_back_n(int k) const {
+    return std::max(top_n_, recorded_.force_n) * (1 - double(k) / (options_.unloading_steps + 1));
+  }
+  // Steps of the way back that an earlier run recorded lie below their force by less than half of what is between two.
+  int first_way_back() const {
+    int k = 1;
+    while (k <= options_.unloading_steps && way_back_n(k) > recorded_.back_at_n - 0.5 * way_back_n(options_.unloading_steps)) ++k;
+    return k;
+  }
+
+  // After a cut it starts from the top once more. A material that remembers its loads is sent to the greatest of them again: it
+  // then goes on as if the way back in between had not been (return-point memory, Madelung 1905).
   void go_back_step_by_step() {
-    if (recorded_unloading_) return;  // the load that the way back starts from is gone
-    const double highest = std::max(report_.highest_force_n, recorded_force_n_);
-    for (int k = 1; k <= options_.unloading_steps; ++k) {
-      const double target = highest * (1 - double(k) / (options_.unloading_steps + 1));
-      while (pressing(robot_.read()) > target && travel(robot_.read()) > 0) {
-        step_back();
+    for (int k = first_way_back(); k <= options_.unloading_steps; ++k) {
+      const double target = way_back_n(k);
+      for (;;) {
+        const RobotState state = look();
+        if (!(pressing(state) > target) || !(travel(look()) > 0)) break;
+        step_back(state);
       }
-      const RobotState there = robot_.read();  // once more, for the same reason as on the way in
-      if (pressing(there) - 2 * stiffness_n_m(there) * options_.increment_m > lost_n()) step_back();
-      if (pressing(robot_.read()) < lost_n()) break;  // the object stayed behind: nothing left to record under load
+      const RobotState there = look();  // once more, for the same reason as on the way in
+      if (pressing(there) - 2 * lengths_.stiffness_n_m(seen(there)) * back_m(there) > lost_n()) step_back(there);
+      if (pressing(look()) < lost_n()) break;  // the object stayed behind: nothing left to record under load
       settle_and_record(true);
     }
   }
 
-  void step_back() {
-    move_to(at_m_ - options_.increment_m, options_.push_speed_m_s);
+  double back_m(const RobotState& state) const { return lengths_.back_m(seen(state), way_back_n(options_.unloading_steps)); }
+  void step_back(const RobotState& state) {
+    move_to(at_m_ - back_m(state), options_.push_speed_m_s);
     robot_.wait(options_.sample_period_s);
   }
 
@@ -334,15 +461,15 @@ class PushRun {
   void retreat() {
     try {
       move_to(-options_.start_distance_m, options_.approach_speed_m_s);
+      const FreeAir air = listen();
+      report_.drift_n = (air.mean_n - report_.tare_n).norm();
+      if (loaded_) report_.drift = ForceDrift{(air.mean_n - report_.tare_n) / (air.time_s - tared_at_s_), tared_at_s_};
+      if (report_.stop != StopReason::no_contact) record(air.last, {}, 0, true);
     } catch (const Stopped& stop) {
       robot_.stop();
+      if (stop.reason == StopReason::user) return told(stop);
       report_.message += "; then " + stop.message;
-      return;
     }
-    const FreeAir air = listen();
-    report_.drift = ForceDrift{(air.mean_n - report_.tare_n) / (air.time_s - tared_at_s_), tared_at_s_};
-    report_.drift_n = (air.mean_n - report_.tare_n).norm();
-    if (report_.stop != StopReason::no_contact && !recorded_again_) record(air.last, {}, 0, true);
   }
 
   Robot& robot_;
@@ -352,16 +479,18 @@ class PushRun {
   const std::function<bool()>& keep_going_;
   Push push_;
   PushReport report_;
-  std::vector<sensing::ContactSample> history_;  // since contact
+  RecordedPart recorded_;
+  MotionLengths lengths_{options_};
+  std::vector<sensing::ContactSample> approach_, history_;  // before contact was noticed, and since
+  Vec3 noticed_m_ = Vec3::Zero();                           // there
   double free_air_std_n_ = 0, tared_at_s_ = 0;
-  std::vector<sensing::ContactSample> approach_;  // before contact was noticed
+  bool in_front_ = false;     // the tip has been in front of the object
   bool loaded_ = false;       // a step under load is recorded
   bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
-  double at_m_ = 0;  // commanded, along the push from the expected contact
+  double at_m_ = 0;           // commanded, along the push from the expected contact
+  double top_n_ = 0, peak_n_ = 0;  // the highest force of the rise, and of all
   std::optional<double> recorded_at_m_;  // of the last loaded step
   int next_index_ = 0;
-  double recorded_force_n_ = 0, recorded_travel_m_ = 0;
-  bool recorded_rest_ = false, recorded_unloading_ = false, recorded_again_ = false;
   std::optional<DepthFrame> before_;  // the untouched object
 };
 
@@ -374,51 +503,6 @@ Mat3 tip_along(const Vec3& direction) {
   rotation.col(0) = (x - x.dot(direction) * direction).normalized();
   rotation.col(1) = direction.cross(rotation.col(0));
   return rotation;
-}
-
-double travel_offset_std_m(const PushOptions& o, double travel_sigma_m) { return std::hypot(0.5 * o.increment_m, travel_sigma_m); }
-
-void check(const PushOptions& o) {
-  const auto need = [](bool good, const char* field, const char* rule) {
-    if (!good) throw Error(rule, std::string("PushOptions.") + field);
-  };
-  need(o.force_limit_n > 0, "force_limit_n", "must be positive");
-  need(o.travel_limit_m > 0, "travel_limit_m", "must be positive");
-  need(o.force_step_n > 0, "force_step_n", "must be positive");
-  need(o.unloading_steps >= 0, "unloading_steps", "must not be negative");
-  need(o.start_distance_m > 0, "start_distance_m", "must be positive");
-  need(o.search_distance_m >= 0, "search_distance_m", "must not be negative");
-  need(o.increment_m > 0 && o.increment_m <= 0.01, "increment_m", "must be positive and at most 10 mm");
-  need(o.approach_speed_m_s > 0, "approach_speed_m_s", "must be positive");
-  need(o.push_speed_m_s > 0, "push_speed_m_s", "must be positive");
-  need(o.sample_period_s > 0, "sample_period_s", "must be positive");
-  need(o.free_air_samples >= 2, "free_air_samples", "must be at least 2");
-  need(o.settling_timeout_s > o.settling.window_s, "settling_timeout_s", "must be longer than settling.window_s");
-  need(o.contact_std_m >= 0, "contact_std_m", "must not be negative");
-  need(o.changed_share >= 0, "changed_share", "must not be negative");
-  sensing::check(o.contact);
-  sensing::check(o.settling);
-  sensing::check(o.slip);
-}
-
-const char* to_words(StopReason reason) {
-  switch (reason) {
-    case StopReason::force_limit:
-      return "force limit";
-    case StopReason::travel_limit:
-      return "travel limit";
-    case StopReason::slip:
-      return "slip";
-    case StopReason::contact_lost:
-      return "contact lost";
-    case StopReason::no_contact:
-      return "no contact";
-    case StopReason::robot_limit:
-      return "limit of the robot";
-    case StopReason::user:
-      break;
-  }
-  return "stopped by the user";
 }
 
 PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,

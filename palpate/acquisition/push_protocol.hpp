@@ -27,13 +27,14 @@ struct PushPlan {
 Mat3 tip_along(const Vec3& direction);
 
 struct PushOptions {
-  double force_limit_n = 50.0;      ///< the paper's
+  double force_limit_n = 50.0;      ///< the paper's; a step is recorded there, however large force_step_n is
   double travel_limit_m = 0.10;     ///< the paper's
-  double force_step_n = 2.0;        ///< between recorded steps; each is recorded an increment after its force was reached
+  double force_step_n = 2.0;        ///< between recorded steps; each is recorded a motion after its force was reached
   int unloading_steps = 2;          ///< recorded on the way back, equally spaced in force
   double start_distance_m = 0.05;   ///< before the expected contact: where the approach starts and the push ends
   double search_distance_m = 0.03;  ///< beyond it: how far to look for contact
-  double increment_m = 0.0005;      ///< of the tip between two looks at the force
+  /// Of the tip between two looks at the force; less where the object is so stiff that it would pass a force step or the limit.
+  double increment_m = 0.0005;
   double approach_speed_m_s = 0.02;
   double push_speed_m_s = 0.005;
   double sample_period_s = 0.02;
@@ -53,21 +54,27 @@ void check(const PushOptions& options);
 /// Prior of the travel's zero, m: it is traced back to about half an increment, from tips that are known to `travel_sigma_m`.
 double travel_offset_std_m(const PushOptions& options, double travel_sigma_m);
 
-enum class StopReason { force_limit, travel_limit, slip, contact_lost, no_contact, robot_limit, user };
+/// moved: a push that goes on finds contact elsewhere than the part that is recorded.
+enum class StopReason { force_limit, travel_limit, slip, contact_lost, no_contact, robot_limit, moved, user };
 const char* to_words(StopReason reason);
 
 struct PushReport {
   StopReason stop = StopReason::user;
   std::string message;            ///< plain words
   Vec3 contact_m = Vec3::Zero();  ///< where contact began: the force's rise traced back to zero
-  double highest_force_n = 0, deepest_m = 0;
+  double highest_force_n = 0, deepest_m = 0;  ///< of the whole push, with what an earlier run has recorded of it
+  /// Of the highest force above the limit, where noise does not explain it; more than a tenth of the limit means that the object
+  /// was stiffer than a motion foresaw (at the first touch up to stiffness times increment_m).
+  double overshoot_n = 0;
   int steps = 0;               ///< recorded now, resumed ones not counted
   std::vector<int> unsettled;  ///< indices (in the push) of steps whose force still crept
   Vec3 tare_n = Vec3::Zero();  ///< taken off every force
-  /// From the tare to the free air after the retreat; not taken off the steps that were handed over. Nothing: no such free air.
+  /// From the tare to the free air after the retreat; not taken off the steps that were handed over. Nothing: no such free air,
+  /// or no step under load that was handed over.
   std::optional<ForceDrift> drift;
   double drift_n = 0;          ///< what it had come to by then
-  bool came_back = true;       ///< false: what the camera sees after the push is not what it saw before
+  bool compared = false;       ///< images from before and after the push, taken from one place
+  bool came_back = true;       ///< false: what the camera sees after the push is not what it saw before; says nothing if not compared
   double changed_share = 0;    ///< of its pixels (sensing::changed_share)
 };
 
@@ -76,10 +83,12 @@ struct PushReport {
 using OnStep = std::function<void(const Push& push, const Step& step)>;
 
 /// Runs one push.
-/// @param keep_going  asked before every motion; false stops the robot where it is (StopReason::user)
+/// @param keep_going  asked before every motion and while it waits; false stops the robot where it is (StopReason::user)
 /// @param so_far  steps of the same push that an earlier run has recorded: they are not recorded again, and the force rises
-///                from where they end
-/// @throws Error for bad options or plan, and whatever the robot throws.
+///                from where they end; where the way back had begun, from its top once more. Travel counts from their zero,
+///                forces from a new tare, whose difference to theirs is in the forces' standard deviations.
+/// @throws Error for bad options or plan, and whatever robot or on_step throw: the tip is then away from the object, if the robot
+///         still moved.
 PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
                     const std::function<bool()>& keep_going = {}, const Push* so_far = nullptr);
 

@@ -29,6 +29,9 @@ struct SpringRobot : Robot {
   double repeat_std_m = 0;   // every motion ends this far from where the encoders say
   double unseen_m = 0;       // the last one's error, deeper
   int images = 0;
+  double highest_n = 0;  // of the spring, as nobody reads it
+  bool camera_moves = false;
+  double breaks_beyond_m = 1e9;  // cannot be read any more
   std::mt19937 generator{7};
 
   double depth() const { return surface_m - tip.translation().z() + unseen_m; }
@@ -38,6 +41,7 @@ struct SpringRobot : Robot {
     return stiffness_n_m * (depth() + 9 * stiff_m) * (depth() > yields_at_m ? 0.5 : 1.0);
   }
   RobotState read() override {
+    if (depth() > breaks_beyond_m) throw Error("no answer", "robot");
     std::normal_distribution<double> noise(0, noise_n);
     RobotState state;
     state.time_s = clock_s;
@@ -60,6 +64,7 @@ struct SpringRobot : Robot {
       tip.translation().z() += 0.002;
       --errs_after_touch;
     }
+    highest_n = std::max(highest_n, spring());
     moved_s = clock_s;
     faded_n = relaxation * std::max(0.0, spring() - before);
     return Motion::done;
@@ -70,10 +75,12 @@ struct SpringRobot : Robot {
     DepthFrame frame;
     frame.time_s = clock_s;
     frame.depth_m = DepthImage::Constant(2, 2, float(depth()));
+    if (camera_moves) frame.T_base_camera.translation().x() = 1e-3 * images;
     return frame;
   }
   void wait(double duration_s) override { clock_s += duration_s; }
-  double travel_sigma_m() const override { return 3e-4; }
+  double travel_sigma_m() const override { return sigma_m; }
+  double sigma_m = 3e-4;
 };
 
 PushPlan plan() {
@@ -307,40 +314,312 @@ TEST(PushProtocol, UserStopsItWhereItIs) {
   EXPECT_NEAR(robot.depth(), 0.006, 0.0011);
 }
 
+// Whatever it is at: between the free air before the push and that after it.
+TEST(PushProtocol, UserStopsItAtAnyTime) {
+  SpringRobot counted;
+  int asked = 0;
+  const std::size_t whole = run(counted, options(), [&] { return ++asked > 0; }).push.steps.size();
+  int at_rest = 0, settling = 0, back = 0, last = 0;
+  for (int stop_at = 1; stop_at <= asked; ++stop_at) {
+    SpringRobot robot;
+    int now = 0;
+    double asked_at_m = 0, asked_at_s = 0;
+    const Result result = run(robot, options(), [&] {
+      asked_at_m = robot.depth();
+      asked_at_s = robot.clock_s;
+      return ++now < stop_at;
+    });
+    ASSERT_EQ(result.report.stop, StopReason::user) << stop_at;
+    ASSERT_EQ(result.report.message, "stopped on request") << stop_at;
+    ASSERT_TRUE(robot.stopped) << stop_at;
+    ASSERT_EQ(now, stop_at) << "once is enough";
+    ASSERT_EQ(robot.depth(), asked_at_m) << stop_at << ": no motion after it";
+    ASSERT_EQ(robot.clock_s, asked_at_s) << stop_at << ": nor anything that takes time";
+    ASSERT_LT(result.push.steps.size(), whole);
+    at_rest += result.push.steps.empty();
+    settling += robot.clock_s - robot.moved_s > 0.1 && robot.depth() > 0;
+    if (!result.push.steps.empty()) {
+      back += result.push.steps.back().unloading && robot.depth() > 0;
+      last += result.push.steps.size() == whole - 1 && robot.depth() < 0;
+    }
+  }
+  EXPECT_GT(at_rest, 10);
+  EXPECT_GT(settling, 100);
+  EXPECT_GT(back, 20);
+  EXPECT_GT(last, 10) << "in the free air after the push";
+}
+
+TEST(PushProtocol, UserStopsItWhileItRetreats) {
+  SpringRobot robot;
+  double stopped_at_m = 0;
+  const Result result = run(robot, options(), [&] {
+    if (robot.images < 7) return true;  // all but the last
+    stopped_at_m = robot.depth();
+    return false;
+  });
+  EXPECT_EQ(result.report.stop, StopReason::user);
+  EXPECT_GT(stopped_at_m, 0);
+  EXPECT_EQ(robot.depth(), stopped_at_m) << "still pressed, as asked for";
+  EXPECT_EQ(result.push.steps.size(), 7u);
+}
+
+TEST(PushProtocol, TheStepAtTheLimitIsRecordedHoweverLowThatIs) {
+  for (const double limit_n : {0.4, 1.0, 1.9, 2.0, 3.0}) {
+    SpringRobot robot;
+    PushOptions o = options();
+    o.force_limit_n = limit_n;
+    const Result result = run(robot, o);
+    EXPECT_EQ(result.report.stop, StopReason::force_limit);
+    std::vector<double> loaded_n, back_n;
+    for (const Step& step : result.push.steps)
+      if (!step.loads.empty()) (step.unloading ? back_n : loaded_n).push_back(force(step));
+    ASSERT_EQ(loaded_n.size(), limit_n > 2 ? 2u : 1u) << limit_n;
+    EXPECT_NEAR(loaded_n.back(), limit_n, 0.15 * limit_n + 0.05);
+    for (const double f : back_n) EXPECT_LT(f, loaded_n.back());
+    EXPECT_LT(result.report.overshoot_n, 0.25) << "an increment and noise";
+  }
+  for (const double limit_m : {0.0004, 0.002}) {
+    SpringRobot robot;
+    PushOptions o = options();
+    o.travel_limit_m = limit_m;
+    const Result result = run(robot, o);
+    EXPECT_EQ(result.report.stop, StopReason::travel_limit);
+    int loaded = 0;
+    for (const Step& step : result.push.steps) loaded += !step.loads.empty() && !step.unloading;
+    EXPECT_EQ(loaded, 1) << limit_m;
+  }
+}
+
+// One increment is 50 N here. The first touch may come anywhere within one.
+TEST(PushProtocol, AStiffContactIsPressedNoFurtherThanTheLimit) {
+  for (const double stiffness_n_m : {5e3, 2e4, 1e5}) {
+    for (int k = 0; k < 25; ++k) {
+      SpringRobot robot;
+      robot.stiffness_n_m = stiffness_n_m;
+      robot.surface_m = 0.1 - 2e-5 * k;
+      robot.relaxation = 0;
+      robot.sigma_m = 2e-5;
+      const Result result = run(robot);
+      ASSERT_EQ(result.report.stop, StopReason::force_limit) << result.report.message;
+      const double touch_n = stiffness_n_m * 5e-4, shortest_n = stiffness_n_m * 1e-5;
+      EXPECT_LE(robot.highest_n, std::max(touch_n, 8 + 0.8 + shortest_n) + 1e-9) << stiffness_n_m << " " << k;
+      EXPECT_NEAR(result.report.overshoot_n, robot.highest_n > 8.1 ? robot.highest_n - 8 : 0, 0.2) << "and it is said";
+      std::vector<double> loaded_n, back_n;
+      for (const Step& step : result.push.steps) {
+        if (step.loads.empty()) continue;
+        (step.unloading ? back_n : loaded_n).push_back(force(step));
+        const double travel_m = std::get<ToolTravel>(step.observations.front()).travel_m;
+        EXPECT_NEAR(travel_m, force(step) / stiffness_n_m, 6e-5) << "a quarter of what is stated, " << stiffness_n_m << " " << k;
+      }
+      EXPECT_NEAR(loaded_n.back(), 8, 0.8 + shortest_n) << "settled at the limit, not beyond";
+      if (shortest_n > 0.5) continue;  // half a step in the shortest of all motions
+      ASSERT_EQ(loaded_n.size(), 4u) << stiffness_n_m << " " << k;
+      for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(loaded_n[i], 2 * (double(i) + 1) + 0.5, 0.6) << stiffness_n_m << " " << k;
+      EXPECT_EQ(back_n.size(), 2u) << stiffness_n_m << " " << k;
+    }
+  }
+}
+
+// The soft cover of something hard: only the motion that meets it goes beyond the limit, and the tip does not stay there.
+TEST(PushProtocol, WhereNothingAnnouncedTheForceItIsTakenBackAndSaid) {
+  struct Hard : SpringRobot {
+    RobotState read() override {
+      RobotState state = SpringRobot::read();
+      state.force_n.z() -= 1e5 * std::max(0.0, depth() - 0.0101);
+      return state;
+    }
+  } hard;
+  const Result result = run(hard);
+  EXPECT_EQ(result.report.stop, StopReason::force_limit);
+  EXPECT_NEAR(result.report.overshoot_n, result.report.highest_force_n - 8, 1e-9);
+  EXPECT_GT(result.report.overshoot_n, 10);
+  double top_n = 0;
+  for (const Step& step : result.push.steps) top_n = std::max(top_n, force(step));
+  EXPECT_NEAR(top_n, 8, 1.3);
+}
+
+// An arm that errs by several force steps a motion still records what it reached.
+TEST(PushProtocol, AStiffContactUnderAnArmThatErrsIsRecordedToo) {
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    SpringRobot robot;
+    robot.generator.seed(seed);
+    robot.stiffness_n_m = 2e4;
+    robot.repeat_std_m = 3e-4;
+    robot.relaxation = 0;
+    const Result result = run(robot);
+    if (result.report.stop != StopReason::force_limit) continue;  // lost again by an error: said
+    double top_n = 0;
+    for (const Step& step : result.push.steps) top_n = std::max(top_n, force(step));
+    EXPECT_GT(top_n, 7.8) << seed;
+    EXPECT_NEAR(result.report.overshoot_n, std::max(0.0, robot.highest_n - 8), 0.2) << seed;
+  }
+}
+
+TEST(PushProtocol, SoftObjectsAreFeltEveryIncrement) {
+  std::vector<double> depths_m;
+  struct Watched : SpringRobot {
+    std::vector<double>* out = nullptr;
+    Motion move(const Pose& pose, double speed_m_s) override {
+      out->push_back(surface_m - pose.translation().z());
+      return SpringRobot::move(pose, speed_m_s);
+    }
+  } watched;
+  watched.out = &depths_m;
+  EXPECT_LT(run(watched).report.overshoot_n, 0.25);
+  ASSERT_GT(depths_m.size(), 100u);
+  for (std::size_t i = 2; i + 1 < depths_m.size(); ++i) EXPECT_NEAR(std::abs(depths_m[i] - depths_m[i - 1]), options().increment_m, 1e-9) << i;
+}
+
+TEST(PushProtocol, WhateverBreaksTheTipGoesAway) {
+  for (const double breaks_m : {-0.01, 0.002, 0.01}) {
+    SpringRobot robot;
+    robot.breaks_beyond_m = breaks_m;
+    EXPECT_THROW(run(robot), Error) << "it goes on to the caller";
+    EXPECT_TRUE(robot.stopped);
+    EXPECT_NEAR(robot.depth(), -0.052, 1e-3) << breaks_m;
+  }
+  struct DiskIsFull {};
+  for (int kept = 0; kept < 8; ++kept) {
+    SpringRobot robot;
+    int steps = 0;
+    EXPECT_THROW(run_push(robot, plan(), options(), [&](const Push&, const Step&) { if (steps++ == kept) throw DiskIsFull{}; }), DiskIsFull);
+    EXPECT_TRUE(robot.stopped);
+    EXPECT_NEAR(robot.depth(), -0.052, 1e-3) << kept;
+  }
+  struct Jams : SpringRobot {
+    Motion move(const Pose& pose, double speed_m_s) override {
+      if (stopped && surface_m - pose.translation().z() < -0.01) throw Error("jammed", "robot");
+      return SpringRobot::move(pose, speed_m_s);
+    }
+  } jams;
+  jams.breaks_beyond_m = 0.006;
+  EXPECT_THROW(run(jams), Error);
+  EXPECT_LT(jams.depth(), 0.003) << "as far as it goes";
+  SpringRobot wanted;
+  wanted.breaks_beyond_m = 0.006;
+  EXPECT_THROW(run(wanted, options(), [&] { return !wanted.stopped; }), Error);
+  EXPECT_NEAR(wanted.depth(), 0.006, 6e-4) << "the user wants it where it is";
+}
+
+TEST(PushProtocol, ACameraThatMovedTellsNothingOfTheObject) {
+  SpringRobot stands, moves;
+  moves.camera_moves = true;
+  const PushReport seen = run(stands).report, unseen = run(moves).report;
+  EXPECT_TRUE(seen.compared);
+  EXPECT_TRUE(seen.came_back);
+  EXPECT_FALSE(unseen.compared);
+  EXPECT_TRUE(unseen.came_back) << "nothing speaks against it";
+}
+
+Push killed_after(std::size_t steps, SpringRobot& robot) {
+  struct Killed {};
+  Push so_far;
+  try {
+    run_push(robot, plan(), options(), [&](const Push& push, const Step& step) {
+      if (so_far.steps.size() == steps) throw Killed{};
+      std::vector<Step> before = std::move(so_far.steps);
+      so_far = push;
+      so_far.steps = std::move(before);
+      so_far.steps.push_back(step);
+    });
+    ADD_FAILURE() << "was not killed";
+  } catch (const Killed&) {
+  }
+  EXPECT_EQ(so_far.steps.size(), steps);
+  return so_far;
+}
+
 TEST(PushProtocol, GoesOnAfterAKillAtEveryStep) {
   SpringRobot whole_robot;
   const Push whole = run(whole_robot).push;
   for (std::size_t killed = 0; killed < whole.steps.size(); ++killed) {
-    struct Killed {};
     SpringRobot robot;
-    Push so_far;
-    try {
-      run_push(robot, plan(), options(), [&](const Push&, const Step& step) {
-        if (so_far.steps.size() == killed) throw Killed{};
-        so_far.steps.push_back(step);
-      });
-      FAIL() << "was not killed";
-    } catch (const Killed&) {
-    }
-    ASSERT_EQ(so_far.steps.size(), killed);
+    Push so_far = killed_after(killed, robot);
     SpringRobot fresh;
     fresh.clock_s = robot.clock_s + 60;
     const Result rest = run(fresh, options(), {}, &so_far);
+    EXPECT_EQ(rest.report.stop, StopReason::force_limit) << rest.report.message;
+    EXPECT_EQ(rest.report.steps, int(whole.steps.size() - killed));
+    EXPECT_GE(rest.report.highest_force_n, 7.8) << "of the whole push";
+    EXPECT_EQ(rest.report.drift.has_value(), killed + 1 < whole.steps.size()) << "nothing is left that a drift could spoil";
     for (const Step& step : rest.push.steps) so_far.steps.push_back(step);
-    double time = -1, highest = 0;
-    int at_rest = 0;
-    for (const Step& step : so_far.steps) {
-      EXPECT_GT(step.time_s, time) << killed;
-      time = step.time_s;
-      if (!step.unloading && force(step) > 0) {
-        EXPECT_GT(force(step), highest + 1) << "no level twice, killed at " << killed;
-        highest = force(step);
-      }
-      at_rest += step.loads.empty();
+    // The same steps as if nothing had happened, each once.
+    ASSERT_EQ(so_far.steps.size(), whole.steps.size()) << killed;
+    double time = -1;
+    for (std::size_t i = 0; i < whole.steps.size(); ++i) {
+      EXPECT_GT(so_far.steps[i].time_s, time) << killed;
+      time = so_far.steps[i].time_s;
+      EXPECT_EQ(so_far.steps[i].unloading, whole.steps[i].unloading) << killed;
+      EXPECT_EQ(so_far.steps[i].loads.empty(), whole.steps[i].loads.empty()) << killed;
+      EXPECT_NEAR(force(so_far.steps[i]), force(whole.steps[i]), 0.5) << killed << ", step " << i;
     }
-    EXPECT_GE(highest, 7.8) << killed;
-    EXPECT_EQ(at_rest, 2) << killed;
   }
+  SpringRobot fresh;
+  const Result nothing = run(fresh, options(), {}, &whole);
+  EXPECT_EQ(nothing.report.steps, 0);
+  EXPECT_EQ(nothing.report.stop, StopReason::force_limit);
+  EXPECT_FALSE(nothing.report.compared);
+  EXPECT_LT(fresh.highest_n, 1e-9) << "nobody touched it";
+}
+
+// The sensor's zero is another one after the pause, and the first touch falls elsewhere within an increment: all steps of the
+// push still lie on one line within what the push states once for all of them, and each for itself.
+TEST(PushProtocol, WhatGoesOnHasTheOffsetsOfWhatIsRecorded) {
+  double between = 0;
+  constexpr int seeds = 60;
+  for (unsigned seed = 1; seed <= seeds; ++seed) {
+    SpringRobot robot;
+    robot.generator.seed(seed);
+    robot.relaxation = 0;
+    Push push = killed_after(3 + seed % 4, robot);
+    const std::size_t cut = push.steps.size();
+    SpringRobot later;
+    later.generator.seed(1000 + seed);
+    later.relaxation = 0;
+    later.clock_s = robot.clock_s + 600;
+    later.bias_n += Vec3(0.5, -0.3, 1.0);
+    PushOptions o = options();
+    o.start_distance_m += 1e-5 * seed;
+    const Result rest = run(later, o, {}, &push);
+    ASSERT_EQ(rest.report.stop, StopReason::force_limit) << rest.report.message;
+    EXPECT_LT((rest.report.tare_n - later.bias_n).norm(), 0.02);
+    double lowest_m = 1, highest_m = -1, sum[2] = {0, 0}, variance[2] = {0, 0}, count[2] = {0, 0};
+    for (const Step& step : rest.push.steps) push.steps.push_back(step);
+    for (std::size_t i = 0; i < push.steps.size(); ++i) {
+      const Step& step = push.steps[i];
+      if (step.loads.empty()) continue;
+      const double depth_m = 0.1 - step.T_base_tip->translation().z();
+      const double zero_m = std::get<ToolTravel>(step.observations.front()).travel_m - depth_m;
+      lowest_m = std::min(lowest_m, zero_m);
+      highest_m = std::max(highest_m, zero_m);
+      const int part = i >= cut;
+      sum[part] += force(step) - 400 * depth_m;
+      variance[part] += std::pow(step.loads[0].force_std_n, 2);
+      ++count[part];
+    }
+    EXPECT_LT(highest_m - lowest_m, 1e-12) << "one zero of the travel";
+    EXPECT_EQ(rest.push.travel_offset_std_m, push.travel_offset_std_m);
+    ASSERT_GT(count[0] * count[1], 0);
+    const double difference_n = sum[1] / count[1] - sum[0] / count[0];
+    between += std::pow(difference_n, 2) / (variance[0] / std::pow(count[0], 2) + variance[1] / std::pow(count[1], 2));
+  }
+  // Not more than what is stated; somewhat less, for a push that goes on does not know how many steps will follow.
+  EXPECT_LT(std::sqrt(between / seeds), 1.2);
+  EXPECT_GT(std::sqrt(between / seeds), 0.5);
+}
+
+TEST(PushProtocol, WhatMovedInThePauseIsNotPushedAsIfItHadNot) {
+  SpringRobot robot;
+  const Push so_far = killed_after(3, robot);
+  SpringRobot later;
+  later.clock_s = robot.clock_s + 600;
+  later.surface_m -= 0.004;
+  const Result rest = run(later, options(), {}, &so_far);
+  EXPECT_EQ(rest.report.stop, StopReason::moved);
+  EXPECT_THAT(rest.report.message, testing::HasSubstr("mm deeper than in the part that is recorded"));
+  ASSERT_EQ(rest.push.steps.size(), 1u);
+  EXPECT_TRUE(rest.push.steps[0].loads.empty());
+  EXPECT_LT(later.depth(), 0);
 }
 
 TEST(PushProtocol, BadOptionsAndPlansAreRefused) {

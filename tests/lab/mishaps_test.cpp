@@ -126,8 +126,8 @@ TEST(Mishaps, AForceThatCreepsIsReported) {
   LabRobot robot(options, small_ball());
   acquisition::PushOptions protocol;
   protocol.travel_limit_m = 0.008;
-  protocol.force_step_n = 1;
-  protocol.increment_m = 0.004;  // about 1.2 N, of which 1 N fades at first by 0.1 N a second
+  protocol.force_step_n = 4;
+  protocol.increment_m = 0.004;  // about 1.2 N, of which 1 N fades at first by 0.1 N a second; less than a step, so not shortened
   protocol.settling_timeout_s = 4;
   protocol.unloading_steps = 0;
   EXPECT_FALSE(acquisition::run_push(robot, robot.plan(0), protocol, {}).unsettled.empty());

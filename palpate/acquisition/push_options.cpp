@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <string>
+
+#include "palpate/acquisition/push_protocol.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::acquisition {
+
+double travel_offset_std_m(const PushOptions& o, double travel_sigma_m) { return std::hypot(0.5 * o.increment_m, travel_sigma_m); }
+
+void check(const PushOptions& o) {
+  const auto need = [](bool good, const char* field, const char* rule) {
+    if (!good) throw Error(rule, std::string("PushOptions.") + field);
+  };
+  need(o.force_limit_n > 0, "force_limit_n", "must be positive");
+  need(o.travel_limit_m > 0, "travel_limit_m", "must be positive");
+  need(o.force_step_n > 0, "force_step_n", "must be positive");
+  need(o.unloading_steps >= 0, "unloading_steps", "must not be negative");
+  need(o.start_distance_m > 0, "start_distance_m", "must be positive");
+  need(o.search_distance_m >= 0, "search_distance_m", "must not be negative");
+  need(o.increment_m > 0 && o.increment_m <= 0.01, "increment_m", "must be positive and at most 10 mm");
+  need(o.approach_speed_m_s > 0, "approach_speed_m_s", "must be positive");
+  need(o.push_speed_m_s > 0, "push_speed_m_s", "must be positive");
+  need(o.sample_period_s > 0, "sample_period_s", "must be positive");
+  need(o.free_air_samples >= 2, "free_air_samples", "must be at least 2");
+  need(o.settling_timeout_s > o.settling.window_s, "settling_timeout_s", "must be longer than settling.window_s");
+  need(o.contact_std_m >= 0, "contact_std_m", "must not be negative");
+  need(o.changed_share >= 0, "changed_share", "must not be negative");
+  sensing::check(o.contact);
+  sensing::check(o.settling);
+  sensing::check(o.slip);
+}
+
+const char* to_words(StopReason reason) {
+  switch (reason) {
+    case StopReason::force_limit:
+      return "force limit";
+    case StopReason::travel_limit:
+      return "travel limit";
+    case StopReason::slip:
+      return "slip";
+    case StopReason::contact_lost:
+      return "contact lost";
+    case StopReason::no_contact:
+      return "no contact";
+    case StopReason::robot_limit:
+      return "limit of the robot";
+    case StopReason::moved:
+      return "moved since the part that is recorded";
+    case StopReason::user:
+      break;
+  }
+  return "stopped by the user";
+}
+
+}  // namespace palpate::acquisition
