@@ -2,6 +2,7 @@
 #include <array>
 #include <memory>
 
+#include "cli/number_checks.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/version.hpp"
 
@@ -23,6 +24,7 @@ void build_command_line(CLI::App& app, Session& session, Run& chosen) {
   app.set_help_flag("-h,--help", "print this help and exit");
   app.add_option("--seed", session.seed, "seed of everything random; the same seed gives the same answer")
       ->type_name("N")
+      ->check(whole_number().description(""))
       ->capture_default_str();
   app.add_option("--threads", session.threads, "threads to use; 0 takes all that the machine has")
       ->capture_default_str()

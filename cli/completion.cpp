@@ -118,7 +118,7 @@ Run verbs::completion(CLI::App& app) {
     if (session.json) {
       session.result({{"shell", *shell}, {"script", script}});
     } else {
-      fmt::print("{}", script);
+      session.print(script);
     }
     return exit_done;
   };

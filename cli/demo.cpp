@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/demo_mark.hpp"
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -57,15 +58,18 @@ int demonstrate(Session& session, fs::path out) {
   if (out.string().starts_with('-')) out = "." / out;  // the verbs below would take it for an option
   const fs::path recording = out / "recording", truth = out / "truth.json";
   must_take_files(out);
-  // A demonstration that was made here before is replaced; anything else of that name is not ours to remove.
-  if (fs::exists(truth)) fs::remove_all(recording);
+  must_take_demo(out);
   fs::create_directories(out);
+  fs::remove_all(recording);  // an earlier demonstration's, file by file
+  fs::remove(truth);
+  mark_demo(out);
   Session quiet_json;  // the demonstration answers with one object: that of the estimate
   quiet_json.seed = session.seed;
   quiet_json.threads = session.threads;
   quiet_json.quiet = session.quiet;
   int code = run_verb(verbs::record, "record", {"--demo", "-o", recording.string(), "--truth", truth.string()}, quiet_json);
   if (code != exit_done) return code;
+  mark_demo(out);
   code = run_verb(verbs::estimate, "estimate", {recording.string(), "-o", out.string()}, session);
   if (!fs::exists(out / "result.json")) return code;
   compare_with_truth(session, read_json(truth), read_json(out / "result.json"));
@@ -77,7 +81,7 @@ int demonstrate(Session& session, fs::path out) {
 
 Run verbs::demo(CLI::App& app) {
   auto out = std::make_shared<std::string>("palpate-demo");
-  app.add_option("-o,--out", *out, "folder for the recording, the result, the report and the figures")
+  app.add_option("-o,--out", *out, "folder for the recording, the result, the report and the figures: new, empty, or of an earlier demo")
       ->capture_default_str();
   return [out](Session& session) { return demonstrate(session, *out); };
 }

@@ -7,12 +7,18 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "cli/live_report.hpp"
+#include "cli/material_names.hpp"
+#include "cli/new_folder.hpp"
 #include "cli/number_checks.hpp"
 #include "cli/paths.hpp"
+#include "cli/push_options.hpp"
 #include "cli/push_robot.hpp"
 #include "cli/push_words.hpp"
+#include "cli/truth_file.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/recording.hpp"
@@ -30,7 +36,6 @@ struct Options {
   ExploreOptions explore;
   fs::path out;
   std::string goal = "both", law, refine;
-  double travel_limit_m = 0;
   bool compare = false;
   LiveOptions live;
 };
@@ -45,7 +50,8 @@ nlohmann::json moduli_json(const std::vector<Parameter>& young) {
 std::string moduli_words(const std::vector<Parameter>& young) {
   std::string words;
   for (const Parameter& one : young)
-    words += fmt::format("{}{}{}{}", words.empty() ? "" : ", ", one.region, one.region.empty() ? "" : " ", report::quantity(one.value, "Pa"));
+    words += fmt::format("{}{}{}{}", words.empty() ? "" : ", ", one.region, one.region.empty() ? "" : " ",
+                         report::quantity(one.value, "Pa"));
   return words;
 }
 
@@ -72,13 +78,20 @@ std::string plans_of(const ExploredPush& push) {
   return fmt::format("; planned with {} more", push.pushes_planned - 1);
 }
 
-/// One whole loop; in the lab, on an object of its own. `writer` and `truth` only where it is recorded, `live` where it may be watched.
-Explored run_loop(Session& session, const Options& given, PushRobot& robot, PushOrder order, io::RecordingWriter* writer,
-                  nlohmann::json* truth, LiveReport* live) {
-  if (truth != nullptr) *truth = robot.truth().value_or(nlohmann::json());
+/// What a loop leaves on the disk; a loop that recorded nothing leaves nothing, so that it can be run again.
+struct Kept {
+  Kept(const fs::path& out, const Recording& scene, std::optional<nlohmann::json> known)
+      : folder(out), recording(out / "recording", scene), truth(out / "truth.json", std::move(known)) {}
+  NewFolder folder;
+  io::RecordingWriter recording;
+  TruthFile truth;
+};
+
+/// One whole loop; in the lab, on an object of its own. `kept` only where it is recorded, `live` where it may be watched.
+Explored run_loop(Session& session, const Options& given, PushRobot& robot, PushOrder order, Kept* kept, LiveReport* live) {
   ExploreOptions options = given.explore;
   options.order = order;
-  options.push.travel_limit_m = given.travel_limit_m > 0 ? given.travel_limit_m : robot.travel_limit_m();
+  if (!(options.push.travel_limit_m > 0)) options.push.travel_limit_m = robot.travel_limit_m();
   options.suggest.candidates.reachable = [&](const Vec3& contact_m, const Vec3& direction) {
     return robot.reaches(contact_m, direction, options.push.start_distance_m);
   };
@@ -90,18 +103,19 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
   std::string pushing;
   hooks.on_push_begin = [&](const Push& push) {
     pushing = push.name;
-    if (writer != nullptr) writer->begin_push(push);
+    if (kept != nullptr) kept->recording.begin_push(push);
   };
   hooks.on_step = [&](const Push& push, const Step& step) {
-    if (writer == nullptr) return;
-    writer->add_step(step);
-    if (truth != nullptr && truth->is_object()) (*truth)["steps"].push_back(robot.truth_of(push, step));
+    if (kept == nullptr) return;
+    kept->truth.add(robot.truth_of(push, step));
+    kept->recording.add_step(step);
+    kept->folder.keep();
     session.say(fmt::format("{}, {:.1f} s: {:.2f} N{}", push.name, step.time_s,
                             step.loads.empty() ? 0.0 : step.loads[0].force_n->norm(), step.unloading ? ", going back" : ""));
   };
   hooks.on_push_end = [&](const acquisition::PushReport& report) {
-    if (writer == nullptr) return;
-    if (report.drift) writer->end_push(*report.drift);
+    if (kept == nullptr) return;
+    if (report.drift) kept->recording.end_push(*report.drift);
     for (const std::string& warning : push_warnings(pushing, report)) session.warn(warning);
     if (report.stop == acquisition::StopReason::slip) session.warn(fmt::format("{}: {}", pushing, report.message));
   };
@@ -136,18 +150,24 @@ int run(const Options& given, Session& session) {
   must_take_files(given.out);
   std::error_code code;
   if (fs::exists(given.out, code) && !fs::is_empty(given.out, code))
-    throw Error("is there already; choose another folder or remove it", given.out.string());
-  check(given.explore);
+    throw Error("is there already, and explore begins anew; choose another folder or remove it (`palpate estimate` takes the "
+                "recording in it)",
+                given.out.string());
+  check_push_options(given.explore.push);
+  ExploreOptions with_limit = given.explore;
+  with_limit.push.travel_limit_m = acquisition::PushOptions{}.travel_limit_m;  // the object's, which is not known yet
+  check(with_limit);
+  if (!given.law.empty())
+    if (const auto wrong = wrong_material(given.law)) throw Error(*wrong, "--law");
   if (given.compare && !given.robot.driver.empty())
     throw Error("compares orders on fresh objects of the lab, and a driver's world has one only; leave it out", "--compare");
   LiveReport live(given.live, session, given.out.filename().string());
-  nlohmann::json truth;
   const auto robot = push_robot(given.robot, session.seed);
   Recording scene = robot->scene();
   if (!given.law.empty()) scene.model.material = given.law;
-  io::RecordingWriter writer(given.out / "recording", scene);
-  Explored found = run_loop(session, given, *robot, PushOrder::next_best, &writer, &truth, &live);
-  if (truth.is_object()) write_json(truth, given.out / "truth.json");
+  if (const auto wrong = wrong_material(scene.model.material)) throw Error(*wrong, given.robot.scene.string() + ": model.material");
+  Kept kept(given.out, scene, robot->truth());
+  Explored found = run_loop(session, given, *robot, PushOrder::next_best, &kept, &live);
   if (found.pushes.empty()) {
     session.warn(found.message);
     session.result({{"format", "palpate-exploration/1"}, {"reached", false}, {"message", found.message}});
@@ -175,7 +195,7 @@ int run(const Options& given, Session& session) {
          {std::pair{PushOrder::random, "random order"}, {PushOrder::best_repeated, "best place repeated"}}) {
       session.say(fmt::format("the same lab, {}:", name));
       const auto another = push_robot(given.robot, session.seed);  // its noise starts anew
-      const Explored other = run_loop(session, given, *another, order, nullptr, nullptr, nullptr);
+      const Explored other = run_loop(session, given, *another, order, nullptr, nullptr);
       if (Session::interrupted()) break;
       session.say(fmt::format("{}: {}; next best push: {}", name, needed(other), needed(found)));
       nlohmann::json one = {{"order", name}, {"reached", other.reached}, {"pushes", nlohmann::json::array()}};
@@ -196,7 +216,6 @@ Run verbs::explore(CLI::App& app) {
   app.add_option("-o,--out", given->out,
                  "folder for recording/, result.json, model/, report.html, exploration.json and truth.json")
       ->required();
-  add_robot_options(app, given->robot);
   app.add_option("--young-modulus-within", options.young_modulus_within, "goal: half of the 95 % interval over E, of every region")
       ->check(positive_number())
       ->capture_default_str();
@@ -215,17 +234,15 @@ Run verbs::explore(CLI::App& app) {
   app.add_option("--tilts", options.suggest.candidates.tilts, "slanted directions at each place, besides the straight one")
       ->check(CLI::Range(0, 12))
       ->capture_default_str();
-  app.add_option("--force-limit", options.push.force_limit_n, "of the robot, N")
-      ->check(positive_number())
-      ->capture_default_str();
-  app.add_option("--travel-limit", given->travel_limit_m, "of the robot, m (default: of the object)")
-      ->check(positive_number());
   app.add_option("--guess", options.suggest.young_modulus_pa, "of Young's modulus before the first touch, Pa")
       ->check(positive_number())
       ->capture_default_str();
   app.add_option("--law", given->law, "material law of the estimate (default: that of the scene)");
   app.add_option("--refine", given->refine, "none or auto: finer under the tool")->check(CLI::IsMember({"none", "auto"}));
   given->live.add_to(app);
+  add_push_limits(app, options.push);
+  add_robot_options(app, given->robot);
+  add_push_thresholds(app, options.push);
   return [given](Session& session) {
     Options chosen = *given;
     chosen.explore.suggest.goal = estimation::push_goal(given->goal);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -26,7 +26,7 @@ constexpr const char* three_things_to_try =
     "  palpate info RECORDING                 what is in a recording, and what is wrong with it\n"
     "  palpate estimate RECORDING -o out      Young's modulus and Poisson ratio with 95 % intervals\n"
     "\n"
-    "`palpate --help` lists everything.\n";
+    "`palpate --help` lists everything.";
 
 std::vector<std::string> verb_names() {
   std::vector<std::string> names;
@@ -81,15 +81,24 @@ std::string unknown_option(CLI::App& app, const std::vector<std::string>& argume
   return {};
 }
 
+/// What the help says of the option that a sentence of the parser begins with: "3 required X Y Z missing" alone helps nobody.
+std::string meaning(CLI::App& app, const std::vector<std::string>& arguments, const std::string& problem) {
+  const std::string* word = first_word(arguments);
+  if (word == nullptr) return {};
+  for (const CLI::Option* option : app.get_subcommand(*word)->get_options())
+    if (problem.starts_with(option->get_name() + ":")) return fmt::format(" ({}: {})", option->get_name(), option->get_description());
+  return {};
+}
+
 int fail(Session& session, ExitCode code, const std::string& kind, const std::string& what, const std::string& where = {}) {
   session.result({{"error", {{"kind", kind}, {"message", what}, {"where", where}}}, {"exit_code", static_cast<int>(code)}});
-  fmt::print(stderr, "palpate: {}{}{}\n", where, where.empty() ? "" : ": ", what);
+  session.announce(fmt::format("palpate: {}{}{}", where, where.empty() ? "" : ": ", what));
   return code;
 }
 
 int parse_and_run(const std::vector<std::string>& arguments, Session& session) {
   if (arguments.empty()) {
-    fmt::print(stderr, "{}", three_things_to_try);
+    session.announce(three_things_to_try);
     return exit_done;
   }
   // Wrong usage must answer a program in JSON too, also when parsing stops before it reaches the option.
@@ -111,9 +120,11 @@ int parse_and_run(const std::vector<std::string>& arguments, Session& session) {
     return app.exit(success);
   } catch (const CLI::ParseError& problem) {
     const std::string mistyped = unknown_option(app, arguments);
+    const bool incomplete = dynamic_cast<const CLI::ArgumentMismatch*>(&problem) != nullptr;
+    const std::string missing = incomplete ? meaning(app, arguments, problem.what()) : "";
     const std::string help = word != nullptr ? "palpate " + *word + " --help" : "palpate --help";
     return fail(session, exit_usage, "usage",
-                fmt::format("{} (`{}`)", mistyped.empty() ? problem.what() : mistyped.c_str(), help));
+                fmt::format("{} (`{}`)", mistyped.empty() ? problem.what() + missing : mistyped, help));
   }
   if (!chosen) {
     return fail(session, exit_usage, "usage", "which verb? `palpate --help` lists them.");
@@ -127,6 +138,7 @@ int parse_and_run(const std::vector<std::string>& arguments, Session& session) {
 int main(int argc, char** argv) {
   using namespace palpate::cli;
   palpate::keep_heap_in_large_pages();
+  hold_standard_streams();
   Session session;
   stop_on_interrupt();
   try {

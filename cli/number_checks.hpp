@@ -3,8 +3,11 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <string>
+#include <system_error>
 
 namespace palpate::cli {
 
@@ -49,6 +52,29 @@ inline CLI::Validator finite_number() {
         return CLI::detail::lexical_cast(text, value) && std::isfinite(value) ? std::string() : "must be a finite number, is " + text;
       },
       "NUMBER");
+}
+
+/// From 0 to the largest that 64 bits hold: "-1" is not taken for that one.
+inline CLI::Validator whole_number() {
+  return CLI::Validator(
+      [](std::string& text) {
+        std::uint64_t value = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool fine = error == std::errc() && end == text.data() + text.size();
+        return fine ? std::string() : "must be a whole number from 0 to 18446744073709551615, is " + text;
+      },
+      "NUMBER");
+}
+
+/// One of three. @param which  e.g. "a place in metres, base frame"
+inline CLI::Validator coordinate(const std::string& which) {
+  return CLI::Validator(
+      [which](std::string& text) {
+        double value = 0;
+        const bool fine = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
+        return fine ? std::string() : "needs three numbers, X Y Z: " + which + "; `" + text + "` is none";
+      },
+      "");
 }
 
 }  // namespace palpate::cli

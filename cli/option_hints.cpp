@@ -17,6 +17,9 @@ constexpr Hint hints[] = {
     {"ObjectOptions.stands", "--stands rough"},
     {": extent_m", "--object-size"},
     {"result: regions", "--regions none"},
+    {"PushOptions.increment_m", "--increment"},
+    {"PushOptions.settling_timeout_s", "--settling-timeout"},
+    {"SlipOptions.force_drop", "--slip-force-drop"},
     {"export: density_kg_m3", "--density"},
 };
 

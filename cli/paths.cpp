@@ -72,4 +72,10 @@ void must_take_files(const fs::path& folder) {
     if (!fs::remove(made, code)) break;
 }
 
+void must_take_file(const fs::path& file) {
+  std::error_code code;
+  if (!file.has_filename() || fs::is_directory(file, code)) throw Error("is a folder; give the name of a file", file.string());
+  must_take_files(file.has_parent_path() ? file.parent_path() : fs::path("."));
+}
+
 }  // namespace palpate::cli

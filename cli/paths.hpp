@@ -18,4 +18,8 @@ void must_be_result(const std::filesystem::path& path);
 /// @throws Error when it, or what it would have to be made in, is no folder or cannot be written
 void must_take_files(const std::filesystem::path& folder);
 
+/// A file that is there is replaced, folders on the way to it are made.
+/// @throws Error when it is a folder, or its folder cannot be written
+void must_take_file(const std::filesystem::path& file);
+
 }  // namespace palpate::cli

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "cli/driver_library.hpp"
+#include "cli/number_checks.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
@@ -14,6 +15,8 @@
 
 namespace palpate::cli {
 namespace {
+
+constexpr const char* own_robot = "A robot of your own";
 
 class FromLab : public PushRobot {
  public:
@@ -116,23 +119,36 @@ void add_robot_options(CLI::App& app, RobotArguments& arguments) {
   add_lab_options(app, arguments.lab);
   const auto of_the_lab = app.get_options();
   CLI::Option* const driver = app.add_option("--driver", arguments.driver,
-                 "a robot of your own in place of the lab's: a shared library as palpate/acquisition/driver.h says");
-  for (CLI::Option* option : of_the_lab)
-    if (std::find(before.begin(), before.end(), option) == before.end()) driver->excludes(option);
-  app.add_option("--driver-settings", arguments.settings, "handed to the driver as it is: an address, a file, ...")->needs("--driver");
+                                           "in place of the lab's: a shared library as palpate/acquisition/driver.h says")
+                                    ->group(own_robot);
+  for (CLI::Option* option : of_the_lab) {
+    if (std::find(before.begin(), before.end(), option) != before.end()) continue;
+    driver->excludes(option);
+    option->group("The lab: what its robot pushes, with what, and what goes wrong");
+  }
+  app.add_option("--driver-settings", arguments.settings, "handed to the driver as it is: an address, a file, ...")
+      ->needs("--driver")
+      ->group(own_robot);
   app.add_option("--scene", arguments.scene, "with --driver: a recording without pushes: object, supports, tools, table, robot")
-      ->needs("--driver");
-  app.add_option("--tool", arguments.tool, "with --driver: of the scene (default: its first)")->needs("--driver");
+      ->needs("--driver")
+      ->group(own_robot);
+  app.add_option("--tool", arguments.tool, "with --driver: of the scene (default: its first)")->needs("--driver")->group(own_robot);
 }
 
 void add_contact_options(CLI::App& app, RobotArguments& arguments) {
-  app.add_option("--contact", arguments.contacts, "with --driver: where to push, X Y Z in metres, base frame; again for every push")
+  app.add_option("--contact", arguments.contacts, "with --driver: where to push, in metres, base frame; again for every push")
       ->needs("--driver")
-      ->type_name("");
+      ->type_name("X Y Z")
+      ->allow_extra_args(false)
+      ->check(coordinate("where to push, in metres, base frame"))
+      ->group(own_robot);
   app.add_option("--direction", arguments.directions,
-                 "of these pushes, into the object: one for all, or one each (default: across the surface)")
+                 "of these pushes, in the base frame, into the object: one for all, or one each (default: across the surface)")
       ->needs("--driver")
-      ->type_name("");
+      ->type_name("X Y Z")
+      ->allow_extra_args(false)
+      ->check(coordinate("along which to push, into the object, base frame"))
+      ->group(own_robot);
 }
 
 std::unique_ptr<PushRobot> push_robot(const RobotArguments& arguments, std::uint64_t seed) {

@@ -35,6 +35,15 @@ std::string push_words(const estimation::RatedPush& push, const PushScene& scene
   return words;
 }
 
+std::string stop_words(const acquisition::PushPlan& plan, const acquisition::PushReport& report, double start_distance_m) {
+  if (report.stop != acquisition::StopReason::robot_limit) return report.message;
+  const Vec3 at = plan.contact_m + Vec3::Zero(), along = plan.direction + Vec3::Zero();  // "+0.00", never "-0.00"
+  return fmt::format("the robot refused to move {}: a limit, or out of reach. The push was to be at ({:.4f} {:.4f} {:.4f}) along "
+                     "({:+.2f} {:+.2f} {:+.2f}), from {:.0f} mm before it; try another contact or direction, a shorter "
+                     "--start-distance, or put the object elsewhere",
+                     report.steps == 0 ? "there" : "on", at.x(), at.y(), at.z(), along.x(), along.y(), along.z(), 1000 * start_distance_m);
+}
+
 std::vector<std::string> push_warnings(const std::string& name, const acquisition::PushReport& report) {
   std::vector<std::string> out;
   if (report.drift && report.steps > 0 && report.drift_n > 0.05 * report.highest_force_n)

@@ -19,6 +19,9 @@ std::string plain_95(double std);
 /// "push at (0.6000 0.0100 0.1500) along (+0.00 +0.00 -1.00) up to 8.20 N (about 9.10 mm), seen by camera 2"
 std::string push_words(const estimation::RatedPush& push, const PushScene& scene);
 
+/// Why a push ended. Where the robot would not move, which push that was and what to try.
+std::string stop_words(const acquisition::PushPlan& plan, const acquisition::PushReport& report, double start_distance_m);
+
 /// What went wrong with a push that was made: its force drifted or crept, the object did not come back.
 std::vector<std::string> push_warnings(const std::string& name, const acquisition::PushReport& report);
 

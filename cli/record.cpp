@@ -5,17 +5,21 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
 
 #include "cli/logged_robot.hpp"
-#include "cli/number_checks.hpp"
+#include "cli/new_folder.hpp"
 #include "cli/paths.hpp"
+#include "cli/push_options.hpp"
 #include "cli/push_robot.hpp"
 #include "cli/push_words.hpp"
+#include "cli/resumed_recording.hpp"
+#include "cli/truth_file.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
@@ -51,6 +55,36 @@ nlohmann::json demo_truth_json(const lab::DemoTruth& truth) {
   return json;
 }
 
+struct Made {
+  nlohmann::json told = nlohmann::json::array();
+  int steps = 0;
+  bool fine = true;
+};
+
+nlohmann::json json_of(const acquisition::PushPlan& plan, const acquisition::PushReport& report) {
+  return {{"push", plan.name},
+          {"site", plan.site},
+          {"stop", acquisition::to_words(report.stop)},
+          {"message", report.message},
+          {"steps", report.steps},
+          {"highest_force_n", report.highest_force_n},
+          {"deepest_m", report.deepest_m},
+          {"unsettled", report.unsettled},
+          {"came_back", report.compared ? nlohmann::json(report.came_back) : nlohmann::json()}};
+}
+
+/// The force or the object ended it, not the robot or the user.
+bool ended_well(acquisition::StopReason stop) {
+  using enum acquisition::StopReason;
+  return stop == force_limit || stop == travel_limit || stop == slip || stop == contact_lost;
+}
+
+const Push* push_named(const std::vector<Push>& pushes, const std::string& name) {
+  for (const Push& push : pushes)
+    if (push.name == name) return &push;
+  return nullptr;
+}
+
 // Runs the protocol at every site; every finished step is on the disk before the next one begins.
 int record_pushes(Session& session, const RecordArguments& arguments) {
   std::filesystem::path folder = arguments.output;
@@ -58,55 +92,51 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   const bool exists = std::filesystem::exists(folder) && !std::filesystem::is_empty(folder);
   if (exists && !arguments.resume)
     throw Error("is there already; say --resume to go on, or choose another folder", folder.string());
+  check_push_options(arguments.push);
+  const std::filesystem::path truth_file =
+      std::filesystem::path(arguments.truth.empty() ? folder.string() + ".truth.json" : arguments.truth);
+  if (!arguments.truth.empty() || arguments.robot.driver.empty()) must_take_file(truth_file);
   const auto robot = push_robot(arguments.robot, session.seed);
   if (robot->sites() == 0) throw Error("say where to push: --contact X Y Z, in metres, base frame", "--driver");
   acquisition::PushOptions protocol = arguments.push;
   if (!(protocol.travel_limit_m > 0)) protocol.travel_limit_m = robot->travel_limit_m();
+  TruthFile truth(truth_file, robot->truth());
+  if (!truth.is_known() && !arguments.truth.empty()) throw Error("nobody knows the truth of a driver's world; leave it out", "--truth");
   Recording recording = robot->scene();
-  if (arguments.views > 0) {
+  std::vector<acquisition::PushPlan> plans;
+  for (std::size_t site = 0; site < robot->sites(); ++site) plans.push_back(robot->plan(site));
+  double not_before_s = 0;
+  if (exists) {
+    const Recording now = std::exchange(recording, io::read_recording_unchecked(folder));
+    must_be_same_scene(recording, now, arguments.views > 0 && arguments.views == int(recording.rest.views.size()), folder);
+    for (const acquisition::PushPlan& plan : plans)
+      if (const Push* recorded = push_named(recording.pushes, plan.name)) must_be_same_push(*recorded, plan, protocol, folder);
+    truth.go_on(recording.pushes);
+    if (!recording.pushes.empty() && !recording.pushes.back().steps.empty())
+      not_before_s = recording.pushes.back().steps.back().time_s + 1;
+  } else if (arguments.views > 0) {
     recording.rest.views = robot->look_around(arguments.views);
     recording.rest.surface.reset();
   }
-  std::optional<nlohmann::json> truth = robot->truth();
-  if (!truth && !arguments.truth.empty()) throw Error("nobody knows the truth of a driver's world; leave it out", "--truth");
-  const std::filesystem::path truth_file =
-      std::filesystem::path(arguments.truth.empty() ? folder.string() + ".truth.json" : arguments.truth);
-  double not_before_s = 0;
-  if (exists) {
-    recording = io::read_recording_unchecked(folder);
-    if (truth) {
-      std::ifstream file(truth_file);
-      const nlohmann::json before = nlohmann::json::parse(file, nullptr, false);
-      if (before.is_object() && before.contains("steps")) (*truth)["steps"] = before["steps"];
-    }
-    if (!recording.pushes.empty() && !recording.pushes.back().steps.empty())
-      not_before_s = recording.pushes.back().steps.back().time_s + 1;
-  }
   const std::vector<Push> recorded = recording.pushes;
+  NewFolder made_here(folder);
   io::RecordingWriter writer(folder, recording);
   LoggedRobot logged(robot->robot(), recording.joint_names, not_before_s);
-  nlohmann::json told = nlohmann::json::array();
-  int steps = 0;
-  bool fine = true;
-  for (std::size_t site = 0; site < robot->sites() && !Session::interrupted(); ++site) {
-    const acquisition::PushPlan plan = robot->plan(site);
+  Made made;
+  for (std::size_t site = 0; site < plans.size() && !Session::interrupted(); ++site) {
+    const acquisition::PushPlan plan = robot->plan(site);  // the robot then presses there
     if (!(arguments.push.force_step_n > 0)) protocol.force_step_n = robot->force_step_n(site);
-    const Push* so_far = nullptr;
-    bool finished = false;
-    for (std::size_t p = 0; p < recorded.size(); ++p)
-      if (recorded[p].name == plan.name) {
-        so_far = &recorded[p];
-        finished = p + 1 < recorded.size();  // a later one was begun
-      }
-    if (finished) continue;
+    const Push* const so_far = push_named(recorded, plan.name);
+    if (so_far != nullptr && so_far != &recorded.back()) continue;  // a later one was begun
     bool begun = so_far != nullptr;
     const acquisition::PushReport report = acquisition::run_push(
         logged, plan, protocol,
         [&](const Push& push, const Step& step) {
+          truth.add(robot->truth_of(push, step));
           if (!begun) writer.begin_push(push);
           begun = true;
           writer.add_step(step);
-          if (truth) (*truth)["steps"].push_back(robot->truth_of(push, step));
+          made_here.keep();
           const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
           session.say(fmt::format("{} ({}), {:.1f} s: {:.2f} N{}", push.name, plan.site, step.time_s, force,
                                   step.unloading ? ", going back" : ""));
@@ -114,24 +144,20 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
         [] { return !Session::interrupted(); }, so_far);
     if (report.drift && report.steps > 0) writer.end_push(*report.drift);
     for (const std::string& warning : push_warnings(plan.name, report)) session.warn(warning);
-    session.say(fmt::format("{} stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps", plan.name, acquisition::to_words(report.stop),
-                            report.message, report.highest_force_n, 1000 * report.deepest_m, report.steps));
-    told.push_back({{"push", plan.name},
-                    {"site", plan.site},
-                    {"stop", acquisition::to_words(report.stop)},
-                    {"message", report.message},
-                    {"steps", report.steps},
-                    {"highest_force_n", report.highest_force_n},
-                    {"deepest_m", report.deepest_m},
-                    {"unsettled", report.unsettled},
-                    {"came_back", report.compared ? nlohmann::json(report.came_back) : nlohmann::json()}});
-    steps += report.steps;
-    fine = fine && (report.stop == acquisition::StopReason::force_limit || report.stop == acquisition::StopReason::travel_limit ||
-                    report.stop == acquisition::StopReason::slip || report.stop == acquisition::StopReason::contact_lost);
+    const std::string why = stop_words(plan, report, protocol.start_distance_m);
+    if (report.steps == 0 && so_far == nullptr && report.stop != acquisition::StopReason::user)
+      session.warn(fmt::format("{}: nothing was recorded: {}", plan.name, why));
+    else
+      session.say(fmt::format("{} stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps", plan.name, acquisition::to_words(report.stop), why,
+                              report.highest_force_n, 1000 * report.deepest_m, report.steps));
+    made.told.push_back(json_of(plan, report));
+    made.steps += report.steps;
+    made.fine = made.fine && ended_well(report.stop);
   }
-  if (truth) write_json(*truth, truth_file);
-  session.say(fmt::format("{}: {} steps{}. Next: palpate estimate {} -o RESULT", arguments.output, steps,
-                          truth ? "; the truth is in " + truth_file.string() : "", arguments.output));
+  const bool nothing = made.steps == 0 && recorded.empty();
+  session.say(nothing ? fmt::format("{}: nothing was recorded", arguments.output)
+                      : fmt::format("{}: {} steps{}. Next: palpate estimate {} -o RESULT", arguments.output, made.steps,
+                                    truth.is_known() ? "; the truth is in " + truth_file.string() : "", arguments.output));
   if (!arguments.raw_bag.empty()) {
     Recording scene = robot->scene();
     if (logged.is_masked()) {  // the masks are in the bag
@@ -141,16 +167,20 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
     logged.write_bag(scene, arguments.raw_bag);
     session.say(fmt::format("{}: all that the sensors said, as a robot's recorder keeps it", arguments.raw_bag));
   }
-  nlohmann::json json = {
-      {"recording", arguments.output}, {"object", recording.name}, {"steps", steps}, {"pushes", told}, {"seed", session.seed}};
-  if (truth) json["truth"] = truth_file.string();
+  nlohmann::json json = {{"recording", arguments.output},
+                         {"object", recording.name},
+                         {"steps", made.steps},
+                         {"pushes", made.told},
+                         {"seed", session.seed}};
+  if (truth.is_known() && !nothing) json["truth"] = truth_file.string();
   session.result(json);
-  return fine && !Session::interrupted() ? exit_done : exit_numbers;
+  return made.fine && !Session::interrupted() ? exit_done : exit_numbers;
 }
 
 int record_demo(Session& session, const RecordArguments& arguments) {
   if (std::filesystem::exists(arguments.output) && !std::filesystem::is_empty(arguments.output))
     throw Error("is there already; choose another folder or remove it", arguments.output);
+  if (!arguments.truth.empty()) must_take_file(arguments.truth);
   lab::DemoOptions options;
   options.seed = session.seed;
   options.threads = session.thread_count();
@@ -158,9 +188,7 @@ int record_demo(Session& session, const RecordArguments& arguments) {
   if (arguments.robot.lab.poisson_ratio >= 0) options.poisson_ratio = arguments.robot.lab.poisson_ratio;
   const lab::Demo demo = lab::make_demo(options, session.progress());
   io::write_recording(demo.recording, arguments.output);
-  if (!arguments.truth.empty()) {
-    write_json(demo_truth_json(demo.truth), arguments.truth);
-  }
+  if (!arguments.truth.empty()) write_json_aside(demo_truth_json(demo.truth), arguments.truth);
   std::size_t steps = 0;
   for (const Push& push : demo.recording.pushes) steps += push.steps.size();
   session.say(fmt::format("{}: {} pushes, {} steps. Next: palpate estimate {} -o RESULT", arguments.output,
@@ -170,15 +198,26 @@ int record_demo(Session& session, const RecordArguments& arguments) {
   return exit_done;
 }
 
+/// Hours of pushing must not end at a closed door.
+void must_take_outputs(const RecordArguments& arguments) {
+  std::error_code code;
+  must_take_files(arguments.output);
+  std::set<std::filesystem::path> folders{std::filesystem::weakly_canonical(std::filesystem::path(arguments.output) / "", code)};
+  for (const auto& [option, bag] : {std::pair{"--bag", arguments.bag}, {"--raw-bag", arguments.raw_bag}}) {
+    if (bag.empty()) continue;
+    must_take_files(bag);
+    if (std::filesystem::exists(bag, code) && !std::filesystem::is_empty(bag, code))
+      throw Error("is there already; choose another folder or remove it", bag);
+    if (!folders.insert(std::filesystem::weakly_canonical(std::filesystem::path(bag) / "", code)).second)
+      throw Error("names a folder that is written already; give it one of its own", option);
+  }
+}
+
 }  // namespace
 
 Run verbs::record(CLI::App& app) {
   auto arguments = std::make_shared<RecordArguments>();
-  // The object says how deep a soft pad can press it and in which steps: less than the paper's 10 cm.
-  arguments->push.travel_limit_m = arguments->push.force_step_n = 0;
-  add_robot_options(app, arguments->robot);
-  add_contact_options(app, arguments->robot);
-  CLI::Option* const demo = app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
+  app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
   app.add_option("-o,--out,--output", arguments->output, "folder to write; must not exist or be empty")->required();
   app.add_option("--views", arguments->views,
                  "look at the untouched object from this many sides and let `estimate` build its shape from that; 0: its shape is given")
@@ -187,28 +226,31 @@ Run verbs::record(CLI::App& app) {
   app.add_option("--truth", arguments->truth,
                  "file for what the simulation knows and the recording does not (default: beside the recording, OUTPUT.truth.json; "
                  "with --demo: not written)");
-  app.add_option("--force-limit", arguments->push.force_limit_n, "stop at this force, N")->check(positive_number());
-  app.add_option("--travel-limit", arguments->push.travel_limit_m, "stop at this travel, m (default: of the object)")->check(positive_number());
-  app.add_option("--force-step", arguments->push.force_step_n, "between recorded steps, N (default: of the object)")->check(positive_number());
   app.add_option("--bag", arguments->bag, "also write a bag (rosbag2: MCAP) with its mapping into this folder");
   app.add_option("--raw-bag", arguments->raw_bag,
                  "also write what the sensors said all the while (MCAP), as a robot's own recorder does");
   app.add_flag("--resume", arguments->resume, "go on with a recording that was cut off");
-  // What the built-in recording cannot do is refused, not passed over.
-  const std::set<std::string> of_the_demo{"--help", "--out", "--truth", "--young-modulus", "--poisson-ratio", "--bag"};
-  for (CLI::Option* option : app.get_options()) {
+  // The object says how deep a soft pad can press it and in which steps: less than the paper's 10 cm.
+  add_push_limits(app, arguments->push);
+  add_force_step_option(app, arguments->push);
+  add_robot_options(app, arguments->robot);
+  add_contact_options(app, arguments->robot);
+  add_push_thresholds(app, arguments->push);
+  // What the built-in recording cannot do is refused, not passed over. (`excludes` would name it all in the help.)
+  const std::set<std::string> of_the_demo{"--help", "--demo", "--out", "--truth", "--young-modulus", "--poisson-ratio", "--bag"};
+  std::vector<const CLI::Option*> not_of_the_demo;
+  for (const CLI::Option* option : app.get_options()) {
     const bool known = std::any_of(of_the_demo.begin(), of_the_demo.end(), [&](const auto& name) { return option->check_name(name); });
-    if (option != demo && !known) demo->excludes(option);
+    if (!known) not_of_the_demo.push_back(option);
   }
-  return [arguments](Session& session) {
-    std::error_code code;
-    must_take_files(arguments->output);
-    for (const std::string& bag : {arguments->bag, arguments->raw_bag}) {
-      if (!bag.empty() && std::filesystem::exists(bag, code) && !std::filesystem::is_empty(bag, code))
-        throw Error("is there already; choose another folder or remove it", bag);
-    }
+  return [arguments, not_of_the_demo](Session& session) {
+    for (const CLI::Option* option : not_of_the_demo)
+      if (arguments->demo && option->count() > 0)
+        throw Error("the built-in recording takes no " + option->get_name() + "; leave one of the two out", "--demo");
+    must_take_outputs(*arguments);
     const int outcome = arguments->demo ? record_demo(session, *arguments) : record_pushes(session, *arguments);
-    if (!arguments->bag.empty()) {
+    std::error_code code;
+    if (!arguments->bag.empty() && std::filesystem::exists(std::filesystem::path(arguments->output) / "recording.yaml", code)) {
       io::write_bag(io::read_recording_unchecked(arguments->output), arguments->bag);
       session.say(fmt::format("{}: the same as a bag of ROS 2", arguments->bag));
     }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/session.hpp"
 
-#include <fmt/core.h>
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -30,6 +31,9 @@ std::size_t terminal_columns() {
   return 80;
 }
 
+/// Whoever reads may be gone (`2>&1 | head -1`): what cannot be said is dropped. A throw would end a push half way.
+void put(FILE* stream, std::string_view text) { std::fwrite(text.data(), 1, text.size(), stream); }
+
 constexpr double redraw_every_s = 0.1;
 constexpr double time_left_after_s = 2.0;  // an extrapolation from less says nothing
 constexpr double time_left_after_share = 0.03;
@@ -40,6 +44,14 @@ void stop_on_interrupt() {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
   std::signal(SIGPIPE, SIG_IGN);  // a reader that closed early is no reason to lose a result on disk
+}
+
+void hold_standard_streams() {
+  for (int descriptor = open("/dev/null", O_RDWR); descriptor >= 0; descriptor = open("/dev/null", O_RDWR))
+    if (descriptor > STDERR_FILENO) {
+      close(descriptor);
+      return;
+    }
 }
 
 void end_at_first_interrupt() {
@@ -98,20 +110,25 @@ void Session::say(std::string_view line) {
   if (quiet) return;
   const std::scoped_lock lock(mutex_);
   clear_line();
-  fmt::print(stderr, "{}\n", line);
+  put(stderr, fmt::format("{}\n", line));
 }
 
 void Session::announce(std::string_view line) {
   const std::scoped_lock lock(mutex_);
   clear_line();
-  fmt::print(stderr, "{}\n", line);
+  put(stderr, fmt::format("{}\n", line));
   std::fflush(stderr);
 }
 
 void Session::warn(std::string_view line) {
   const std::scoped_lock lock(mutex_);
   clear_line();
-  fmt::print(stderr, "warning: {}\n", line);
+  put(stderr, fmt::format("warning: {}\n", line));
+}
+
+void Session::print(std::string_view text) {
+  const std::scoped_lock lock(mutex_);
+  put(stdout, text);
 }
 
 void Session::result(const nlohmann::json& object) {
@@ -119,7 +136,7 @@ void Session::result(const nlohmann::json& object) {
   const std::scoped_lock lock(mutex_);
   clear_line();
   // Names come from files and may be anything: bytes that are not UTF-8 are replaced, not fatal.
-  fmt::print("{}\n", object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  put(stdout, object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   std::fflush(stdout);
 }
 
@@ -136,23 +153,23 @@ bool Session::draw(std::string_view stage, double share) {
   if (stage != stage_) {
     if (on_terminal && !stage_.empty() && line_open_) {
       clear_line();
-      fmt::print(stderr, "  {:<40} {}\n", stage_words(stage_), duration(since(stage_start_)));
+      put(stderr, fmt::format("  {:<40} {}\n", stage_words(stage_), duration(since(stage_start_))));
     }
     stage_ = stage;
     stage_start_ = now;
     last_draw_ = {};
-    if (!on_terminal) fmt::print(stderr, "{} ...\n", stage_words(stage_));
+    if (!on_terminal) put(stderr, fmt::format("{} ...\n", stage_words(stage_)));
   }
   const bool finished = share >= 1.0;
   if (on_terminal && finished) {
     clear_line();
-    fmt::print(stderr, "  {:<40} {}\n", stage_words(stage_), duration(since(stage_start_)));
+    put(stderr, fmt::format("  {:<40} {}\n", stage_words(stage_), duration(since(stage_start_))));
     stage_.clear();
   } else if (on_terminal && since(last_draw_) > redraw_every_s) {
     std::string line = fmt::format("  {:<40} {:3.0f} %", stage_words(stage_), 100 * std::fmax(share, 0.0));
     if (const auto left_s = time_left_s(since(stage_start_), share)) line += fmt::format("  about {} left", duration(*left_s));
     if (line.size() >= terminal_columns()) line.resize(terminal_columns() - 1);
-    fmt::print(stderr, "\r\033[K{}", line);
+    put(stderr, "\r\033[K" + line);
     std::fflush(stderr);
     line_open_ = true;
     last_draw_ = now;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every verb is given: the global options, and the only way to speak. People read stderr, programs read stdout.
+// Where nobody reads any more, what is said is dropped: no message is worth a push.
 #pragma once
 
 #include <chrono>
@@ -37,6 +38,8 @@ class Session {
   void announce(std::string_view line);
   /// A warning in plain words on stderr, also with --quiet.
   void warn(std::string_view line);
+  /// A text that the user asked for (a script), as it is, on stdout.
+  void print(std::string_view text);
   /// The one JSON object of this run on stdout, with --json only. NaN becomes null.
   void result(const nlohmann::json& object);
 
@@ -58,6 +61,8 @@ class Session {
 
 /// Ctrl-C asks the running work to stop at its next progress report; pressed again it ends the program at once.
 void stop_on_interrupt();
+/// A program that was started with a stream closed (`2>&-`) would open its first file in its place and write messages into it.
+void hold_standard_streams();
 /// For verbs that have nothing to save: they end where they are.
 void end_at_first_interrupt();
 

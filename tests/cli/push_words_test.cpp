@@ -31,5 +31,20 @@ TEST(PushWarnings, SayWhatWentWrongAndNothingElse) {
   EXPECT_THAT(push_warnings("top", report), testing::SizeIs(2));
 }
 
+TEST(StopWords, NameThePlaceThatTheRobotDoesNotReachOnce) {
+  acquisition::PushPlan plan;
+  plan.contact_m = Vec3(0.9, 0, 0.1);
+  acquisition::PushReport report;
+  report.message = "the travel reached its limit";
+  report.stop = acquisition::StopReason::travel_limit;
+  EXPECT_EQ(stop_words(plan, report, 0.05), report.message);
+  report.stop = acquisition::StopReason::robot_limit;
+  report.message = "the robot refused to move on: a limit, or out of reach; then the robot refused to move on: a limit, or out of reach";
+  const std::string words = stop_words(plan, report, 0.05);
+  EXPECT_THAT(words, HasSubstr("at (0.9000 0.0000 0.1000) along (+0.00 +0.00 -1.00), from 50 mm before it"));
+  EXPECT_THAT(words, HasSubstr("try another contact or direction"));
+  EXPECT_EQ(words.find("refused"), words.rfind("refused"));
+}
+
 }  // namespace
 }  // namespace palpate::cli

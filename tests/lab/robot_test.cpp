@@ -6,10 +6,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <map>
 #include <numeric>
+#include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/io/file.hpp"
+#include "palpate/io/recording.hpp"
 #include "refusals.hpp"
+#include "temporary_folder.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -105,17 +111,65 @@ TEST(LabRobot, TravelsErrAsTheyState) {
   EXPECT_LT(std::sqrt(zeros / seeds), 1.6);
 }
 
+/// Every file of a folder, by its name.
+std::map<std::string, std::string> bytes_in(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) files[entry.path().lexically_relative(folder).string()] = io::read_file(entry.path());
+  return files;
+}
+
 TEST(LabRobot, SameSeedSameRecording) {
   const Made a = run(quick()), b = run(quick());
   ASSERT_EQ(a.steps.size(), b.steps.size());
+  EXPECT_EQ(a.true_force_n, b.true_force_n);
+  EXPECT_EQ(a.true_travel_m, b.true_travel_m);
+  EXPECT_EQ(a.report.contact_m, b.report.contact_m);
+  EXPECT_EQ(a.report.tare_n, b.report.tare_n);
   for (std::size_t i = 0; i < a.steps.size(); ++i) {
-    EXPECT_EQ(a.steps[i].joints_rad, b.steps[i].joints_rad);
-    const auto& first = std::get<DepthFrame>(a.steps[i].observations.back());
-    const auto& second = std::get<DepthFrame>(b.steps[i].observations.back());
+    const Step &one = a.steps[i], &other = b.steps[i];
+    EXPECT_EQ(one.time_s, other.time_s);
+    EXPECT_EQ(one.joints_rad, other.joints_rad);
+    EXPECT_EQ(one.unloading, other.unloading);
+    ASSERT_TRUE(one.T_base_tip && other.T_base_tip);
+    EXPECT_EQ(one.T_base_tip->matrix(), other.T_base_tip->matrix());
+    ASSERT_EQ(one.loads.size(), other.loads.size());
+    for (std::size_t k = 0; k < one.loads.size(); ++k) {
+      EXPECT_EQ(*one.loads[k].force_n, *other.loads[k].force_n);
+      EXPECT_EQ(one.loads[k].force_std_n, other.loads[k].force_std_n);
+      EXPECT_EQ(one.loads[k].contact_m, other.loads[k].contact_m);
+    }
+    ASSERT_EQ(one.observations.size(), other.observations.size());
+    for (std::size_t k = 0; k < one.observations.size(); ++k)
+      if (const auto* travel = std::get_if<ToolTravel>(&one.observations[k])) {
+        EXPECT_EQ(travel->travel_m, std::get<ToolTravel>(other.observations[k]).travel_m);
+        EXPECT_EQ(travel->sigma_m, std::get<ToolTravel>(other.observations[k]).sigma_m);
+      }
+    const auto& first = std::get<DepthFrame>(one.observations.back());
+    const auto& second = std::get<DepthFrame>(other.observations.back());
+    EXPECT_EQ(first.T_base_camera.matrix(), second.T_base_camera.matrix());
     EXPECT_EQ(first.depth_m, second.depth_m);
     EXPECT_EQ(first.mask, second.mask);
     EXPECT_GT(first.mask.cast<int>().sum(), 1000) << "the arm is in the picture";
   }
+  // On the disk, too: nothing there may depend on the clock, the folder or the memory.
+  const test::TemporaryFolder folder("same_seed");
+  std::map<std::string, std::string> files[2];
+  for (const Made* made : {&a, &b}) {
+    const std::size_t which = made == &a ? 0 : 1;
+    Recording recording = LabRobot(quick()).scene();
+    recording.pushes.emplace_back();
+    recording.pushes[0].name = "push 1";
+    recording.pushes[0].steps = made->steps;
+    io::write_recording(recording, folder.path() / std::to_string(which));
+    files[which] = bytes_in(folder.path() / std::to_string(which));
+  }
+  EXPECT_GT(files[0].size(), 10u);
+  for (const auto& [name, bytes] : files[0]) EXPECT_TRUE(files[1].contains(name) && files[1].at(name) == bytes) << name;
+  EXPECT_EQ(files[0].size(), files[1].size());
+  LabOptions other_seed = quick();
+  other_seed.seed = 4;
+  EXPECT_NE(run(other_seed).report.tare_n, a.report.tare_n);
 }
 
 TEST(LabRobot, SlipEndsThePush) {

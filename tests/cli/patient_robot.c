@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0
+ * The example's spring in real time, ten times as fast as its clock says, so that a signal can catch it in the middle of a push.
+ * What it was told to do goes into the file that PATIENT_ROBOT_LOG names, a line a call.
+ */
+#define _POSIX_C_SOURCE 199309L
+#include "palpate/acquisition/driver.h"
+
+#define palpate_make_robot make_spring_robot
+int palpate_make_robot(uint32_t abi, const char* settings, struct PalpateRobot* robot, char* error, size_t error_size);
+#include "examples/driver/spring_robot.c"
+#undef palpate_make_robot
+
+#include <time.h>
+
+static struct PalpateRobot spring;
+
+static void say(const char* call) {
+  const char* name = getenv("PATIENT_ROBOT_LOG");
+  FILE* log = name ? fopen(name, "a") : NULL;
+  if (!log) return;
+  fprintf(log, "%s\n", call);
+  fclose(log);
+}
+
+static int wait_really(void* self, double duration_s) {
+  const long ns = (long)(1e8 * duration_s);
+  const struct timespec rest = {ns / 1000000000, ns % 1000000000};
+  nanosleep(&rest, NULL);
+  return spring.wait(self, duration_s);
+}
+
+static int move_and_say(void* self, const struct PalpatePose* T_base_tip, double speed_m_s) {
+  say("move");
+  return spring.move(self, T_base_tip, speed_m_s);
+}
+
+static int stop_and_say(void* self) {
+  say("stop");
+  return spring.stop(self);
+}
+
+int palpate_make_robot(uint32_t abi, const char* settings, struct PalpateRobot* robot, char* error, size_t error_size) {
+  const int answer = make_spring_robot(abi, settings, robot, error, error_size);
+  if (answer != PALPATE_DONE) return answer;
+  spring = *robot;
+  robot->wait = wait_really;
+  robot->move = move_and_say;
+  robot->stop = stop_and_say;
+  return PALPATE_DONE;
+}

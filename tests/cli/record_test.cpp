@@ -1,0 +1,308 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// `palpate record` as a process that is stopped, killed, left by its reader, asked to go on with something else, or given what
+// cannot be: no recorded step is lost, nothing moves that need not, and every refusal has its cure.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "io/recording_folder.hpp"
+#include "palpate/io/recording.hpp"
+
+namespace palpate::io {
+namespace {
+
+using namespace palpate::io::test;
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string scene = PALPATE_SOURCE_DIR "/examples/driver/scene";
+const std::string spring = PALPATE_SPRING_ROBOT;
+constexpr int numbers = 1, usage = 2, input = 3;
+
+class Record : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  }
+  std::string path(const std::string& name) const { return (folder.path() / name).string(); }
+
+  /// Starts the program; its messages come out of `messages_`.
+  pid_t start(std::vector<std::string> words) {
+    int ends[2];
+    if (pipe(ends) != 0) return -1;
+    words.insert(words.begin(), PALPATE_CLI);
+    const pid_t child = fork();
+    if (child == 0) {
+      setenv("PATIENT_ROBOT_LOG", path("calls").c_str(), 1);
+      dup2(ends[1], STDERR_FILENO);
+      dup2(ends[1], STDOUT_FILENO);
+      close(ends[0]);
+      close(ends[1]);
+      std::vector<char*> arguments;
+      for (std::string& word : words) arguments.push_back(word.data());
+      arguments.push_back(nullptr);
+      execv(PALPATE_CLI, arguments.data());
+      _exit(127);
+    }
+    close(ends[1]);
+    messages_ = fdopen(ends[0], "r");
+    return child;
+  }
+  /// Reads messages until one holds `words`.
+  bool says(const std::string& words) {
+    char line[4096];
+    while (std::fgets(line, sizeof line, messages_) != nullptr) {
+      said += line;
+      if (std::string(line).find(words) != std::string::npos) return true;
+    }
+    return false;
+  }
+  int wait_for(pid_t child) {
+    while (says("\n")) {
+    }
+    std::fclose(messages_);
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
+  }
+  int palpate(const std::vector<std::string>& words) {
+    said.clear();
+    return wait_for(start(words));
+  }
+
+  std::vector<std::string> record(const std::string& driver, std::vector<std::string> more = {}) const {
+    std::vector<std::string> words{"record", "--driver", driver, "--scene", scene, "-o", path("recording"), "--force-limit", "6"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  std::vector<std::string> with_contact(const std::string& driver, std::vector<std::string> more = {}) const {
+    std::vector<std::string> words = record(driver, {"--contact", "0.5", "0", "0.1"});
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  Recording made() const { return read_recording(folder.path() / "recording"); }
+
+  const TemporaryFolder folder{"record"};
+  std::string said;
+  FILE* messages_ = nullptr;
+};
+
+TEST_F(Record, CtrlCStopsTheArmWhereItStandsAndKeepsEveryFinishedStep) {
+  const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT, {"--json"}));
+  ASSERT_TRUE(says(": 2.")) << said;  // the first step under load
+  kill(child, SIGINT);
+  EXPECT_EQ(wait_for(child), numbers) << said;
+  EXPECT_THAT(said, HasSubstr("stopped: stopped by the user (stopped on request)"));
+  EXPECT_TRUE(folder.get("calls").ends_with("stop\n")) << "nothing moves after it";
+  const Recording recording = made();
+  EXPECT_TRUE(check_recording(recording).empty());
+  ASSERT_EQ(recording.pushes.size(), 1u);
+  EXPECT_GE(recording.pushes[0].steps.size(), 2u);
+  EXPECT_LT(recording.pushes[0].steps.size(), 7u) << "it was not whole yet";
+  EXPECT_THAT(said, HasSubstr("\"steps\": " + std::to_string(recording.pushes[0].steps.size())));
+}
+
+TEST_F(Record, KilledItGoesOnAsIfNothingHadBeen) {
+  const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT));
+  ASSERT_TRUE(says(": 4.")) << said;
+  kill(child, SIGKILL);
+  EXPECT_EQ(wait_for(child), 1000 + SIGKILL);
+  const std::size_t before = read_recording_unchecked(folder.path() / "recording").pushes.at(0).steps.size();
+  EXPECT_GE(before, 3u);  // rest, 2 N, 4 N
+  ASSERT_EQ(palpate(with_contact(spring, {"--resume"})), 0) << said;
+  const Recording recording = made();
+  EXPECT_TRUE(check_recording(recording).empty());
+  ASSERT_EQ(recording.pushes.size(), 1u);
+  ASSERT_EQ(recording.pushes[0].steps.size(), 7u);  // rest, 2, 4, 6 N, two on the way back, rest
+  double time_s = -1;
+  for (const Step& step : recording.pushes[0].steps) {
+    EXPECT_GT(step.time_s, time_s);
+    time_s = step.time_s;
+  }
+}
+
+TEST_F(Record, ItsTruthIsThereStepByStep) {
+  const std::vector<std::string> words{"record",         "--object",      "cube", "-o", path("recording"), "--young-modulus", "20000",
+                                       "--force-limit", "5", "--force-step", "2"};
+  const pid_t child = start(words);
+  ASSERT_TRUE(says(": 4.") || says(": 5.")) << said;
+  kill(child, SIGKILL);
+  wait_for(child);
+  const auto truth_of_every_step = [&] {
+    const nlohmann::json truth = nlohmann::json::parse(folder.get("recording.truth.json"));
+    std::size_t steps = 0, known = 0;
+    for (const Push& push : read_recording_unchecked(folder.path() / "recording").pushes)
+      for (const Step& step : push.steps) {
+        ++steps;
+        for (const auto& one : truth.at("steps"))
+          if (one.at("push") == push.name && std::abs(one.at("time_s").get<double>() - step.time_s) < 1e-9) ++known;
+      }
+    EXPECT_EQ(known, steps);
+    return steps;
+  };
+  const std::size_t before = truth_of_every_step();
+  EXPECT_GE(before, 3u);
+  const std::string index = folder.get("recording/recording.yaml");
+  std::vector<std::string> other = words;
+  other.insert(other.end(), {"--resume", "--poisson-ratio", "0.11"});
+  EXPECT_EQ(palpate(other), input);
+  EXPECT_THAT(said, HasSubstr("cannot go on: poisson_ratio was"));
+  other = words;
+  other[2] = "ball";
+  other.push_back("--resume");
+  EXPECT_EQ(palpate(other), input);
+  EXPECT_THAT(said, HasSubstr("cannot go on: its object is cube, and this command has ball"));
+  EXPECT_EQ(folder.get("recording/recording.yaml"), index);
+  other = words;
+  other.push_back("--resume");
+  ASSERT_EQ(palpate(other), 0) << said;
+  EXPECT_GT(truth_of_every_step(), before);
+  EXPECT_EQ(made().pushes.size(), 2u);
+}
+
+TEST_F(Record, GoesOnWithTheSameThingOnly) {
+  ASSERT_EQ(palpate(with_contact(spring, {"--contact", "0.52", "0.01", "0.1"})), 0) << said;
+  const std::string index = folder.get("recording/recording.yaml");
+  const auto refused = [&](std::vector<std::string> words, const std::string& why) {
+    words.push_back("--resume");
+    EXPECT_EQ(palpate(words), input) << why;
+    EXPECT_THAT(said, HasSubstr("cannot go on"));
+    EXPECT_THAT(said, HasSubstr(why));
+    EXPECT_THAT(said, HasSubstr("or choose another folder"));
+    EXPECT_EQ(folder.get("recording/recording.yaml"), index) << why;
+  };
+  refused(record(spring, {"--contact", "0.52", "0.01", "0.1"}), "push 1: ");
+  refused(record(spring, {"--contact", "0.5", "0", "0.1", "--contact", "0.5", "0.02", "0.1"}), "push 2: ");
+  refused(with_contact(spring, {"--direction", "0.05", "0", "-1"}), "push 1: direction");
+  const std::string text = read_file(fs::path(scene) / "recording.yaml");
+  const auto other_scene = [&](const std::string& from, const std::string& to) {
+    folder.put("scene/recording.yaml", replaced(text, from, to));
+    folder.put("scene/plate.obj", read_file(fs::path(scene) / "plate.obj"));
+    std::vector<std::string> words = with_contact(spring);
+    words[4] = path("scene");
+    return words;
+  };
+  refused(other_scene("plate on a spring", "ball"), "its object is plate on a spring, and this command has ball");
+  refused(other_scene("radius_m: 0.01", "radius_m: 0.012"), "tool stick: radius_m is 0.01, and this command has 0.012");
+  refused(other_scene("normal: [0, 0, 1], tol", "normal: [0, 1, 0], tol"), "support table: normal");
+  refused(other_scene("material: linear", "material: foam"), "model's material is linear, and this command has foam");
+  const auto thicker = other_scene("name:", "name:");
+  std::ofstream(folder / "scene/plate.obj", std::ios::app) << "v 0.5 0 0.11\n";
+  refused(thicker, "rest shape");
+  ASSERT_EQ(palpate(with_contact(spring, {"--contact", "0.52", "0.01", "0.1", "--contact", "0.51", "0", "0.1", "--resume"})), 0) << said;
+  EXPECT_EQ(made().pushes.size(), 3u) << "more pushes of the same thing are welcome";
+}
+
+TEST_F(Record, NobodyListensAndThePushGoesOn) {
+  const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT, {"--json"}));
+  ASSERT_TRUE(says("push 1")) << said;
+  std::fclose(messages_);  // as `2>&1 | head -1` does
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  EXPECT_EQ(made().pushes.at(0).steps.size(), 7u);
+  // Started without the streams: messages must not run into the recording's files.
+  fs::remove_all(path("recording"));
+  const std::string command = std::string("'") + PALPATE_CLI + "' --json record --driver '" + spring + "' --scene '" + scene + "' -o '" +
+                              path("recording") + "' --contact 0.5 0 0.1 --force-limit 6 <&- >&- 2>&-";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_TRUE(check_recording(made()).empty());
+}
+
+TEST_F(Record, OutputsThatCannotBeWrittenAreToldBeforeAnythingMoves) {
+  const auto refused = [&](const std::vector<std::string>& words, const std::string& why, int code = input) {
+    fs::remove(path("calls"));
+    EXPECT_EQ(palpate(words), code) << said;
+    EXPECT_THAT(said, HasSubstr(why));
+    EXPECT_FALSE(fs::exists(path("calls"))) << why << ": the robot has moved";
+    EXPECT_FALSE(fs::exists(path("recording"))) << why;
+  };
+  refused(with_contact(PALPATE_PATIENT_ROBOT, {"--bag", "/proc/bag"}), "/proc/bag: ");
+  refused(with_contact(PALPATE_PATIENT_ROBOT, {"--raw-bag", "/proc/bag"}), "/proc/bag: ");
+  refused(with_contact(PALPATE_PATIENT_ROBOT, {"--bag", path("bag"), "--raw-bag", path("bag") + "/"}), "written already", usage);
+  refused(with_contact(PALPATE_PATIENT_ROBOT, {"--bag", path("recording")}), "written already", usage);
+  const std::vector<std::string> lab{"record", "-o", path("recording"), "--truth"};
+  for (const std::string truth : {"/proc/nowhere/truth.json", "/proc"}) {
+    std::vector<std::string> words = lab;
+    words.push_back(truth);
+    refused(words, "/proc");
+    words.insert(words.begin() + 1, "--demo");
+    refused(words, "/proc");
+  }
+  std::ofstream(path("file")) << "words\n";
+  refused({"record", "-o", path("recording"), "--truth", path("file") + "/truth.json"}, "is a file");
+}
+
+TEST_F(Record, APushOutOfReachIsNamedWithItsPlaceAndLeavesNothing) {
+  EXPECT_EQ(palpate(record(spring, {"--contact", "0.9", "0", "0.1"})), numbers) << said;
+  EXPECT_THAT(said, HasSubstr("push 1: nothing was recorded: the robot refused to move there: a limit, or out of reach"));
+  EXPECT_THAT(said, HasSubstr("at (0.9000 0.0000 0.1000) along"));
+  EXPECT_THAT(said, HasSubstr("try another contact or direction"));
+  EXPECT_EQ(said.find("refused"), said.rfind("refused")) << "once is enough";
+  EXPECT_THAT(said, Not(HasSubstr("palpate estimate")));
+  EXPECT_FALSE(fs::exists(path("recording"))) << "it would stand in the way of the next try";
+  EXPECT_EQ(palpate(record(spring, {"--contact", "0.9", "0", "0.1", "--contact", "0.5", "0", "0.1"})), numbers);
+  EXPECT_THAT(said, HasSubstr("palpate estimate"));
+  EXPECT_EQ(made().pushes.size(), 1u);
+}
+
+TEST_F(Record, WhatIsMistypedIsToldInWords) {
+  const auto refused = [&](const std::vector<std::string>& words, const std::string& why, int code = usage) {
+    EXPECT_EQ(palpate(words), code) << said;
+    EXPECT_THAT(said, HasSubstr(why));
+    EXPECT_THAT(said, Not(HasSubstr("Could not convert")));
+    EXPECT_FALSE(fs::exists(path("recording"))) << why;
+  };
+  for (const std::string wrong : {"-1", "abc", "1.5", "18446744073709551616"})
+    refused({"--seed", wrong, "record", "-o", path("recording")},
+            "--seed: must be a whole number from 0 to 18446744073709551615, is " + wrong);
+  refused({"record", "--contact", "0.5", "0", "-o", path("recording"), "--driver", spring},
+          "--contact: needs three numbers, X Y Z: where to push, in metres, base frame; `-o` is none");
+  refused(record(spring, {"--contact", "0.5", "0"}), "where to push, in metres, base frame");
+  refused(record(spring, {"--contact", "0.5", "0", "0.1", "--direction", "0", "down", "1"}), "--direction: needs three numbers");
+  refused(record(spring, {"--contact", "0.5", "0", "0.1", "0.2"}), "0.2");
+  refused(with_contact(spring, {"--increment", "0.02"}), "(`--increment`)", input);
+  refused({"record", "--demo", "--contact-threshold", "1", "-o", path("recording")}, "--contact-threshold");
+}
+
+TEST_F(Record, ThresholdsOfThePushAreTheUsers) {
+  ASSERT_EQ(palpate(with_contact(spring, {"--unloading-steps", "0", "--contact-std", "0.002", "--increment", "0.001"})), 0) << said;
+  const Recording recording = made();
+  ASSERT_EQ(recording.pushes.at(0).steps.size(), 5u);  // rest, 2, 4, 6 N, rest
+  EXPECT_EQ(recording.pushes[0].steps[1].loads.at(0).contact_std_m, 0.002);
+  EXPECT_NEAR(recording.pushes[0].travel_offset_std_m, 0.0005, 1e-5) << "half an increment";
+  for (const std::string verb : {"record", "explore"}) {
+    ASSERT_EQ(palpate({verb, "--help"}), 0);
+    for (const char* option : {"--force-limit FLOAT:POSITIVE=50", "--settling-timeout", "--slip-sideways", "--contact-threshold",
+                               "--contact-std", "--increment", "Limits of a push", "A robot of your own"})
+      EXPECT_THAT(said, HasSubstr(option)) << verb;
+  }
+}
+
+TEST_F(Record, ExploreKnowsItsLawBeforeItMoves) {
+  const std::vector<std::string> words{"explore", "--driver", PALPATE_PATIENT_ROBOT, "--scene", scene, "-o", path("explored")};
+  std::vector<std::string> rubber = words;
+  rubber.insert(rubber.end(), {"--law", "rubber"});
+  EXPECT_EQ(palpate(rubber), usage) << said;
+  EXPECT_THAT(said, HasSubstr("--law: no material is called 'rubber'"));
+  EXPECT_FALSE(fs::exists(path("calls")));
+  EXPECT_FALSE(fs::exists(path("explored"))) << "the next try finds its folder free";
+  folder.put("explored/recording/recording.yaml", "of an earlier run\n");
+  EXPECT_EQ(palpate(words), input);
+  EXPECT_THAT(said, HasSubstr("choose another folder or remove it"));
+}
+
+}  // namespace
+}  // namespace palpate::io
