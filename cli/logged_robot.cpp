@@ -26,8 +26,9 @@ acquisition::RobotState LoggedRobot::read() {
   acquisition::RobotState state = robot_.read();
   state.time_s += later_s_;
   const std::int64_t stamp = stamp_of(state.time_s);
-  put("/wrench", "geometry_msgs/msg/WrenchStamped", state.time_s,
-      io::encode(io::RosWrench{{stamp, "base"}, state.force_n, Vec3::Zero()}));
+  // About the origin of the frame that it is given in, as ROS has it.
+  const Vec3 tip_m = state.T_base_tip.translation(), torque_nm = state.torque_nm.value_or(Vec3::Zero()) + tip_m.cross(state.force_n);
+  put("/wrench", "geometry_msgs/msg/WrenchStamped", state.time_s, io::encode(io::RosWrench{{stamp, "base"}, state.force_n, torque_nm}));
   put("/tf", "tf2_msgs/msg/TFMessage", state.time_s,
       io::encode(std::vector<io::RosTransform>{{{stamp, "base"}, "tip", state.T_base_tip}}));
   if (joint_names_.size() == state.joints_rad.size())

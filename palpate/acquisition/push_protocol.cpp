@@ -10,6 +10,7 @@
 #include "palpate/acquisition/force_begin.hpp"
 #include "palpate/acquisition/motion_lengths.hpp"
 #include "palpate/acquisition/recorded_part.hpp"
+#include "palpate/acquisition/torque_mean.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/rest_change.hpp"
 
@@ -134,22 +135,26 @@ class PushRun {
     Vec3 mean_n = Vec3::Zero();
     double time_s = 0;  // its middle
     double std_n = 0;   // of one sample, along the push
+    std::optional<TorqueMean> torque;
     RobotState last;
   };
   FreeAir listen() {
     FreeAir air;
     std::vector<Vec3> forces;
+    std::vector<std::optional<Vec3>> torques;
     for (int i = 0; i < options_.free_air_samples; ++i) {
       ask_user();
       robot_.wait(options_.sample_period_s);
       air.last = robot_.read();
       forces.push_back(air.last.force_n);
+      torques.push_back(air.last.torque_nm);
       air.mean_n += air.last.force_n / options_.free_air_samples;
       air.time_s += air.last.time_s / options_.free_air_samples;
     }
     double square = 0;
     for (const Vec3& f : forces) square += std::pow(along(f - air.mean_n), 2);
     air.std_n = std::sqrt(square / std::max(1, options_.free_air_samples - 1));
+    air.torque = torque_mean(torques);
     return air;
   }
 
@@ -160,6 +165,11 @@ class PushRun {
     report_.tare_n = air.mean_n;
     tared_at_s_ = air.time_s;
     free_air_std_n_ = air.std_n;
+    torque_tare_ = air.torque;
+    if (torque_tare_ && options_.contact_std_m > 0) {
+      push_.torque_tare_std_nm = torque_tare_->mean_std_nm();
+      push_.tip_std_m = options_.contact_std_m;  // where the arm believes its tip to be is what makes the contact uncertain
+    }
     const double travel_sigma_m = robot_.travel_sigma_m();
     lengths_.state_noise(free_air_std_n_, travel_sigma_m);
     // A push that goes on is one push with one statement.
@@ -313,6 +323,7 @@ class PushRun {
     RobotState last;
     Vec3 mean_n = Vec3::Zero();
     double sigma_n = 0;
+    std::optional<TorqueMean> torque;  // as it was read
     bool settled = false;
   };
   Settled settle(bool unloading) {
@@ -320,11 +331,13 @@ class PushRun {
     const double start = robot_.read().time_s;
     sensing::Settling state;
     Settled out;
+    std::vector<std::optional<Vec3>> torques;
     do {
       ask_user();
       robot_.wait(options_.sample_period_s);
       out.last = robot_.read();
       samples.push_back(sample(out.last));
+      torques.push_back(out.last.torque_nm);
       state = sensing::settling(samples, plan_.direction, options_.settling);
     } while (!state.settled && out.last.time_s - start < options_.settling_timeout_s);
     out.settled = state.settled;
@@ -337,6 +350,7 @@ class PushRun {
       ++count;
     }
     out.mean_n /= count;
+    out.torque = torque_mean({torques.end() - std::ptrdiff_t(count), torques.end()});
     const Vec3 variance = (square / count - out.mean_n.cwiseAbs2()).cwiseMax(0.0);
     out.sigma_n = std::sqrt(std::max(variance.mean(), free_air_std_n_ * free_air_std_n_ * 0.01) / count);
     history_.insert(history_.end(), samples.begin(), samples.end());
@@ -352,7 +366,23 @@ class PushRun {
     const Settled step = settle(unloading);
     if (!step.settled) report_.unsettled.push_back(next_index_);
     loaded_ = true;
-    record(step.last, step.mean_n, std::hypot(step.sigma_n, second_tare_std_n()), unloading);
+    record(step.last, step.mean_n, std::hypot(step.sigma_n, second_tare_std_n()), unloading, torque_of(step));
+  }
+
+  // It says where the force acts beside the tip, which is known as well as the joints are read: nothing new of a contact that is
+  // exactly known.
+  std::optional<Wrench> torque_of(const Settled& step) const {
+    if (!step.torque || !torque_tare_ || !(options_.contact_std_m > 0)) return std::nullopt;
+    Wrench wrench;
+    wrench.time_s = step.last.time_s;
+    wrench.force_n = step.mean_n;
+    wrench.force_sigma_n = step.sigma_n;
+    wrench.has_torque = true;
+    wrench.torque_nm = step.torque->mean_nm - torque_tare_->mean_nm;
+    const double noise_nm = std::max(step.torque->mean_std_nm(), 0.1 * torque_tare_->mean_std_nm());
+    wrench.torque_sigma_nm = std::hypot(noise_nm, robot_.travel_sigma_m() * step.mean_n.norm());
+    wrench.tool = plan_.tool;
+    return wrench.torque_sigma_nm > 0 ? std::optional(wrench) : std::nullopt;
   }
 
   // The push states one error of its force's zero, but its parts before and after a cut have two tares, whose errors are
@@ -383,7 +413,8 @@ class PushRun {
                                            " than in the part that is recorded: object or arm moved in between; push there anew"};
   }
 
-  void record(const RobotState& state, const std::optional<Vec3>& force_n, double sigma_n, bool unloading) {
+  void record(const RobotState& state, const std::optional<Vec3>& force_n, double sigma_n, bool unloading,
+              const std::optional<Wrench>& torque = {}) {
     Step step;
     step.time_s = state.time_s;
     step.joints_rad = state.joints_rad;
@@ -403,6 +434,7 @@ class PushRun {
       encoder.travel_m = travel(state);
       encoder.sigma_m = robot_.travel_sigma_m();
       step.observations.emplace_back(encoder);
+      if (torque) step.observations.emplace_back(*torque);
     }
     DepthFrame image = robot_.take_depth_image();
     if (!force_n && !unloading) before_ = image;
@@ -484,6 +516,7 @@ class PushRun {
   std::vector<sensing::ContactSample> approach_, history_;  // before contact was noticed, and since
   Vec3 noticed_m_ = Vec3::Zero();                           // there
   double free_air_std_n_ = 0, tared_at_s_ = 0;
+  std::optional<TorqueMean> torque_tare_;
   bool in_front_ = false;     // the tip has been in front of the object
   bool loaded_ = false;       // a step under load is recorded
   bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
