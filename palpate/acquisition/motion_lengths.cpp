@@ -80,7 +80,7 @@ double MotionLengths::for_steps_m(const Seen& seen, double between_n) const {
 }
 
 bool MotionLengths::is_far_beyond(double force_n, double at_m) const {
-  return force_n > 1.5 * options_.force_limit_n && at_m > touched_at_m_ && last_m_ > shortest_m();
+  return force_n > 1.5 * options_.force_limit_n && at_m > touched_at_m_ && last_m_ > 1.01 * shortest_m();
 }
 
 double MotionLengths::take_back_m(double force_n) {

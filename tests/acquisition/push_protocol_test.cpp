@@ -420,6 +420,20 @@ TEST(PushProtocol, AStiffContactIsPressedNoFurtherThanTheLimit) {
   }
 }
 
+TEST(PushProtocol, EndsEvenWhereTheShortestMotionPassesTheLimit) {
+  for (int k = 0; k < 50; ++k) {
+    SpringRobot robot;
+    robot.stiffness_n_m = 5e5;
+    robot.surface_m = 0.1 - 1e-5 * k;
+    PushOptions o = options();
+    o.force_limit_n = 2.5;
+    int asked = 0;
+    const Result result = run(robot, o, [&] { return ++asked < 20000; });
+    ASSERT_EQ(result.report.stop, StopReason::force_limit) << k << ": " << result.report.message;
+    EXPECT_GT(result.report.overshoot_n, 0);
+  }
+}
+
 // The soft cover of something hard: only the motion that meets it goes beyond the limit, and the tip does not stay there.
 TEST(PushProtocol, WhereNothingAnnouncedTheForceItIsTakenBackAndSaid) {
   struct Hard : SpringRobot {
