@@ -50,7 +50,7 @@ std::vector<std::string> push_warnings(const std::string& name, const acquisitio
     out.push_back(fmt::format("{}: the zero of the force moved by {:.3g} N during the push ({:.1f} N at most); taken off evenly over "
                               "its time. Let the sensor warm up, and keep cables from pulling",
                               name, report.drift_n, report.highest_force_n));
-  if (report.overshoot_n > 0.02 * report.highest_force_n)
+  if (report.overshoot_n > 0.1 * (report.highest_force_n - report.overshoot_n))
     out.push_back(fmt::format("{}: the force passed its limit by {:.3g} N (to {:.3g} N): the object is stiffer than one motion foresees; "
                               "set a smaller --increment or --push-speed",
                               name, report.overshoot_n, report.highest_force_n));
