@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
+#include <functional>
 
 #include "cli/driver_library.hpp"
 #include "cli/number_checks.hpp"
@@ -17,19 +17,66 @@ namespace palpate::cli {
 namespace {
 
 constexpr const char* own_robot = "A robot of your own";
+constexpr const char* where = "Where to push";
+
+struct Place {
+  Vec3 contact_m, direction;
+};
+
+/// Of the pushes that are asked for. @param into  where no direction is said: the one into the object there
+std::vector<Place> places_of(const RobotArguments& arguments, const std::function<Vec3(const Vec3&)>& into) {
+  const std::size_t pushes = arguments.contacts.size(), directions = arguments.directions.size();
+  if (directions > 1 && directions != pushes)
+    throw Error(fmt::format("there are {} for {} contacts: give one each, one for all, or none", directions, pushes), "--direction");
+  std::vector<Place> places;
+  for (std::size_t i = 0; i < pushes; ++i) {
+    const Vec3 contact_m(arguments.contacts[i].data());
+    const Vec3 direction = directions == 0 ? into(contact_m) : Vec3(arguments.directions[directions == 1 ? 0 : i].data());
+    if (!(direction.norm() > 0) || !direction.allFinite()) throw Error("must not be zero", "--direction");
+    places.push_back({contact_m, direction.normalized()});
+  }
+  return places;
+}
+
+Vec3 into_surface(const TriMesh& surface, const Vec3& contact_m) {
+  const auto nearest = geometry::TriangleTree(surface).closest(contact_m);
+  const auto corner = [&](int k) { return Vec3(surface.vertices_m.row(surface.triangles(nearest.triangle, k))); };
+  return (corner(2) - corner(0)).cross(corner(1) - corner(0)).normalized();
+}
 
 class FromLab : public PushRobot {
  public:
-  FromLab(const LabArguments& arguments, std::uint64_t seed) : lab_(lab_options(arguments, seed), lab_object(arguments, seed)) {}
+  FromLab(const RobotArguments& arguments, std::uint64_t seed)
+      : lab_(lab_options(arguments.lab, seed), lab_object(arguments.lab, seed)) {
+    const TriMesh& surface = lab_.object().surface;
+    places_ = places_of(arguments, [&](const Vec3& at_m) { return into_surface(surface, at_m); });
+    for (Place& place : places_) {
+      const Vec3 onto_m = geometry::TriangleTree(surface).closest(place.contact_m).point_m;
+      constexpr double near_m = 0.002;
+      const double beside_m = (onto_m - place.contact_m).norm();
+      if (beside_m > near_m)
+        throw Error(fmt::format("({:.4f} {:.4f} {:.4f}) lies {:.1f} mm beside the object, which is nearest at ({:.4f} {:.4f} {:.4f})",
+                                place.contact_m.x(), place.contact_m.y(), place.contact_m.z(), 1000 * beside_m, onto_m.x(), onto_m.y(), onto_m.z()),
+                    "--contact");
+      place.contact_m = onto_m;
+    }
+  }
   acquisition::Robot& robot() override { return lab_; }
   Recording scene() const override { return lab_.scene(); }
-  std::size_t sites() const override { return lab_.object().sites.size(); }
-  acquisition::PushPlan plan(std::size_t site) override { return lab_.plan(site); }
+  std::size_t sites() const override { return places_.empty() ? lab_.object().sites.size() : places_.size(); }
+  acquisition::PushPlan plan(std::size_t site) override {
+    if (places_.empty()) return lab_.plan(site);
+    acquisition::PushPlan plan = lab_.plan_at(places_.at(site).contact_m, places_.at(site).direction);
+    plan.name = fmt::format("push {}", site + 1);
+    return plan;
+  }
   acquisition::PushPlan plan_at(const Vec3& contact_m, const Vec3& direction) override { return lab_.plan_at(contact_m, direction); }
   bool reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m) const override {
     return lab_.reaches(contact_m, direction, start_distance_m);
   }
-  double force_step_n(std::size_t site) const override { return lab_.object().force_step_at(lab_.object().sites[site]); }
+  double force_step_n(std::size_t site) const override {
+    return places_.empty() ? lab_.object().force_step_at(lab_.object().sites[site]) : lab_.object().force_step_n;
+  }
   double travel_limit_m() const override { return lab_.object().travel_limit_m; }
   std::vector<DepthFrame> look_around(int views) const override { return lab_.look_around(views); }
   std::optional<nlohmann::json> truth() const override { return truth_json(lab_); }
@@ -37,6 +84,7 @@ class FromLab : public PushRobot {
 
  private:
   lab::LabRobot lab_;
+  std::vector<Place> places_;  // that the user asks for; none: those of the object
 };
 
 class FromDriver : public PushRobot {
@@ -52,21 +100,13 @@ class FromDriver : public PushRobot {
     bool known = false;
     for (const Tool& tool : scene_.tools) known = known || tool.name == tool_;
     if (!known) throw Error("is no tool of the scene; its first is " + scene_.tools.front().name, "--tool " + tool_);
-    const std::size_t pushes = arguments.contacts.size(), directions = arguments.directions.size();
-    if (directions > 1 && directions != pushes)
-      throw Error(fmt::format("there are {} for {} contacts: give one each, one for all, or none", directions, pushes), "--direction");
-    for (std::size_t i = 0; i < pushes; ++i) {
-      const Vec3 contact_m(arguments.contacts[i].data());
-      Vec3 direction = directions == 0 ? into_the_object(contact_m) : Vec3(arguments.directions[directions == 1 ? 0 : i].data());
-      if (!(direction.norm() > 0) || !direction.allFinite()) throw Error("must not be zero", "--direction");
-      places_.emplace_back(contact_m, direction.normalized());
-    }
+    places_ = places_of(arguments, [&](const Vec3& at_m) { return into_the_object(at_m); });
   }
   acquisition::Robot& robot() override { return library_.robot(); }
   Recording scene() const override { return scene_; }
   std::size_t sites() const override { return places_.size(); }
   acquisition::PushPlan plan(std::size_t site) override {
-    acquisition::PushPlan plan = plan_at(places_.at(site).first, places_.at(site).second);
+    acquisition::PushPlan plan = plan_at(places_.at(site).contact_m, places_.at(site).direction);
     plan.name = fmt::format("push {}", site + 1);
     plan.site = fmt::format("place {}", site + 1);
     return plan;
@@ -101,15 +141,13 @@ class FromDriver : public PushRobot {
     std::optional<TriMesh> surface = scene_.rest.surface;
     if (!surface && scene_.rest.volume) surface = geometry::boundary_surface(*scene_.rest.volume).surface;
     if (!surface) throw Error("the scene's shape is known from views only: say along which --direction to push", "--contact");
-    const auto nearest = geometry::TriangleTree(*surface).closest(contact_m);
-    const auto corner = [&](int k) { return Vec3(surface->vertices_m.row(surface->triangles(nearest.triangle, k))); };
-    return (corner(2) - corner(0)).cross(corner(1) - corner(0)).normalized();
+    return into_surface(*surface, contact_m);
   }
 
   DriverLibrary library_;
   Recording scene_;
   std::string tool_;
-  std::vector<std::pair<Vec3, Vec3>> places_;  // contact, direction
+  std::vector<Place> places_;
 };
 
 }  // namespace
@@ -136,23 +174,22 @@ void add_robot_options(CLI::App& app, RobotArguments& arguments) {
 }
 
 void add_contact_options(CLI::App& app, RobotArguments& arguments) {
-  app.add_option("--contact", arguments.contacts, "with --driver: where to push, in metres, base frame; again for every push")
-      ->needs("--driver")
+  app.add_option("--contact", arguments.contacts, "where to push, in metres, base frame; again for every push (default: the places of the lab's object)")
       ->type_name("X Y Z")
       ->allow_extra_args(false)
       ->check(coordinate("where to push, in metres, base frame"))
-      ->group(own_robot);
+      ->group(where);
   app.add_option("--direction", arguments.directions,
                  "of these pushes, in the base frame, into the object: one for all, or one each (default: across the surface)")
-      ->needs("--driver")
+      ->needs("--contact")
       ->type_name("X Y Z")
       ->allow_extra_args(false)
       ->check(coordinate("along which to push, into the object, base frame"))
-      ->group(own_robot);
+      ->group(where);
 }
 
 std::unique_ptr<PushRobot> push_robot(const RobotArguments& arguments, std::uint64_t seed) {
-  if (arguments.driver.empty()) return std::make_unique<FromLab>(arguments.lab, seed);
+  if (arguments.driver.empty()) return std::make_unique<FromLab>(arguments, seed);
   return std::make_unique<FromDriver>(arguments);
 }
 

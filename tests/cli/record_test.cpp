@@ -99,6 +99,28 @@ class Record : public testing::Test {
   FILE* messages_ = nullptr;
 };
 
+// The lab's objects are pushed where the user wants, too: on their surface, and there only.
+TEST_F(Record, TheLabPushesWhereItIsAsked) {
+  std::vector<std::string> words{"record", "--object", "cube", "--material", "linear", "-o", path("lab"), "--travel-limit", "0.003", "--unloading-steps", "0"};
+  const auto with = [&](std::vector<std::string> more) {
+    std::vector<std::string> all = words;
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  EXPECT_EQ(palpate(with({"--contact", "0.64", "0", "0.17"})), usage);
+  EXPECT_THAT(said, HasSubstr("--contact: (0.6400 0.0000 0.1700) lies 20.0 mm beside the object"));
+  EXPECT_EQ(palpate(with({"--direction", "0", "0", "-1"})), usage);
+  EXPECT_THAT(said, HasSubstr("--contact"));
+  EXPECT_FALSE(fs::exists(path("lab")));
+  ASSERT_EQ(palpate(with({"--contact", "0.64", "0", "0.1495"})), 0) << said;
+  const Recording made = read_recording(folder.path() / "lab");
+  ASSERT_EQ(made.pushes.size(), 1u);
+  const Step& pressed = made.pushes[0].steps.at(1);
+  ASSERT_EQ(pressed.loads.size(), 1u);
+  EXPECT_LT((pressed.loads[0].contact_m - Vec3(0.64, 0, 0.15)).norm(), 2e-3);
+  EXPECT_LT((pressed.loads[0].direction + Vec3::UnitZ()).norm(), 1e-9);
+}
+
 TEST_F(Record, CtrlCStopsTheArmWhereItStandsAndKeepsEveryFinishedStep) {
   const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT, {"--json"}));
   ASSERT_TRUE(says(": 2.")) << said;  // the first step under load

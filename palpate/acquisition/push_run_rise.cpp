@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// Up to contact, and into the object until a limit says stop.
+#include "palpate/acquisition/push_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "palpate/sensing/push_events.hpp"
+
+namespace palpate::acquisition {
+
+void PushRun::approach() {
+  std::vector<sensing::ContactSample> samples;
+  double motion_m = options_.increment_m, fine_until_m = -options_.start_distance_m;
+  while (at_m_ < options_.search_distance_m) {
+    if (at_m_ > fine_until_m) motion_m = options_.increment_m;
+    move_to(at_m_ + motion_m, options_.approach_speed_m_s);
+    for (int i = 0; i < options_.contact.confirm_samples; ++i) {
+      robot_.wait(options_.sample_period_s);
+      samples.push_back(sample(robot_.read()));
+    }
+    const auto contact = sensing::find_contact(samples, plan_.direction, free_air_std_n_, options_.contact);
+    if (!contact) continue;
+    const double touched_n = along(samples.back().force_n);
+    if (lengths_.is_hard_touch(touched_n, motion_m)) {  // back to where nothing was felt, and once more
+      samples.resize(*contact);
+      fine_until_m = at_m_ + options_.increment_m;
+      move_to(at_m_ - motion_m, options_.approach_speed_m_s);
+      look();
+      motion_m = lengths_.after_hard_touch_m(touched_n, motion_m);
+      continue;
+    }
+    touched(samples, *contact, motion_m);
+    return;
+  }
+  throw Stopped{StopReason::no_contact, "no contact within " + std::to_string(1000 * options_.search_distance_m) +
+                                            " mm beyond the expected surface"};
+}
+
+void PushRun::touched(const std::vector<sensing::ContactSample>& samples, std::size_t contact, double motion_m) {
+  noticed_m_ = samples[contact].tip_m;
+  // Encoders are absolute: what goes on counts from the zero that the recorded travels have.
+  report_.contact_m = recorded_.contact_m.value_or(noticed_m_);
+  begins_late_ = true;
+  approach_.assign(samples.begin(), samples.begin() + std::ptrdiff_t(contact));
+  history_.assign(samples.begin() + std::ptrdiff_t(contact), samples.end());
+  lengths_.touched(at_m_, motion_m);
+}
+
+Stopped PushRun::press() {
+  constexpr int touches = 5;
+  for (int touch = 1;; ++touch) {
+    approach();
+    try {
+      return rise();
+    } catch (const Stopped& stop) {
+      const bool hardly_touched = !loaded_ && recorded_.force_n == 0 && top_n_ < options_.force_step_n;
+      if (stop.reason != StopReason::contact_lost || !hardly_touched || touch == touches) throw;
+    }
+  }
+}
+
+Stopped PushRun::rise() {
+  const bool top_recorded = top_is_recorded();
+  double target = std::max(options_.force_step_n, recorded_.force_n + options_.force_step_n);
+  if (top_recorded) target = options_.force_limit_n;
+  for (;;) {
+    const RobotState state = robot_.read();
+    const double now = pressing(state);
+    report_.highest_force_n = std::max(report_.highest_force_n, now);
+    report_.deepest_m = std::max(report_.deepest_m, travel(state));
+    if (lengths_.is_far_beyond(now, at_m_)) {
+      move_to(at_m_ - lengths_.take_back_m(now), options_.push_speed_m_s);
+      robot_.wait(options_.sample_period_s);
+      recorded_at_m_.reset();  // the arm comes to no place twice
+      continue;
+    }
+    top_n_ = std::max(top_n_, now);
+    if (recorded_.contact_m && now >= step_n()) begin_where_the_force_began();  // as early as in the part that is recorded
+    if (now >= options_.force_limit_n) {
+      end_rise(top_recorded);
+      return {StopReason::force_limit, "the force reached its limit"};
+    }
+    if (travel(state) >= options_.travel_limit_m - 1e-9) {
+      end_rise(top_recorded);
+      return {StopReason::travel_limit, "the travel reached its limit"};
+    }
+    if (now >= std::min(target, options_.force_limit_n)) {
+      // The motion that got there was picked for its own error, too: the tip stands deeper than the encoders say more often
+      // than not. Of one more motion nothing is known yet.
+      if (has_room_for_one_more(state)) {
+        advance(state);
+        if (lengths_.is_far_beyond(along(history_.back().force_n), at_m_)) continue;
+      }
+      target += options_.force_step_n;
+      if (travel(robot_.read()) < options_.travel_limit_m - 1e-9) settle_and_record(false);  // else as the last one
+      continue;
+    }
+    advance(state);
+  }
+}
+
+void PushRun::advance(const RobotState& state) {
+  const double from_m = at_m_;
+  move_to(at_m_ + std::min(next_m(state), options_.travel_limit_m - travel(state)), options_.push_speed_m_s);
+  robot_.wait(options_.sample_period_s);
+  history_.push_back(sample(robot_.read()));
+  lengths_.moved(at_m_ - from_m, along(history_.back().force_n) - pressing(state));
+  watch_out();
+}
+
+void PushRun::watch_out() const {
+  // Below the first step, the arm's own repeat error moves the force of a soft object by more than slip would.
+  sensing::SlipOptions slip = options_.slip;
+  slip.least_force_n = std::max(slip.least_force_n, step_n());
+  const sensing::PushEvent event = sensing::watch(history_, plan_.direction, lost_n(), slip);
+  if (event == sensing::PushEvent::none) return;
+  throw Stopped{event == sensing::PushEvent::contact_lost ? StopReason::contact_lost : StopReason::slip,
+                sensing::to_words(event)};
+}
+
+}  // namespace palpate::acquisition

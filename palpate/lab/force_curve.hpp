@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inner header of the room.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "palpate/core/error.hpp"
+#include "palpate/lab/pressed.hpp"
+
+namespace palpate::lab {
+
+// Equilibria at rising forces, solved when they are first needed; between two of them everything is interpolated.
+class ForceCurve {
+ public:
+  /// @param first_n  the first step of force; later ones follow the object's own stiffness, for about `step_m` of travel each
+  ForceCurve(std::unique_ptr<Pressed> object, double first_n, double step_m)
+      : object_(std::move(object)), step_n_(first_n), step_m_(step_m) {
+    forces_.push_back(0);
+    travels_.push_back(0);
+    surfaces_.push_back(object_->surface());
+  }
+
+  struct Place {
+    std::size_t below = 0;
+    double share = 0;
+  };
+  Place at(double travel_m) {
+    while (travels_.back() < travel_m) {
+      object_->press(forces_.back() + step_n_);
+      forces_.push_back(object_->force_n());
+      travels_.push_back(object_->travel_m());
+      surfaces_.push_back(object_->surface());
+      const double gained_m = travels_.back() - travels_[travels_.size() - 2];
+      if (!(gained_m > 0)) throw Error("the true object does not give way under the pad", "LabRobot");
+      step_n_ *= std::clamp(step_m_ / gained_m, 0.25, 2.0);
+    }
+    if (travel_m <= 0) return {};
+    std::size_t k = 1;
+    while (travels_[k] < travel_m) ++k;
+    return {k - 1, (travel_m - travels_[k - 1]) / (travels_[k] - travels_[k - 1])};
+  }
+  double force_n(const Place& p) const {
+    return p.share == 0 ? forces_[p.below] : (1 - p.share) * forces_[p.below] + p.share * forces_[p.below + 1];
+  }
+  TriMesh surface(const Place& p) const {
+    TriMesh mesh = surfaces_[p.below];
+    if (p.share > 0) mesh.vertices_m = (1 - p.share) * mesh.vertices_m + p.share * surfaces_[p.below + 1].vertices_m;
+    return mesh;
+  }
+
+ private:
+  std::unique_ptr<Pressed> object_;
+  double step_n_, step_m_;
+  std::vector<double> forces_, travels_;
+  std::vector<TriMesh> surfaces_;
+};
+
+}  // namespace palpate::lab
