@@ -1,122 +1,17 @@
 // label: unit
 // SPDX-License-Identifier: Apache-2.0
 // Every way in which a push can end, on a robot that presses a spring.
-#include "palpate/acquisition/push_protocol.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
+#include "acquisition/spring_robot.hpp"
 #include "palpate/core/error.hpp"
 #include "refusals.hpp"
 
 namespace palpate::acquisition {
 namespace {
-
-// A linear spring whose surface lies at height 0.1 m; pressed from above. The force relaxes after every motion.
-struct SpringRobot : Robot {
-  double stiffness_n_m = 400, surface_m = 0.1, noise_n = 0.02;
-  double relaxation = 0.1, relaxation_s = 0.3;  // share of the last increase that fades
-  Vec3 bias_n{0.4, -0.2, 0.9}, drift_n_s = Vec3::Zero();
-  double stiffens_at_m = 1e9;  // ten times
-  double slips_at_m = 1e9, loses_at_m = 1e9, yields_at_m = 1e9, refuses_at_m = 1e9;
-  double clock_s = 0, moved_s = -100, faded_n = 0;
-  Pose tip = Pose(Eigen::Translation3d(0, 0, 0.3));
-  bool stopped = false;
-  int errs_after_touch = 0;  // motions that end 2 mm short, from the first after the first touch on
-  double repeat_std_m = 0;   // every motion ends this far from where the encoders say
-  double unseen_m = 0;       // the last one's error, deeper
-  int images = 0;
-  double highest_n = 0;  // of the spring, as nobody reads it
-  bool camera_moves = false;
-  double breaks_beyond_m = 1e9;  // cannot be read any more
-  std::mt19937 generator{7};
-
-  double depth() const { return surface_m - tip.translation().z() + unseen_m; }
-  double spring() const {
-    if (depth() <= 0 || depth() > loses_at_m) return 0;
-    const double stiff_m = std::max(0.0, depth() - stiffens_at_m);
-    return stiffness_n_m * (depth() + 9 * stiff_m) * (depth() > yields_at_m ? 0.5 : 1.0);
-  }
-  RobotState read() override {
-    if (depth() > breaks_beyond_m) throw Error("no answer", "robot");
-    std::normal_distribution<double> noise(0, noise_n);
-    RobotState state;
-    state.time_s = clock_s;
-    state.joints_rad = {tip.translation().z(), 0.5};
-    state.T_base_tip = tip;
-    if (depth() > slips_at_m) state.T_base_tip.translation().x() += 0.004;
-    const double fading = depth() > 0 ? faded_n * std::exp(-(clock_s - moved_s) / relaxation_s) : 0;
-    state.force_n =
-        bias_n + clock_s * drift_n_s + Vec3(noise(generator), noise(generator), noise(generator) - (spring() > 0 ? spring() + fading : 0));
-    return state;
-  }
-  Motion move(const Pose& pose, double speed_m_s) override {
-    if (surface_m - pose.translation().z() > refuses_at_m) return Motion::refused;
-    const double before = spring();
-    const bool errs = before > 0 && errs_after_touch > 0;
-    clock_s += (pose.translation() - tip.translation()).norm() / speed_m_s;
-    tip = pose;
-    if (repeat_std_m > 0) unseen_m = std::normal_distribution<double>(0, repeat_std_m)(generator);
-    if (errs) {
-      tip.translation().z() += 0.002;
-      --errs_after_touch;
-    }
-    highest_n = std::max(highest_n, spring());
-    moved_s = clock_s;
-    faded_n = relaxation * std::max(0.0, spring() - before);
-    return Motion::done;
-  }
-  void stop() override { stopped = true; }
-  DepthFrame take_depth_image() override {
-    ++images;
-    DepthFrame frame;
-    frame.time_s = clock_s;
-    frame.depth_m = DepthImage::Constant(2, 2, float(depth()));
-    if (camera_moves) frame.T_base_camera.translation().x() = 1e-3 * images;
-    return frame;
-  }
-  void wait(double duration_s) override { clock_s += duration_s; }
-  double travel_sigma_m() const override { return sigma_m; }
-  double sigma_m = 3e-4;
-};
-
-PushPlan plan() {
-  PushPlan p;
-  p.name = "push 1";
-  p.tool = "stick";
-  p.contact_m = Vec3(0, 0, 0.102);  // expected 2 mm too high
-  return p;
-}
-
-PushOptions options() {
-  PushOptions o;
-  o.force_limit_n = 8;
-  o.travel_limit_m = 0.03;
-  return o;
-}
-
-struct Result {
-  PushReport report;
-  Push push;
-};
-
-Result run(SpringRobot& robot, const PushOptions& o = options(), const std::function<bool()>& keep_going = {},
-           const Push* so_far = nullptr) {
-  Result result;
-  result.report = run_push(
-      robot, plan(), o,
-      [&](const Push& push, const Step& step) {
-        std::vector<Step> steps = std::move(result.push.steps);
-        result.push = push;
-        result.push.steps = std::move(steps);
-        result.push.steps.push_back(step);
-      },
-      keep_going, so_far);
-  return result;
-}
 
 // Which motion crosses the target is decided by what the encoders do not see of it: its own travel would read too little,
 // by 0.17 mm here.
@@ -164,8 +59,6 @@ TEST(PushProtocol, NoStepIsRecordedTwiceWhereTheObjectStiffens) {
     EXPECT_GT(result.report.highest_force_n, limit_n - 1) << "the top is recorded, once";
   }
 }
-
-double force(const Step& step) { return step.loads.empty() ? 0 : -step.loads[0].force_n->z(); }
 
 TEST(PushProtocol, RisesStepByStepToTheForceLimitAndBack) {
   SpringRobot robot;
@@ -363,127 +256,6 @@ TEST(PushProtocol, UserStopsItWhileItRetreats) {
   EXPECT_EQ(result.push.steps.size(), 7u);
 }
 
-TEST(PushProtocol, TheStepAtTheLimitIsRecordedHoweverLowThatIs) {
-  for (const double limit_n : {0.4, 1.0, 1.9, 2.0, 3.0}) {
-    SpringRobot robot;
-    PushOptions o = options();
-    o.force_limit_n = limit_n;
-    const Result result = run(robot, o);
-    EXPECT_EQ(result.report.stop, StopReason::force_limit);
-    std::vector<double> loaded_n, back_n;
-    for (const Step& step : result.push.steps)
-      if (!step.loads.empty()) (step.unloading ? back_n : loaded_n).push_back(force(step));
-    ASSERT_EQ(loaded_n.size(), limit_n > 2 ? 2u : 1u) << limit_n;
-    EXPECT_NEAR(loaded_n.back(), limit_n, 0.15 * limit_n + 0.05);
-    for (const double f : back_n) EXPECT_LT(f, loaded_n.back());
-    EXPECT_LT(result.report.overshoot_n, 0.25) << "an increment and noise";
-  }
-  for (const double limit_m : {0.0004, 0.002}) {
-    SpringRobot robot;
-    PushOptions o = options();
-    o.travel_limit_m = limit_m;
-    const Result result = run(robot, o);
-    EXPECT_EQ(result.report.stop, StopReason::travel_limit);
-    int loaded = 0;
-    for (const Step& step : result.push.steps) loaded += !step.loads.empty() && !step.unloading;
-    EXPECT_EQ(loaded, 1) << limit_m;
-  }
-}
-
-// One increment is 50 N here. The first touch may come anywhere within one.
-TEST(PushProtocol, AStiffContactIsPressedNoFurtherThanTheLimit) {
-  for (const double stiffness_n_m : {5e3, 2e4, 1e5}) {
-    for (int k = 0; k < 25; ++k) {
-      SpringRobot robot;
-      robot.stiffness_n_m = stiffness_n_m;
-      robot.surface_m = 0.1 - 2e-5 * k;
-      robot.relaxation = 0;
-      robot.sigma_m = 2e-5;
-      const Result result = run(robot);
-      ASSERT_EQ(result.report.stop, StopReason::force_limit) << result.report.message;
-      const double touch_n = stiffness_n_m * 5e-4, shortest_n = stiffness_n_m * 1e-5;
-      EXPECT_LE(robot.highest_n, std::max(touch_n, 8 + 0.8 + shortest_n) + 1e-9) << stiffness_n_m << " " << k;
-      EXPECT_NEAR(result.report.overshoot_n, robot.highest_n > 8.1 ? robot.highest_n - 8 : 0, 0.2) << "and it is said";
-      std::vector<double> loaded_n, back_n;
-      for (const Step& step : result.push.steps) {
-        if (step.loads.empty()) continue;
-        (step.unloading ? back_n : loaded_n).push_back(force(step));
-        const double travel_m = std::get<ToolTravel>(step.observations.front()).travel_m;
-        EXPECT_NEAR(travel_m, force(step) / stiffness_n_m, 6e-5) << "a quarter of what is stated, " << stiffness_n_m << " " << k;
-      }
-      EXPECT_NEAR(loaded_n.back(), 8, 0.8 + shortest_n) << "settled at the limit, not beyond";
-      if (shortest_n > 0.5) continue;  // half a step in the shortest of all motions
-      ASSERT_EQ(loaded_n.size(), 4u) << stiffness_n_m << " " << k;
-      for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(loaded_n[i], 2 * (double(i) + 1) + 0.5, 0.6) << stiffness_n_m << " " << k;
-      EXPECT_EQ(back_n.size(), 2u) << stiffness_n_m << " " << k;
-    }
-  }
-}
-
-TEST(PushProtocol, EndsEvenWhereTheShortestMotionPassesTheLimit) {
-  for (int k = 0; k < 50; ++k) {
-    SpringRobot robot;
-    robot.stiffness_n_m = 5e5;
-    robot.surface_m = 0.1 - 1e-5 * k;
-    PushOptions o = options();
-    o.force_limit_n = 2.5;
-    int asked = 0;
-    const Result result = run(robot, o, [&] { return ++asked < 20000; });
-    ASSERT_EQ(result.report.stop, StopReason::force_limit) << k << ": " << result.report.message;
-    EXPECT_GT(result.report.overshoot_n, 0);
-  }
-}
-
-// The soft cover of something hard: only the motion that meets it goes beyond the limit, and the tip does not stay there.
-TEST(PushProtocol, WhereNothingAnnouncedTheForceItIsTakenBackAndSaid) {
-  struct Hard : SpringRobot {
-    RobotState read() override {
-      RobotState state = SpringRobot::read();
-      state.force_n.z() -= 1e5 * std::max(0.0, depth() - 0.0101);
-      return state;
-    }
-  } hard;
-  const Result result = run(hard);
-  EXPECT_EQ(result.report.stop, StopReason::force_limit);
-  EXPECT_NEAR(result.report.overshoot_n, result.report.highest_force_n - 8, 1e-9);
-  EXPECT_GT(result.report.overshoot_n, 10);
-  double top_n = 0;
-  for (const Step& step : result.push.steps) top_n = std::max(top_n, force(step));
-  EXPECT_NEAR(top_n, 8, 1.3);
-}
-
-// An arm that errs by several force steps a motion still records what it reached.
-TEST(PushProtocol, AStiffContactUnderAnArmThatErrsIsRecordedToo) {
-  for (unsigned seed = 1; seed <= 60; ++seed) {
-    SpringRobot robot;
-    robot.generator.seed(seed);
-    robot.stiffness_n_m = 2e4;
-    robot.repeat_std_m = 3e-4;
-    robot.relaxation = 0;
-    const Result result = run(robot);
-    if (result.report.stop != StopReason::force_limit) continue;  // lost again by an error: said
-    double top_n = 0;
-    for (const Step& step : result.push.steps) top_n = std::max(top_n, force(step));
-    EXPECT_GT(top_n, 7.8) << seed;
-    EXPECT_NEAR(result.report.overshoot_n, std::max(0.0, robot.highest_n - 8), 0.2) << seed;
-  }
-}
-
-TEST(PushProtocol, SoftObjectsAreFeltEveryIncrement) {
-  std::vector<double> depths_m;
-  struct Watched : SpringRobot {
-    std::vector<double>* out = nullptr;
-    Motion move(const Pose& pose, double speed_m_s) override {
-      out->push_back(surface_m - pose.translation().z());
-      return SpringRobot::move(pose, speed_m_s);
-    }
-  } watched;
-  watched.out = &depths_m;
-  EXPECT_LT(run(watched).report.overshoot_n, 0.25);
-  ASSERT_GT(depths_m.size(), 100u);
-  for (std::size_t i = 2; i + 1 < depths_m.size(); ++i) EXPECT_NEAR(std::abs(depths_m[i] - depths_m[i - 1]), options().increment_m, 1e-9) << i;
-}
-
 TEST(PushProtocol, WhateverBreaksTheTipGoesAway) {
   for (const double breaks_m : {-0.01, 0.002, 0.01}) {
     SpringRobot robot;
@@ -523,117 +295,6 @@ TEST(PushProtocol, ACameraThatMovedTellsNothingOfTheObject) {
   EXPECT_TRUE(seen.came_back);
   EXPECT_FALSE(unseen.compared);
   EXPECT_TRUE(unseen.came_back) << "nothing speaks against it";
-}
-
-Push killed_after(std::size_t steps, SpringRobot& robot) {
-  struct Killed {};
-  Push so_far;
-  try {
-    run_push(robot, plan(), options(), [&](const Push& push, const Step& step) {
-      if (so_far.steps.size() == steps) throw Killed{};
-      std::vector<Step> before = std::move(so_far.steps);
-      so_far = push;
-      so_far.steps = std::move(before);
-      so_far.steps.push_back(step);
-    });
-    ADD_FAILURE() << "was not killed";
-  } catch (const Killed&) {
-  }
-  EXPECT_EQ(so_far.steps.size(), steps);
-  return so_far;
-}
-
-TEST(PushProtocol, GoesOnAfterAKillAtEveryStep) {
-  SpringRobot whole_robot;
-  const Push whole = run(whole_robot).push;
-  for (std::size_t killed = 0; killed < whole.steps.size(); ++killed) {
-    SpringRobot robot;
-    Push so_far = killed_after(killed, robot);
-    SpringRobot fresh;
-    fresh.clock_s = robot.clock_s + 60;
-    const Result rest = run(fresh, options(), {}, &so_far);
-    EXPECT_EQ(rest.report.stop, StopReason::force_limit) << rest.report.message;
-    EXPECT_EQ(rest.report.steps, int(whole.steps.size() - killed));
-    EXPECT_GE(rest.report.highest_force_n, 7.8) << "of the whole push";
-    EXPECT_EQ(rest.report.drift.has_value(), killed + 1 < whole.steps.size()) << "nothing is left that a drift could spoil";
-    for (const Step& step : rest.push.steps) so_far.steps.push_back(step);
-    // The same steps as if nothing had happened, each once.
-    ASSERT_EQ(so_far.steps.size(), whole.steps.size()) << killed;
-    double time = -1;
-    for (std::size_t i = 0; i < whole.steps.size(); ++i) {
-      EXPECT_GT(so_far.steps[i].time_s, time) << killed;
-      time = so_far.steps[i].time_s;
-      EXPECT_EQ(so_far.steps[i].unloading, whole.steps[i].unloading) << killed;
-      EXPECT_EQ(so_far.steps[i].loads.empty(), whole.steps[i].loads.empty()) << killed;
-      EXPECT_NEAR(force(so_far.steps[i]), force(whole.steps[i]), 0.5) << killed << ", step " << i;
-    }
-  }
-  SpringRobot fresh;
-  const Result nothing = run(fresh, options(), {}, &whole);
-  EXPECT_EQ(nothing.report.steps, 0);
-  EXPECT_EQ(nothing.report.stop, StopReason::force_limit);
-  EXPECT_FALSE(nothing.report.compared);
-  EXPECT_LT(fresh.highest_n, 1e-9) << "nobody touched it";
-}
-
-// The sensor's zero is another one after the pause, and the first touch falls elsewhere within an increment: all steps of the
-// push still lie on one line within what the push states once for all of them, and each for itself.
-TEST(PushProtocol, WhatGoesOnHasTheOffsetsOfWhatIsRecorded) {
-  double between = 0;
-  constexpr int seeds = 60;
-  for (unsigned seed = 1; seed <= seeds; ++seed) {
-    SpringRobot robot;
-    robot.generator.seed(seed);
-    robot.relaxation = 0;
-    Push push = killed_after(3 + seed % 4, robot);
-    const std::size_t cut = push.steps.size();
-    SpringRobot later;
-    later.generator.seed(1000 + seed);
-    later.relaxation = 0;
-    later.clock_s = robot.clock_s + 600;
-    later.bias_n += Vec3(0.5, -0.3, 1.0);
-    PushOptions o = options();
-    o.start_distance_m += 1e-5 * seed;
-    const Result rest = run(later, o, {}, &push);
-    ASSERT_EQ(rest.report.stop, StopReason::force_limit) << rest.report.message;
-    EXPECT_LT((rest.report.tare_n - later.bias_n).norm(), 0.02);
-    double lowest_m = 1, highest_m = -1, sum[2] = {0, 0}, variance[2] = {0, 0}, count[2] = {0, 0};
-    for (const Step& step : rest.push.steps) push.steps.push_back(step);
-    for (std::size_t i = 0; i < push.steps.size(); ++i) {
-      const Step& step = push.steps[i];
-      if (step.loads.empty()) continue;
-      const double depth_m = 0.1 - step.T_base_tip->translation().z();
-      const double zero_m = std::get<ToolTravel>(step.observations.front()).travel_m - depth_m;
-      lowest_m = std::min(lowest_m, zero_m);
-      highest_m = std::max(highest_m, zero_m);
-      const int part = i >= cut;
-      sum[part] += force(step) - 400 * depth_m;
-      variance[part] += std::pow(step.loads[0].force_std_n, 2);
-      ++count[part];
-    }
-    EXPECT_LT(highest_m - lowest_m, 1e-12) << "one zero of the travel";
-    EXPECT_EQ(rest.push.travel_offset_std_m, push.travel_offset_std_m);
-    ASSERT_GT(count[0] * count[1], 0);
-    const double difference_n = sum[1] / count[1] - sum[0] / count[0];
-    between += std::pow(difference_n, 2) / (variance[0] / std::pow(count[0], 2) + variance[1] / std::pow(count[1], 2));
-  }
-  // Not more than what is stated; somewhat less, for a push that goes on does not know how many steps will follow.
-  EXPECT_LT(std::sqrt(between / seeds), 1.2);
-  EXPECT_GT(std::sqrt(between / seeds), 0.5);
-}
-
-TEST(PushProtocol, WhatMovedInThePauseIsNotPushedAsIfItHadNot) {
-  SpringRobot robot;
-  const Push so_far = killed_after(3, robot);
-  SpringRobot later;
-  later.clock_s = robot.clock_s + 600;
-  later.surface_m -= 0.004;
-  const Result rest = run(later, options(), {}, &so_far);
-  EXPECT_EQ(rest.report.stop, StopReason::moved);
-  EXPECT_THAT(rest.report.message, testing::HasSubstr("mm deeper than in the part that is recorded"));
-  ASSERT_EQ(rest.push.steps.size(), 1u);
-  EXPECT_TRUE(rest.push.steps[0].loads.empty());
-  EXPECT_LT(later.depth(), 0);
 }
 
 TEST(PushProtocol, BadOptionsAndPlansAreRefused) {
