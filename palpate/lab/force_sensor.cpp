@@ -81,7 +81,8 @@ ForceSensor::ForceSensor(const ForceSensorOptions& options, Random& once, Random
 Vec3 ForceSensor::read(const Vec3& true_force_n, const Mat3& R_base_sensor, double time_s, Random& noise) const {
   // A reaction on the tool is the force on the object with the other sign; drivers turn it round, and so the weight too.
   const Vec3 weight_n(0, 0, 9.81 * options_.tool_mass_kg);
-  Vec3 force = scale_ * (gain_ * (R_base_sensor.transpose() * (true_force_n + weight_n))) + bias_n_ + drift_n_s_ * time_s + options_.sigma_n * noise.normal3();
+  const Vec3 along_axes = R_base_sensor.transpose() * (true_force_n + weight_n);
+  const Vec3 force = scale_ * (gain_ * along_axes) + bias_n_ + drift_n_s_ * time_s + options_.sigma_n * noise.normal3();
   const double across_n = options_.range_n;
   return as_read(force, options_.unit_n, Vec3(across_n, across_n, options_.range_along_n));
 }
