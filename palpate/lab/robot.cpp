@@ -157,13 +157,16 @@ struct LabRobot::Impl {
     for (int k = 0; k < 60; ++k) (needs(0.5 * (low + high)) < reach_m ? low : high) = 0.5 * (low + high);
     return 0.5 * (low + high);
   }
+  // Of a force that is no higher than the present travel's.
+  double depth_that_bears_m(double force_n) {
+    double low = 0, high = travel();
+    for (int k = 0; k < 60; ++k) (curve().force_n(curve().at(0.5 * (low + high))) < force_n ? low : high) = 0.5 * (low + high);
+    return low;
+  }
   void slide() {
     const double share = sideways().norm(), most_n = share > 1e-9 ? options.slides_at_n / share : 1e300;
     if (travel() <= 0 || curve().force_n(curve().at(travel())) <= most_n) return;
-    double low = 0, high = travel();
-    for (int k = 0; k < 60; ++k)
-      (curve().force_n(curve().at(0.5 * (low + high))) < most_n ? low : high) = 0.5 * (low + high);
-    const double bears_m = low + options.compliance_m_per_n * most_n;
+    const double bears_m = depth_that_bears_m(most_n) + options.compliance_m_per_n * most_n;
     slid_m += (reach() - bears_m) / (share * share) * sideways();
   }
   double travel() { return travel_at(reach()); }
@@ -186,13 +189,8 @@ struct LabRobot::Impl {
   // How the object looks now: as deep as it bears the force.
   TriMesh shape() {
     TriMesh out = object.surface;
-    if (double low = 0, high = travel(); high > 0) {
-      if (slipped()) {
-        const double bears_n = force();
-        for (int k = 0; k < 60; ++k) (curve().force_n(curve().at(0.5 * (low + high))) < bears_n ? low : high) = 0.5 * (low + high);
-      }
-      out = curve().surface(curve().at(high));
-    }
+    if (const double deep_m = travel(); deep_m > 0)
+      out = curve().surface(curve().at(slipped() ? depth_that_bears_m(force()) : deep_m));
     out.vertices_m.rowwise() += slid_m.transpose();
     return out;
   }
