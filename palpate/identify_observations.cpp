@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/estimation/grazing.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
@@ -90,7 +91,8 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
           }
           terms.push_back(estimation::RayObservation{thinned_rays(masked), frame->pose_std_m, frame->pose_std_rad,
                                                      frame->noise.bias_std_m, sensing::lens_scatter(*frame), cameras[frame_number++],
-                                                     frame->T_base_camera.linear()});
+                                                     frame->T_base_camera.linear(),
+                                                     estimation::outline_margin_px / std::min(frame->camera.fx_px, frame->camera.fy_px)});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
           terms.push_back(*cloud);
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {

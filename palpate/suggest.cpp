@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/grazing.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
@@ -100,6 +101,7 @@ std::optional<estimation::RayObservation> rays_of(DepthFrame camera, const TriMe
   view.pose_std_m = camera.pose_std_m;
   view.pose_std_rad = camera.pose_std_rad;
   view.bias_std_m = camera.noise.bias_std_m;
+  view.outline_margin_rad = estimation::outline_margin_px / std::min(camera.camera.fx_px, camera.camera.fy_px);
   return view;
 }
 

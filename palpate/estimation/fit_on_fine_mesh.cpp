@@ -29,8 +29,9 @@ std::string mesh_words(const SimulatedObject& object) {
 }
 
 struct Excess {
-  double young = 0;  // share of E
-  double share = 0;  // of what is borne
+  double young = 0;        // share of E
+  double young_share = 0;  // of what is borne of it
+  double share = 0;        // the same of E or nu, whichever bears it less
 };
 
 /// Small strains, which are asked what a mesh does, have said less than half of it where strains were large
@@ -39,8 +40,9 @@ double share_borne(const SimulatedObject& object) {
   return fem::material_law(object.material).is_linear() ? 1 : 0.35;
 }
 
-/// Of what a mesh does to E, in the region that bears it least.
-/// @param tolerance  what is borne of E where the change is told right
+/// Of what a mesh does to E, in the region that bears it least, and to nu. Small meshes of a bar put nu off by its standard deviation
+/// and E by a tenth of its own.
+/// @param tolerance  what is borne of E (a share) and of nu where the change is told right
 /// @param borne      share of that which is borne
 Excess most_excess(const MeshDoubt& found, const AnswerShift& by_mesh, double tolerance, double borne) {
   constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
@@ -48,8 +50,9 @@ Excess most_excess(const MeshDoubt& found, const AnswerShift& by_mesh, double to
   for (std::size_t r = 0; r < found.young_std.size(); ++r) {
     const double young = std::abs(by_mesh.of_region(static_cast<Index>(r)).log_young);
     const double share = young / (borne * std::max(tolerance, hardly * found.young_std[r]));
-    if (share > most.share) most = {young, share};
+    if (share > most.young_share) most.young = young, most.young_share = share;
   }
+  most.share = std::max(most.young_share, std::abs(by_mesh.poisson) / (borne * std::max(tolerance, hardly * found.poisson_std)));
   return most;
 }
 
@@ -108,7 +111,7 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
     bool too_coarse = false;
     fit_options.take_finer = [&](const MeshDoubt& found) -> const FinerMesh* {
       const Excess excess = most_excess(found, found.shift, mesh_tolerance, share_borne(object));
-      too_coarse = share_borne(object) * excess.share > 1;
+      too_coarse = share_borne(object) * excess.young_share > 1;
       if (excess.share <= 1 || refinements == most_refinements) return nullptr;
       const FinerModel& shows = taken.empty() ? *finer : *taken.back().finer;
       const Recording& at = taken.empty() ? recording : taken.back().mesh.recording;

@@ -205,6 +205,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   if (earlier && !contact_ && solved_->holds_for(*earlier)) {
     solved_->bodies = std::move(earlier->bodies);
     solved_->rest_tree = earlier->rest_tree;
+    solved_->surface_edges = earlier->surface_edges;
     for (auto& bodies : solved_->bodies) {
       for (const auto& push : recording.pushes) drop_if_unfit(bodies, push);
     }
@@ -256,6 +257,12 @@ const Tool& ForwardModel::tool(const std::string& name) const {
 std::shared_ptr<const geometry::TriangleTree> ForwardModel::rest_tree() const {
   if (!solved_->rest_tree) solved_->rest_tree = std::make_shared<const geometry::TriangleTree>(object_.surface.rest());
   return solved_->rest_tree;
+}
+
+std::shared_ptr<const std::vector<geometry::SurfaceEdge>> ForwardModel::surface_edges() const {
+  if (!solved_->surface_edges)
+    solved_->surface_edges = std::make_shared<const std::vector<geometry::SurfaceEdge>>(geometry::surface_edges(object_.surface.rest().triangles));
+  return solved_->surface_edges;
 }
 
 void ForwardModel::forget_steps() {

@@ -16,6 +16,7 @@
 #include "palpate/estimation/surface_field.hpp"
 #include "palpate/estimation/unknowns.hpp"
 #include "palpate/fem/response.hpp"
+#include "palpate/geometry/surface_edges.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
@@ -121,6 +122,7 @@ class ForwardModel {
   const SimulatedObject& object() const { return object_; }
   /// Of the surface at rest, made when it is first asked for (by one thread): others copy it.
   std::shared_ptr<const geometry::TriangleTree> rest_tree() const;
+  std::shared_ptr<const std::vector<geometry::SurfaceEdge>> surface_edges() const;  ///< the same
 
   /// Solves step s. Starts from the last solution of this step, moved along its derivatives to the new unknowns.
   /// @param derivatives  false: surface, readings and converged only (the paper's method differentiates numerically)

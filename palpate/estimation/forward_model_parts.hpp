@@ -84,6 +84,7 @@ struct ForwardModel::Solved {
   std::unique_ptr<SurfaceField> field;
   double field_std_m = 0, field_correlation_m = 0;
   std::shared_ptr<const geometry::TriangleTree> rest_tree;  ///< of the surface, once somebody asked
+  std::shared_ptr<const std::vector<geometry::SurfaceEdge>> surface_edges;  ///< the same
 };
 
 struct ForwardModel::Coefficients {

@@ -16,6 +16,7 @@ constexpr double rays_per_cell = 1;
 constexpr double most_cells = 1 << 20;
 constexpr double finest = 1e6;   // cells a unit of slope
 constexpr double margin = 1e-6;  // cells: far more than rounding moves a vertex or a ray by, of the finest too
+constexpr double steepest = 4;   // fall of a surface beside its outline: seen at 76 degrees
 constexpr float lower = 1 - 1e-6F, higher = 1 + 1e-6F;
 
 float to_float(double positive) { return static_cast<float>(std::min(positive, 1e38)); }
@@ -161,6 +162,31 @@ struct RayBundle::Drawing {
     depth[k] = to_float(best.range_m * bundle.ahead_[k]) * higher;
   }
 
+  /// Marks the rays that hit within some cells of the line between two vertices, where it is no further than what they hit.
+  void mark_beside(const SurfaceEdge& edge, double cells, double margin, const std::vector<RayHit>& met, std::vector<char>& marked) const {
+    const Corner &a = corners[static_cast<std::size_t>(edge.from)], &b = corners[static_cast<std::size_t>(edge.to)];
+    const double top = std::min(a.v, b.v) - cells, bottom = std::max(a.v, b.v) + cells;
+    const double left = std::min(a.u, b.u) - cells, right = std::max(a.u, b.u) + cells;
+    const Index columns = bundle.columns_, rows = bundle.rows_;
+    if (right < 0 || bottom < 0 || left > static_cast<double>(columns) || top > static_cast<double>(rows)) return;
+    const double du = b.u - a.u, dv = b.v - a.v, squared = du * du + dv * dv;
+    const Index from = cell_of(left, columns), to = cell_of(right, columns) + 1, last = cell_of(bottom, rows);
+    for (Index row = cell_of(top, rows); row <= last; ++row) {
+      const auto end = static_cast<std::size_t>(bundle.first_[static_cast<std::size_t>(row * columns + to)]);
+      for (auto k = static_cast<std::size_t>(bundle.first_[static_cast<std::size_t>(row * columns + from)]); k < end; ++k) {
+        const auto ray = static_cast<std::size_t>(bundle.ray_[k]);
+        if (marked[ray] != 0 || met[ray].triangle < 0) continue;
+        const double u = bundle.u_[k] - a.u, v = bundle.v_[k] - a.v;
+        const double share = squared > 0 ? std::clamp((u * du + v * dv) / squared, 0.0, 1.0) : 0;
+        const double beside = std::hypot(u - share * du, v - share * dv);
+        if (beside > cells) continue;
+        // The edge of the very surface that is hit lies further away by what that surface falls on the way to it.
+        const double hit_m = met[ray].range_m * bundle.ahead_[k], edge_m = a.depth + share * (b.depth - a.depth);
+        if (edge_m <= hit_m * (1 + steepest * margin)) marked[ray] = 1;
+      }
+    }
+  }
+
   const Corner& corner(Index triangle, int k) const { return corners[static_cast<std::size_t>(triangles(triangle, k))]; }
 };
 
@@ -181,6 +207,22 @@ std::optional<std::vector<RayHit>> RayBundle::meet(const Points& vertices_m, con
   }
   for (Index t : averted) drawing.draw(t);
   return std::move(drawing.hits);
+}
+
+std::optional<std::vector<char>> RayBundle::beside_outline(const Points& vertices_m, const Triangles& triangles,
+                                                           const std::vector<SurfaceEdge>& edges, const Vec3& eye_m, const Mat3& turn,
+                                                           const std::vector<RayHit>& hits, double margin_rad) const {
+  if (!in_view_ || !turn.allFinite()) return std::nullopt;
+  Drawing drawing(*this, vertices_m, triangles, eye_m, turn);
+  if (!drawing.look()) return std::nullopt;
+  std::vector<char> facing(static_cast<std::size_t>(triangles.rows())), marked(hits.size(), 0);
+  for (Index t = 0; t < triangles.rows(); ++t) facing[static_cast<std::size_t>(t)] = drawing.faces_eye(t);
+  const auto faces = [&](Index t) { return facing[static_cast<std::size_t>(t)]; };
+  for (const SurfaceEdge& edge : edges) {
+    const auto& [one, other] = edge.triangles;
+    if (other < 0 || faces(one) != faces(other)) drawing.mark_beside(edge, margin_rad * cells_per_slope_, margin_rad, hits, marked);
+  }
+  return marked;
 }
 
 }  // namespace palpate::geometry

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "palpate/geometry/surface_edges.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::geometry {
@@ -26,6 +27,16 @@ class RayBundle {
   ///          then a tree must be asked
   std::optional<std::vector<RayHit>> meet(const Points& vertices_m, const Triangles& triangles, const Vec3& eye_m, const Mat3& turn,
                                           const std::vector<char>& skipped = {}) const;
+
+  /// Rays that pass an outline closely: an edge between a triangle that faces the eye and one that does not, or where the surface
+  /// ends, unless it lies behind what the ray meets. There a camera's pixel mixes both sides.
+  /// @param edges  of the triangles (surface_edges)
+  /// @param hits   what meet() said of the same surface
+  /// @param margin_rad  how closely; small
+  /// @returns a ray each, nonzero for those that hit and lie so; nothing where meet() would say nothing
+  std::optional<std::vector<char>> beside_outline(const Points& vertices_m, const Triangles& triangles,
+                                                  const std::vector<SurfaceEdge>& edges, const Vec3& eye_m, const Mat3& turn,
+                                                  const std::vector<RayHit>& hits, double margin_rad) const;
 
  private:
   struct Drawing;

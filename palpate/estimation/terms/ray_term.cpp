@@ -24,15 +24,17 @@ constexpr double steepest_cosine = 0.17;  // a ray that counts may come to a fac
 
 class RayTerm : public Term {
  public:
-  RayTerm(const RayObservation& observation, std::shared_ptr<const geometry::TriangleTree> rest, int pose, int camera, int bias, int scatter)
+  RayTerm(const RayObservation& observation, const ForwardModel& model, int pose, int camera, int bias, int scatter)
       : rays_(observation.rays),
+        outline_margin_rad_(observation.outline_margin_rad),
         lens_(observation.scatter.value_or(LensScatter{})),
         R_base_camera_(observation.R_base_camera),
         pose_(pose),
         camera_(camera),
         bias_(bias),
         scatter_(scatter),
-        rest_tree_(std::move(rest)),
+        rest_tree_(model.rest_tree()),
+        edges_(outline_margin_rad_ > 0 ? model.surface_edges() : nullptr),
         rest_(rest_tree_->mesh()),
         hints_(static_cast<std::size_t>(rays_.range_m.size()), -1) {
     centre_m_ = rest_.vertices_m.colwise().mean();
@@ -85,7 +87,7 @@ class RayTerm : public Term {
         if (const auto hit = cast(sight, predicted.surface_m, i, origin_m, direction)) {
           const Vec3 normal = face_normal(predicted.surface_m, hit->triangle);
           const double cosine = normal.dot(direction);
-          rows.facing(i) = std::abs(cosine) / grazing_cosine;
+          rows.facing(i) = sight.facing(i, cosine);
           if (chosen || rows.facing(i) > 1) {
             triangle = hit->triangle;
             barycentric = hit->barycentric;
@@ -187,7 +189,12 @@ class RayTerm : public Term {
     RigidMap frame, camera;
     Mat3 rotation;
     std::optional<std::vector<geometry::RayHit>> hits = {};  ///< a ray that counts; nothing: the tree is asked
-    const geometry::TriangleTree* tree = nullptr;            ///< once somebody asked
+    std::vector<char> beside_outline = {};  ///< a ray, while none was chosen: not to count; empty: none
+    const geometry::TriangleTree* tree = nullptr;  ///< once somebody asked
+    double facing(Index ray, double cosine) const {
+      const double steep = std::abs(cosine) / grazing_cosine;
+      return !beside_outline.empty() && beside_outline[static_cast<std::size_t>(ray)] != 0 ? std::min(steep, 0.5) : steep;
+    }
     Vec3 place(const Vec3& seen_m) const { return frame.apply(camera.apply(seen_m)); }
   };
   Sight look(const Points& surface_m, const VectorX& unknowns, const TermView& view) const {
@@ -198,8 +205,17 @@ class RayTerm : public Term {
     if (view.chosen != nullptr)
       for (const char choice : *view.chosen) skipped.push_back(choice != counts_in);
     if (!bundle_) bundle_.emplace(rays_.directions);
-    out.hits = bundle_->meet(surface_m, rest_.triangles, out.place(rays_.origins_m.row(0)), out.rotation, skipped);
+    const Vec3 eye_m = out.place(rays_.origins_m.row(0));
+    out.hits = bundle_->meet(surface_m, rest_.triangles, eye_m, out.rotation, skipped);
+    if (out.hits && view.chosen == nullptr && outline_margin_rad_ > 0) leave_outline(out, surface_m, eye_m);
     return out;
+  }
+  void leave_outline(Sight& sight, const Points& surface_m, const Vec3& eye_m) const {
+    auto beside = bundle_->beside_outline(surface_m, rest_.triangles, *edges_, eye_m, sight.rotation, *sight.hits, outline_margin_rad_);
+    if (!beside) return;
+    const auto hit = std::count_if(sight.hits->begin(), sight.hits->end(), [](const auto& one) { return one.triangle >= 0; });
+    // What is a few pixels wide has nothing else to say.
+    if (2 * std::count(beside->begin(), beside->end(), 1) < hit) sight.beside_outline = std::move(*beside);
   }
   const geometry::TriangleTree& tree_of(Sight& sight, const Points& surface_m) const {
     if (sight.tree == nullptr) {
@@ -263,7 +279,7 @@ class RayTerm : public Term {
       Index& facet = facet_of[static_cast<std::size_t>(hit->triangle)];
       if (facet < 0) facet = add_facet(predicted.surface_m, hit->triangle, sight, facets);
       const double cosine = facets.normal.row(facet).dot(direction);
-      rows.facing(i) = std::abs(cosine) / grazing_cosine;
+      rows.facing(i) = sight.facing(i, cosine);
       if (!chosen && !(rows.facing(i) > 1)) continue;
       const double along = 1 / (std::copysign(std::max(std::abs(cosine), steepest_cosine), cosine) * rays_.sigma_m(i));
       facets.facet[static_cast<std::size_t>(i)] = facet;
@@ -360,6 +376,7 @@ class RayTerm : public Term {
   }
 
   RayCloud rays_;
+  double outline_margin_rad_ = 0;
   LensScatter lens_;
   Mat3 R_base_camera_;
   int pose_, camera_;
@@ -368,6 +385,7 @@ class RayTerm : public Term {
   double typical_ = 0;
   bool one_eye_ = false;  // all rays start at one point
   std::shared_ptr<const geometry::TriangleTree> rest_tree_;
+  std::shared_ptr<const std::vector<geometry::SurfaceEdge>> edges_;  // nullptr: rays beside the outline count
   const TriMesh& rest_;
   mutable std::optional<geometry::RayBundle> bundle_;   // of rays of one eye
   mutable std::optional<geometry::TriangleTree> tree_;  // rays of one eye need none
@@ -396,7 +414,7 @@ std::unique_ptr<Term> make_ray_term(const RayObservation& observation, const Ter
   }
   const int pose = add_frame_pose(context, observation.pose_std_m, observation.pose_std_rad);
   const int camera = add_camera_pose(context, observation.camera, observation.pose_std_m, observation.pose_std_rad);
-  return std::make_unique<RayTerm>(observation, context.model.rest_tree(), pose, camera, bias, scatter);
+  return std::make_unique<RayTerm>(observation, context.model, pose, camera, bias, scatter);
 }
 
 }  // namespace palpate::estimation

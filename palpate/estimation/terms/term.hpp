@@ -29,6 +29,9 @@ struct RayObservation {
   /// that carries the camera in the other, and the images tell which.
   std::string camera = {};
   Mat3 R_base_camera = Mat3::Identity();
+  /// Rays that pass the simulated object's outline more closely than this do not count: their pixels may mix it with what is
+  /// behind, or be those that their mixed neighbours left. 0: all count.
+  double outline_margin_rad = 0;
 };
 
 using TermInput = std::variant<RayObservation, PointCloud, Markers, ToolTravel, Wrench>;
