@@ -11,6 +11,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_formats.hpp"
 #include "palpate/io/file.hpp"
+#include "palpate/io/sqlite_log.hpp"
 #include "palpate/io/unpack.hpp"
 #include "palpate/io/yaml_field.hpp"
 
@@ -129,12 +130,19 @@ MessageSource read_bag_file(const fs::path& path) {
     if (!unpacked) throw Error("is damaged: it cannot be unpacked", path.string());
     bytes = std::move(*unpacked);
   }
-  MessageSource source = with_unpacked_messages(parse_bag(std::move(bytes), path.string()));
-  // A database that was not closed: its last messages lie beside it.
+  // A database that was not closed: its last messages, or all of them, lie beside it.
   const fs::path log = path.string() + "-wal";
+  const std::string log_name = "'" + log.filename().string() + "'";
+  std::vector<std::string> warnings;
   std::error_code code;
-  if (fs::exists(log, code) && fs::file_size(log, code) > 0)
-    source.warnings.push_back("what is in '" + log.filename().string() + "' is not read; open the file once with sqlite3 to fold it in");
+  if (fs::exists(log, code) && fs::file_size(log, code) > 0) {
+    const auto left = fold_in_log(bytes, read_file(log));
+    warnings.push_back(left ? "the database was not closed by its recorder: what is in " + log_name + " is read as well" +
+                                  (*left > 0 ? ", but for its last " + std::to_string(*left) + " bytes, which are no whole transaction" : "")
+                            : "what is in " + log_name + " is not read: it is no write-ahead log, or its beginning is damaged");
+  }
+  MessageSource source = with_unpacked_messages(parse_bag(std::move(bytes), path.string()));
+  source.warnings.insert(source.warnings.end(), warnings.begin(), warnings.end());
   return source;
 }
 

@@ -209,15 +209,6 @@ TEST(Bags, ADatabaseThatWasLeftInWriteAheadModeIsRead) {
   EXPECT_EQ(parse_bag(bytes, "a").messages.size(), 25u);
 }
 
-TEST(Bags, WhatLiesBesideADatabaseThatWasNotClosedIsSaid) {
-  const TemporaryFolder folder("bag_wal");
-  folder.put("x.db3", sqlite_bytes(mixed(50)));
-  EXPECT_TRUE(read_bag(folder.path() / "x.db3").warnings.empty());
-  folder.put("x.db3-wal", "pages");
-  for (const auto& path : {folder.path() / "x.db3", folder.path()})
-    EXPECT_THAT(read_bag(path).warnings, testing::Contains(HasSubstr("'x.db3-wal' is not read"))) << path;
-}
-
 /// A recorder that was cut off leaves its last file empty, or with nothing but its first bytes.
 TEST(Bags, AnEmptyFileOfAFolderCostsNothingElse) {
   for (const char* last : {"", "\x89MCAP0\r\n"}) {
