@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <set>
 
 #include "palpate/acquisition/force_track.hpp"
+#include "palpate/acquisition/repeated_notes.hpp"
 #include "palpate/acquisition/step_force.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
@@ -28,11 +30,6 @@ struct PushTimes {
   std::vector<StepTime> steps;
   const ContactSpan* span = nullptr;
 };
-
-std::string seconds(double value) {
-  std::string text = std::to_string(value);
-  return text.substr(0, text.find('.') + 4) + " s";
-}
 
 std::string newtons(double value) {
   const std::string text = std::to_string(value);
@@ -59,6 +56,7 @@ class Assembly {
     track_ = track_of(plan_, streams_, tree_, wrench_offset_s_);
     spans_ = find_contacts(track_, plan_);
     for (const PushTimes& push : pushes()) add_push(push);
+    for (std::string& note : of_steps_.texts()) out_.notes.push_back(std::move(note));
     if (out_.recording.pushes.empty())
       throw Error("no step could be made; check times, topics and clocks with `palpate info`", plan_.source + ": steps");
     return std::move(out_);
@@ -179,8 +177,8 @@ class Assembly {
       const double begin = track_.samples[span.begin].time_s, end = track_.samples[span.end - 1].time_s;
       const auto still = find_still_times(track_, span, plan_);
       if (still.empty()) {
-        out_.notes.push_back("contact at " + seconds(begin) + " to " + seconds(end) + ": the tool never stood still for " +
-                             seconds(plan_.hold_s) + ", so that no step was taken there (steps.hold_s, steps.still_m_s)");
+        out_.notes.push_back("contact at " + seconds_text(begin) + " to " + seconds_text(end) + ": the tool never stood still for " +
+                             seconds_text(plan_.hold_s) + ", so that no step was taken there (steps.hold_s, steps.still_m_s)");
         continue;
       }
       const double before = begin - 0.5 * plan_.tare_s, after = end + plan_.tare_s;
@@ -188,8 +186,7 @@ class Assembly {
       if (before > track_.samples.front().time_s) push.steps.push_back({before, false, false});
       for (const StillTime& one : still) {
         push.steps.push_back({one.time_s, true, {}});
-        if (!one.settled)
-          out_.notes.push_back(push.plan.name + ": the force still crept in the step at " + seconds(one.time_s));
+        if (!one.settled) of_steps_.add(push.plan.name + ": the force still crept in", one.time_s);
       }
       if (after < next) push.steps.push_back({after, false, true});
       all.push_back(std::move(push));
@@ -256,8 +253,7 @@ class Assembly {
       const bool on_its_way = force && !force->rate_n_s.isZero(0);
       const auto tip = tree_.lookup(plan_.base_frame, plan_.tip_frame, on_its_way ? seen_s : at.time_s);
       if (!force && at.loaded.value_or(true)) {
-        out_.notes.push_back(push.name + ": no force within " + seconds(plan_.window_s) + " before " + seconds(at.time_s) +
-                             ": step left out");
+        of_steps_.add(push.name + ": no force within " + seconds_text(plan_.window_s) + " before", at.time_s, ": left out");
         continue;
       }
       if (direction.norm() == 0 && touches) {
@@ -270,7 +266,7 @@ class Assembly {
       }
       Step step;
       step.time_s = at.time_s;
-      step.source = plan_.source + ": " + push.name + " at " + seconds(at.time_s);
+      step.source = plan_.source + ": " + push.name + " at " + seconds_text(at.time_s);
       step.T_base_tip = tip;
       step.joints_rad = joints_of(at.time_s);
       const Vec3 drifted = drift.at(at.time_s);
@@ -310,7 +306,7 @@ class Assembly {
                            std::to_string(loaded_steps) + " loaded steps; the last one stands for those that follow");
     if (!moving.empty())
       out_.notes.push_back(push.name + ": the force was changing in " + std::to_string(moving.size()) +
-                           (moving.size() == 1 ? " step" : " steps") + ", the first at " + seconds(moving.front()) +
+                           (moving.size() == 1 ? " step" : " steps") + ", the first at " + seconds_text(moving.front()) +
                            "; taken at the time of the image, with its rate" +
                            (out_.recording.time_offset_std_s > 0
                                 ? ""
@@ -348,20 +344,29 @@ class Assembly {
     return best;
   }
 
+  static double smallest_gap_s(const std::vector<double>& times, double offset_s, double time_s) {
+    double gap_s = std::numeric_limits<double>::infinity();
+    for (const double one : times) gap_s = std::min(gap_s, std::abs(one + offset_s - time_s));
+    return gap_s;
+  }
+
   void look(Step& step) {
     for (std::size_t c = 0; c < streams_.cameras.size(); ++c) {
       const DepthStream& camera = streams_.cameras[c];
       const auto image = nearest(camera.times_s, camera_offset_s_[c], step.time_s, used_images_[c]);
       if (!image) {
-        out_.notes.push_back(camera.name + ": no image within " + seconds(plan_.image_gap_s) + " of the step at " +
-                             seconds(step.time_s));
+        const double gap_s = smallest_gap_s(camera.times_s, camera_offset_s_[c], step.time_s);
+        if (gap_s < plan_.image_gap_s)
+          of_steps_.add(camera.name + ": its image belongs to another step already; none is left for", step.time_s);
+        else
+          of_steps_.add(camera.name + ": no image within " + seconds_text(plan_.image_gap_s) + " of", step.time_s, "", gap_s);
         continue;
       }
       DepthFrame frame = camera.like;
       frame.time_s = camera.times_s[*image] + camera_offset_s_[c];
       const auto pose = pose_of(camera.frame, frame.time_s);
       if (!pose) {
-        out_.notes.push_back(camera.name + ": its pose is not known at " + seconds(frame.time_s));
+        of_steps_.add(camera.name + ": its pose is not known at the time of the image of", step.time_s);
         continue;
       }
       frame.T_base_camera = *pose;
@@ -369,13 +374,12 @@ class Assembly {
         frame.depth_m = camera.image(*image);
         if (camera.mask) frame.mask = camera.mask(*image);
       } catch (const Error& error) {
-        out_.notes.push_back(camera.name + ": the image of the step at " + seconds(step.time_s) +
-                             " cannot be used: " + error.message());
+        of_steps_.add(camera.name + ": the image cannot be used of", step.time_s, ": " + error.message());
         continue;
       }
       const auto& robot = plan_.recording.robot;
       if (camera.mask_robot.value_or(robot && sensing::has_shapes(*robot) && !streams_.joints.empty()))
-        frame = without_robot(std::move(frame));
+        frame = without_robot(std::move(frame), step.time_s);
       frame.robot_is_masked = true;  // or it is not to be
       step.observations.emplace_back(std::move(frame));
     }
@@ -384,7 +388,7 @@ class Assembly {
       const auto number = nearest(stream.times_s, cloud_offset_s_, step.time_s, used_clouds_[c]);
       const auto pose = number ? pose_of(stream.frame, stream.times_s[*number] + cloud_offset_s_) : std::nullopt;
       if (!pose) {
-        out_.notes.push_back(stream.name + ": no cloud with a known pose near the step at " + seconds(step.time_s));
+        of_steps_.add(stream.name + ": no cloud with a known pose near", step.time_s);
         continue;
       }
       try {
@@ -395,8 +399,7 @@ class Assembly {
         cloud.pose_std_rad = stream.pose_std_rad;
         step.observations.emplace_back(std::move(cloud));
       } catch (const Error& error) {
-        out_.notes.push_back(stream.name + ": the cloud of the step at " + seconds(step.time_s) +
-                             " cannot be used: " + error.message());
+        of_steps_.add(stream.name + ": the cloud cannot be used of", step.time_s, ": " + error.message());
       }
     }
   }
@@ -418,7 +421,7 @@ class Assembly {
     return positions;
   }
 
-  DepthFrame without_robot(DepthFrame frame) {
+  DepthFrame without_robot(DepthFrame frame, double step_s) {
     if (!plan_.recording.robot)
       throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description",
                   plan_.source + ": topics.depth");
@@ -435,10 +438,10 @@ class Assembly {
     if (missing != free.end() || !base) {
       const auto& heard = streams_.joint_names;
       const bool is_heard = base && std::find(heard.begin(), heard.end(), *missing) != heard.end();
-      out_.notes.push_back("the robot is not masked at " + seconds(frame.time_s) + ": " +
-                           (is_heard ? "there is no joint state near that time"
-                            : base   ? "its joint '" + *missing + "' is not in the joint states"
-                                     : "the pose of '" + root + "' is not known"));
+      of_steps_.add("the robot is not masked in the image of", step_s,
+                    is_heard ? ": there is no joint state near that time"
+                    : base   ? ": its joint '" + *missing + "' is not in the joint states"
+                             : ": the pose of '" + root + "' is not known");
       return frame;
     }
     return sensing::with_mask(frame, mask_->mask(frame, names, joints, *base));
@@ -453,6 +456,7 @@ class Assembly {
   std::vector<double> camera_offset_s_;
   std::vector<std::set<std::size_t>> used_images_, used_clouds_;
   std::unique_ptr<sensing::RobotMask> mask_;
+  RepeatedNotes of_steps_;
   FromStreams out_;
 };
 

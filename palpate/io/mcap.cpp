@@ -212,7 +212,7 @@ std::uint16_t McapWriter::add_channel(const std::string& topic, const std::strin
     record(schemas_, op_schema, content);
     record(chunk_, op_schema, content);
   }
-  const auto id = static_cast<std::uint16_t>(counts_.size());
+  const auto id = static_cast<std::uint16_t>(counts_.size() + 1);  // rosbags 0.11.1 finds no message of a channel 0
   std::string content;
   store(content, id);
   store(content, schema->second);

@@ -11,6 +11,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_formats.hpp"
 #include "palpate/io/file.hpp"
+#include "palpate/io/sqlite_log.hpp"
 #include "palpate/io/unpack.hpp"
 #include "palpate/io/yaml_field.hpp"
 
@@ -20,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using std::string_view_literals::operator""sv;
 constexpr const char* metadata_name = "metadata.yaml";
+constexpr std::string_view packed_extension = ".zstd";
 
 bool starts_as_a_bag(const fs::path& path) {
   std::string first(16, '\0');
@@ -33,29 +35,23 @@ bool starts_as_a_bag(const fs::path& path) {
 bool has_bag_extension(const fs::path& path) {
   for (const BagFormat& format : bag_formats()) {
     for (const std::string& extension : format.extensions) {
-      if (path.string().ends_with(extension) || path.string().ends_with(extension + ".zstd")) return true;
+      if (path.string().ends_with(extension) || path.string().ends_with(extension + std::string(packed_extension))) return true;
     }
   }
   return false;
 }
 
-/// What metadata.yaml says of the files; it is written by many versions of rosbag2, so that only what is needed is looked
-/// at.
-struct Metadata {
+/// The files that metadata.yaml names; it is written by many versions of rosbag2, so that only what is needed is looked at.
+std::vector<std::string> files_of(const fs::path& path) {
   std::vector<std::string> files;
-  bool packed_messages = false;
-};
-
-Metadata metadata_of(const fs::path& path) {
-  Metadata result;
   const YamlField top = YamlField::parse(read_file(path), path.string());
-  YamlKeys keys(YamlKeys(top).required("rosbag2_bagfile_information"));
-  for (const YamlField& file : keys.required("relative_file_paths").items()) result.files.push_back(file.text());
+  // Since version 6 (Iron) it says `custom_data: ~`.
+  YamlKeys keys(YamlKeys(top).required("rosbag2_bagfile_information"), KeysWithoutValue::left_out);
+  for (const YamlField& file : keys.required("relative_file_paths").items()) files.push_back(file.text());
   const std::string mode = keys.text_or("compression_mode", ""), format = keys.text_or("compression_format", "");
-  result.packed_messages = mode == "MESSAGE" || mode == "message";
-  if (!mode.empty() && mode != "NONE" && !format.empty() && format != "zstd")
+  if (!mode.empty() && mode != "NONE" && mode != "none" && !format.empty() && format != "zstd")
     throw Error("is compressed as '" + format + "'; only zstd is read. Convert it: ros2 bag convert", path.string());
-  return result;
+  return files;
 }
 
 std::vector<std::string> bag_files_in(const fs::path& folder) {
@@ -65,7 +61,27 @@ std::vector<std::string> bag_files_in(const fs::path& folder) {
     if (entry.is_regular_file(code) && has_bag_extension(entry.path())) files.push_back(entry.path().filename().string());
   }
   std::sort(files.begin(), files.end());
+  // Whoever unpacks a file or was about to pack it leaves both beside each other.
+  std::erase_if(files, [&](const std::string& file) {
+    return file.ends_with(packed_extension) &&
+           fs::exists(folder / file.substr(0, file.size() - packed_extension.size()), code);
+  });
   return files;
+}
+
+/// Where a file of a bag lies that metadata.yaml names; nothing where it is not there.
+std::optional<fs::path> found_in(const fs::path& folder, const std::string& file) {
+  const bool is_packed = file.ends_with(packed_extension);
+  // A recorder that was cut off, or somebody with `zstd`, packed or unpacked it after it was named.
+  const std::string other = is_packed ? file.substr(0, file.size() - packed_extension.size()) : file + std::string(packed_extension);
+  for (const std::string& name : {file, other}) {
+    // Old versions of rosbag2 put the folder's name in front.
+    for (const fs::path& path : {folder / name, folder / fs::path(name).filename()}) {
+      std::error_code code;
+      if (fs::is_regular_file(path, code)) return path;
+    }
+  }
+  return std::nullopt;
 }
 
 /// Several files of one bag (rosbag2 splits them by size or time) as one.
@@ -84,12 +100,19 @@ MessageSource joined(std::vector<MessageSource> sources, const std::string& name
   return result;
 }
 
+/// rosbag2 packs messages on their own (compression_mode MESSAGE) and says so in metadata.yaml alone, which may be missing or
+/// elsewhere. The first byte of CDR is always 0.
 MessageSource with_unpacked_messages(MessageSource source) {
+  const auto is_packed = [&](const Message& message) {
+    return source.topics[message.topic].encoding == MessageEncoding::cdr && message.data.starts_with("\x28\xb5\x2f\xfd"sv);
+  };
+  if (std::none_of(source.messages.begin(), source.messages.end(), is_packed)) return source;
   auto texts = std::make_shared<std::pair<std::shared_ptr<const void>, std::vector<std::string>>>();
   texts->first = source.memory;
   texts->second.reserve(source.messages.size());  // views must stay where they are
   std::size_t lost = 0;
   for (Message& message : source.messages) {
+    if (!is_packed(message)) continue;
     auto text = unpack_zstd(message.data);
     if (!text) ++lost;
     texts->second.push_back(text ? std::move(*text) : std::string());
@@ -102,49 +125,54 @@ MessageSource with_unpacked_messages(MessageSource source) {
 
 MessageSource read_bag_file(const fs::path& path) {
   std::string bytes = read_file(path);
-  if (path.extension() == ".zstd") {
+  if (path.extension() == packed_extension) {
     auto unpacked = unpack_zstd(bytes);
     if (!unpacked) throw Error("is damaged: it cannot be unpacked", path.string());
     bytes = std::move(*unpacked);
   }
-  MessageSource source = parse_bag(std::move(bytes), path.string());
-  // A database that was not closed: its last messages lie beside it.
+  // A database that was not closed: its last messages, or all of them, lie beside it.
   const fs::path log = path.string() + "-wal";
+  const std::string log_name = "'" + log.filename().string() + "'";
+  std::vector<std::string> warnings;
   std::error_code code;
-  if (fs::exists(log, code) && fs::file_size(log, code) > 0)
-    source.warnings.push_back("what is in '" + log.filename().string() + "' is not read; open the file once with sqlite3 to fold it in");
+  if (fs::exists(log, code) && fs::file_size(log, code) > 0) {
+    const auto left = fold_in_log(bytes, read_file(log));
+    warnings.push_back(left ? "the database was not closed by its recorder: what is in " + log_name + " is read as well" +
+                                  (*left > 0 ? ", but for its last " + std::to_string(*left) + " bytes, which are no whole transaction" : "")
+                            : "what is in " + log_name + " is not read: it is no write-ahead log, or its beginning is damaged");
+  }
+  MessageSource source = with_unpacked_messages(parse_bag(std::move(bytes), path.string()));
+  source.warnings.insert(source.warnings.end(), warnings.begin(), warnings.end());
   return source;
 }
 
 MessageSource read_bag_folder(const fs::path& folder) {
   std::error_code code;
-  Metadata metadata;
+  const bool has_metadata = fs::exists(folder / metadata_name, code);
   std::vector<std::string> warnings;
-  if (fs::exists(folder / metadata_name, code)) {
-    metadata = metadata_of(folder / metadata_name);
-  } else {
-    metadata.files = bag_files_in(folder);
+  if (!has_metadata)
     warnings.push_back("there is no metadata.yaml (was the recorder cut off?): all bag files of the folder are read");
-  }
   std::vector<MessageSource> sources;
   std::optional<Error> unread;
-  for (const std::string& file : metadata.files) {
-    // Old versions of rosbag2 put the folder's name in front.
-    const fs::path path = fs::exists(folder / file, code) ? folder / file : folder / fs::path(file).filename();
-    if (!fs::exists(path, code)) {
+  std::optional<std::string> missing;
+  for (const std::string& file : has_metadata ? files_of(folder / metadata_name) : bag_files_in(folder)) {
+    const auto path = found_in(folder, file);
+    if (!path) {
       warnings.push_back("the file '" + file + "' is not there");
+      if (!missing) missing = file;
       continue;
     }
     try {
-      sources.push_back(read_bag_file(path));
+      sources.push_back(read_bag_file(*path));
     } catch (const Error& error) {  // a recorder that was cut off leaves its last file empty; the others are whole
-      warnings.push_back("the file '" + path.filename().string() + "' is left out: it " + error.message());
+      warnings.push_back("the file '" + path->filename().string() + "' is left out: it " + error.message());
       unread = error;
-      continue;
     }
-    if (metadata.packed_messages) sources.back() = with_unpacked_messages(std::move(sources.back()));
   }
   if (sources.empty() && unread) throw Error(*unread);
+  if (sources.empty() && missing)
+    throw Error("names '" + *missing + "', which is not in this folder; copy the bag's files beside it",
+                (folder / metadata_name).string());
   if (sources.empty()) throw Error("holds no bag file (.mcap, .db3, .bag)", folder.string());
   MessageSource result = joined(std::move(sources), folder.string());
   result.warnings.insert(result.warnings.begin(), warnings.begin(), warnings.end());

@@ -164,7 +164,7 @@ std::vector<YamlField> YamlField::items() const {
   return result;
 }
 
-std::vector<std::pair<std::string, YamlField>> YamlField::entries() const {
+std::vector<std::pair<std::string, YamlField>> YamlField::entries(KeysWithoutValue empty) const {
   if (!node_.IsMap()) {
     if (!path_.empty()) fail("keys and values are expected here");
     fail("holds no keys with values (`key: value`); give another file if this was not meant to be YAML "
@@ -175,6 +175,7 @@ std::vector<std::pair<std::string, YamlField>> YamlField::entries() const {
     if (!entry.first.IsScalar()) fail("a key must be a single word");
     const std::string& key = entry.first.Scalar();
     YamlField field{entry.second, path_.empty() ? key : path_ + "." + key, file_};
+    if (entry.second.IsNull() && empty == KeysWithoutValue::left_out) continue;
     // An empty value has no place of its own in the file.
     if (entry.second.IsNull()) YamlField{entry.first, field.path_, file_}.fail("has no value");
     for (const auto& [other, value] : result) {
@@ -185,7 +186,7 @@ std::vector<std::pair<std::string, YamlField>> YamlField::entries() const {
   return result;
 }
 
-YamlKeys::YamlKeys(const YamlField& map) : map_(map), entries_(map.entries()) {}
+YamlKeys::YamlKeys(const YamlField& map, KeysWithoutValue empty) : map_(map), entries_(map.entries(empty)) {}
 
 bool YamlKeys::has(const std::string& key) const {
   return std::any_of(entries_.begin(), entries_.end(), [&](const auto& entry) { return entry.first == key; });

@@ -21,6 +21,9 @@ namespace palpate::io {
 /// The known word nearest to a mistyped one, if near enough: fewest insertions, deletions and replacements.
 std::optional<std::string> nearest_word(std::string_view word, const std::vector<std::string>& known);
 
+/// A key without a value, or with `~`: a mistake in what a user writes; other programs write it of what they leave out.
+enum class KeysWithoutValue { refused, left_out };
+
 class YamlField {
  public:
   /// Parses a document. Throws Error with file and line.
@@ -46,7 +49,8 @@ class YamlField {
   Vec3 unit_vector() const;  ///< normalised; an error when its length is not 1 within 1 %
   std::vector<double> numbers() const;
   std::vector<YamlField> items() const;                            ///< of a list
-  std::vector<std::pair<std::string, YamlField>> entries() const;  ///< of a map with free keys; none twice
+  /// Of a map with free keys; none twice.
+  std::vector<std::pair<std::string, YamlField>> entries(KeysWithoutValue empty = KeysWithoutValue::refused) const;
   template <typename Enum>
   Enum choice(std::span<const std::pair<const char*, Enum>> table) const {
     const std::string word = text();
@@ -71,7 +75,7 @@ class YamlField {
 /// The keys of one map. Ask for each known key, then call `finish`, which refuses what nobody asked for.
 class YamlKeys {
  public:
-  explicit YamlKeys(const YamlField& map);
+  explicit YamlKeys(const YamlField& map, KeysWithoutValue empty = KeysWithoutValue::refused);
   YamlField required(const std::string& key, const std::string& cure = {});
   std::optional<YamlField> optional(const std::string& key);
   bool has(const std::string& key) const;

@@ -9,6 +9,7 @@
 
 #include "acquisition/pressed_spring.hpp"
 #include "palpate/acquisition/find_pushes.hpp"
+#include "palpate/acquisition/repeated_notes.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::acquisition {
@@ -241,6 +242,20 @@ TEST(FromStreams, WhatIsMissingIsSaidWithACure) {
   const FromStreams made = recording_from(plan(), moving);
   EXPECT_THAT(made.notes, testing::Contains(HasSubstr("is damaged")));
   EXPECT_EQ(made.recording.pushes[0].steps.size(), 7u) << "the steps have their force and travel still";
+}
+
+TEST(FromStreams, StepsWithoutAnImageAreSaidOnceWithTheWorst) {
+  SensorStreams streams = lab();
+  const std::size_t steps = recording_from(plan(), streams).recording.pushes.at(0).steps.size();
+  DepthStream& camera = streams.cameras[0];
+  camera.times_s = {camera.times_s.back() + 100};
+  const FromStreams made = recording_from(plan(), streams);
+  const std::vector<Step>& all = made.recording.pushes.at(0).steps;
+  ASSERT_EQ(all.size(), steps);
+  EXPECT_THAT(made.notes, testing::ElementsAre(testing::AllOf(
+                              HasSubstr("no image within 0.500 s of " + std::to_string(steps) + " steps, the first at " +
+                                        seconds_text(all.front().time_s) + "; at " + seconds_text(all.front().time_s)),
+                              HasSubstr("furthest, " + seconds_text(camera.times_s[0] - all.front().time_s) + " away"))));
 }
 
 TEST(FindContacts, ADriftingBiasIsTaredAnewForEachPush) {

@@ -55,10 +55,11 @@ TEST(Architecture, TableNamesEveryRoomAndHasNoCycle) {
 TEST(Architecture, NoRoomForOddsAndEnds) {
   for (const char* folder : {"palpate", "cli", "tests", "python"}) {
     if (!fs::exists(root / folder)) continue;
-    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
-      const std::string name = entry.path().stem().string();
+    for (auto entry = fs::recursive_directory_iterator(root / folder); entry != fs::recursive_directory_iterator(); ++entry) {
+      const std::string name = entry->path().stem().string();
+      if (name == "node_modules") entry.disable_recursion_pending();  // other people's, fetched for a test
       for (const char* drawer : {"utils", "util", "utilities", "common", "helpers", "helper", "misc"}) {
-        EXPECT_NE(name, drawer) << entry.path();
+        EXPECT_NE(name, drawer) << entry->path();
       }
     }
   }

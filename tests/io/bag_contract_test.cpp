@@ -3,7 +3,6 @@
 // What every container of messages promises, whoever wrote it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zstd.h>
 
 #include <functional>
 #include <random>
@@ -29,7 +28,8 @@ const Container containers[] = {
     {"mcap_none", [](const auto& m) { return mcap_bytes(m, McapWriter::Compression::none); }, "mcap"},
     {"mcap_zstd", [](const auto& m) { return mcap_bytes(m, McapWriter::Compression::zstd); }, "mcap"},
     {"mcap_unindexed", [](const auto& m) { return bare_mcap_bytes(m); }, "mcap"},
-    {"sqlite3", [](const auto& m) { return sqlite_bytes(m); }, "sqlite3"},
+    {"sqlite3_schema_1", [](const auto& m) { return sqlite_bytes(m, 1); }, "sqlite3"},
+    {"sqlite3_schema_4", [](const auto& m) { return sqlite_bytes(m, 4); }, "sqlite3"},
     {"ros1_none", [](const auto& m) { return ros1_bytes(m, "none"); }, "ros1"},
     {"ros1_bz2", [](const auto& m) { return ros1_bytes(m, "bz2"); }, "ros1"},
     {"ros1_lz4", [](const auto& m) { return ros1_bytes(m, "lz4"); }, "ros1"},
@@ -203,44 +203,10 @@ TEST(Bags, AFolderOfRosbag2IsReadByItsMetadata) {
   EXPECT_THAT(bag.warnings[0], HasSubstr("part_2.db3"));
 }
 
-std::string packed(const std::string& bytes) {
-  std::string out(ZSTD_compressBound(bytes.size()), '\0');
-  out.resize(ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), 3));
-  return out;
-}
-
-TEST(Bags, PackedFilesAndPackedMessagesAreUnpacked) {
-  const std::string head = "rosbag2_bagfile_information:\n  version: 5\n  compression_format: zstd\n";
-  const std::vector<TestMessage> all = mixed(50);
-  const TemporaryFolder files("bag_packed_files");
-  files.put("a.db3.zstd", packed(sqlite_bytes(all)));
-  files.put("metadata.yaml", head + "  compression_mode: FILE\n  relative_file_paths: [a.db3.zstd]\n");
-  EXPECT_EQ(read_bag(files.path()).messages[0].data, all[0].data);
-  std::vector<TestMessage> each = all;
-  for (TestMessage& one : each) one.data = packed(one.data);
-  const TemporaryFolder messages("bag_packed_messages");
-  messages.put("a.db3", sqlite_bytes(each));
-  messages.put("metadata.yaml", head + "  compression_mode: MESSAGE\n  relative_file_paths: [a.db3]\n");
-  EXPECT_EQ(read_bag(messages.path()).messages[0].data, all[0].data);
-  messages.put("metadata.yaml",
-               "rosbag2_bagfile_information:\n  compression_format: fake\n  compression_mode: FILE\n  relative_file_paths: "
-               "[a.db3]\n");
-  EXPECT_THROW(read_bag(messages.path()), Error);
-}
-
 TEST(Bags, ADatabaseThatWasLeftInWriteAheadModeIsRead) {
   std::string bytes = sqlite_bytes(mixed(50));
   bytes[18] = bytes[19] = 2;
   EXPECT_EQ(parse_bag(bytes, "a").messages.size(), 25u);
-}
-
-TEST(Bags, WhatLiesBesideADatabaseThatWasNotClosedIsSaid) {
-  const TemporaryFolder folder("bag_wal");
-  folder.put("x.db3", sqlite_bytes(mixed(50)));
-  EXPECT_TRUE(read_bag(folder.path() / "x.db3").warnings.empty());
-  folder.put("x.db3-wal", "pages");
-  for (const auto& path : {folder.path() / "x.db3", folder.path()})
-    EXPECT_THAT(read_bag(path).warnings, testing::Contains(HasSubstr("'x.db3-wal' is not read"))) << path;
 }
 
 /// A recorder that was cut off leaves its last file empty, or with nothing but its first bytes.

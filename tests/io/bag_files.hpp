@@ -134,14 +134,26 @@ inline std::string ros1_bytes(const std::vector<TestMessage>& messages, const st
 }
 
 // sqlite3 ----------------------------------------------------------------------------------------------------------------
-inline std::string sqlite_bytes(const std::vector<TestMessage>& messages, const char* journal = "DELETE") {
+/// The statements of rosbag2's own source, SqliteStorage::initialize() of sqlite_storage.cpp.
+/// @param schema  1: Crystal to Eloquent; 2: Foxy and Galactic; 3: Humble; 4: Iron, Jazzy, Rolling
+inline std::string sqlite_bytes(const std::vector<TestMessage>& messages, int schema = 4) {
   sqlite3* database = nullptr;
   sqlite3_open(":memory:", &database);
   const auto run = [&](const std::string& query) { sqlite3_exec(database, query.c_str(), nullptr, nullptr, nullptr); };
-  run(std::string("PRAGMA journal_mode=") + journal);
-  run("CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT NOT NULL,"
-      "offered_qos_profiles TEXT NOT NULL);"
-      "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT "
+  if (schema >= 3) {
+    run("CREATE TABLE schema(schema_version INTEGER PRIMARY KEY,ros_distro TEXT NOT NULL);"
+        "CREATE TABLE metadata(id INTEGER PRIMARY KEY,metadata_version INTEGER NOT NULL,metadata TEXT NOT NULL);"
+        "INSERT INTO schema VALUES(" + std::to_string(schema) + ",'rolling')");
+  }
+  run(std::string("CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,"
+                  "serialization_format TEXT NOT NULL") +
+      (schema >= 2 ? ",offered_qos_profiles TEXT NOT NULL" : "") +
+      (schema >= 4 ? ",type_description_hash TEXT NOT NULL" : "") + ")");
+  if (schema >= 4) {
+    run("CREATE TABLE message_definitions(id INTEGER PRIMARY KEY,topic_type TEXT NOT NULL,encoding TEXT NOT NULL,"
+        "encoded_message_definition TEXT NOT NULL,type_description_hash TEXT NOT NULL)");
+  }
+  run("CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT "
       "NULL);"
       "CREATE INDEX timestamp_idx ON messages (timestamp ASC)");
   std::map<std::string, int> ids;
@@ -149,7 +161,9 @@ inline std::string sqlite_bytes(const std::vector<TestMessage>& messages, const 
     if (!ids.count(one.topic)) {
       ids[one.topic] = static_cast<int>(ids.size()) + 1;
       run("INSERT INTO topics VALUES(" + std::to_string(ids[one.topic]) + ",'" + one.topic + "','" + one.type +
-          "','cdr','')");
+          "','cdr'" + (schema >= 2 ? ",''" : "") + (schema >= 4 ? ",'RIHS01_0'" : "") + ")");
+      if (schema >= 4)
+        run("INSERT INTO message_definitions VALUES(NULL,'" + one.type + "','ros2msg','# none','RIHS01_0')");
     }
     sqlite3_stmt* row = nullptr;
     sqlite3_prepare_v2(database, "INSERT INTO messages(topic_id,timestamp,data) VALUES(?,?,?)", -1, &row, nullptr);

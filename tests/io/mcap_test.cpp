@@ -46,9 +46,9 @@ TEST_P(EveryCompression, GivesBackEveryMessageInTheOrderOfTime) {
   EXPECT_TRUE(file.warnings.empty());
   EXPECT_EQ(file.profile, "ros2");
   ASSERT_EQ(file.channels.size(), 2u);
-  EXPECT_EQ(file.channels.at(0).topic, "/camera/depth");
-  EXPECT_EQ(file.channels.at(0).schema_name, "sensor_msgs/msg/Image");
-  EXPECT_EQ(file.channels.at(1).message_encoding, "cdr");
+  EXPECT_EQ(file.channels.at(1).topic, "/camera/depth");
+  EXPECT_EQ(file.channels.at(1).schema_name, "sensor_msgs/msg/Image");
+  EXPECT_EQ(file.channels.at(2).message_encoding, "cdr");
   ASSERT_EQ(file.messages.size(), 16u);
   for (std::size_t i = 1; i < 16; ++i) EXPECT_LE(file.messages[i - 1].log_time_ns, file.messages[i].log_time_ns);
   EXPECT_EQ(file.messages[0].data, noise(300000, 0));

@@ -5,6 +5,7 @@ import { McapIndexedReader } from '@mcap/core';
 import { parse } from '@foxglove/rosmsg';
 import { MessageReader } from '@foxglove/rosmsg2-serialization';
 import { decompress } from 'fzstd';
+import { print_messages } from './print_messages.mjs';
 
 const bytes = readFileSync(process.argv[2]);
 const readable = {
@@ -24,11 +25,6 @@ for await (const message of reader.readMessages({ validateCrcs: true })) {
     decoders.set(schema.id, new MessageReader(parse(new TextDecoder().decode(schema.data), { ros2: true })));
   }
   const data = decoders.get(schema.id).readMessage(message.data);
-  if (data.data instanceof Uint8Array) {
-    data.bytes = data.data.length;
-    delete data.data;
-  }
   messages.push({ topic: channel.topic, type: schema.name, time: message.logTime, data });
 }
-const plain = (_, value) => (typeof value === 'bigint' ? Number(value) : ArrayBuffer.isView(value) ? [...value] : value);
-console.log(JSON.stringify({ profile: reader.header.profile, statistics: reader.statistics, messages }, plain));
+print_messages({ profile: reader.header.profile, statistics: reader.statistics, messages });
