@@ -221,6 +221,73 @@ TEST(RayChoice, ARayThatComesToMissASharpEdgeGoesOnAsTheEdge) {
   EXPECT_GT(missed, 100) << "no ray came to miss";
 }
 
+/// Counted are rays that meet the box at a right angle nearly, wherever they meet it.
+std::pair<Index, double> counted(const SimulatedObject& object, const Recording& recording, double pixel_rad, double margin_rad) {
+  Unknowns unknowns;
+  ForwardModel model(recording, object, unknowns);
+  const VectorX at = unknowns.prior_mean();
+  const geometry::TriangleTree tree(model.object().surface.rest());
+  const Vec3 eye(0, -0.6, 0.05);
+  std::vector<Vec3> directions;
+  std::vector<double> ranges;
+  for (double v = -0.12; v < 0.12; v += pixel_rad)
+    for (double u = -0.12; u < 0.12; u += pixel_rad) {
+      const Vec3 direction = Vec3(u, 1, v).normalized();
+      if (const auto hit = tree.cast(eye, direction)) directions.push_back(direction), ranges.push_back(hit->range_m);
+    }
+  RayObservation seen;
+  const Index count = static_cast<Index>(ranges.size());
+  seen.rays.origins_m = eye.transpose().replicate(count, 1);
+  seen.rays.directions.resize(count, 3);
+  for (Index i = 0; i < count; ++i) seen.rays.directions.row(i) = directions[static_cast<std::size_t>(i)].transpose();
+  seen.rays.range_m = Eigen::Map<const VectorX>(ranges.data(), count);
+  seen.rays.sigma_m = VectorX::Constant(count, sigma_m);
+  seen.outline_margin_rad = margin_rad;
+  Objective objective(model, {{seen}}, unknowns);
+  objective.evaluate(at, {});
+  const Loss chosen = objective.with_chosen_rays({});
+  double nearest = 1;  // to an edge of the front, in the picture
+  Index counts = 0;
+  for (Index i = 0; i < count; ++i) {
+    if ((*chosen.rays[0])[0][static_cast<std::size_t>(i)] != counts_in) continue;
+    ++counts;
+    const Vec3 ray = seen.rays.directions.row(i) / seen.rays.directions(i, 1);
+    nearest = std::min(nearest, 0.05 / 0.55 - std::max(std::abs(ray.x()), std::abs(ray.z())));
+  }
+  // Those that were not chosen are left in the next evaluation too.
+  objective.evaluate(at, chosen);
+  EXPECT_EQ(objective.last_rows()[0][0].residual.array().isFinite().count(), counts);
+  return {counts, nearest};
+}
+
+TEST(RayChoice, LeavesTheRaysBesideTheOutline) {
+  Recording recording;
+  recording.rest.surface = lab::box_surface({-0.05, -0.05, 0}, {0.05, 0.05, 0.1}, 6);
+  recording.model.material = "linear";
+  recording.model.element = "tet4";
+  Support table;
+  table.name = "table";
+  table.kind = SupportKind::plane;
+  table.select = NodeSelection::plane;
+  recording.supports = {table};
+  Push push;
+  push.name = "untouched";
+  push.steps.resize(1);
+  recording.pushes = {push};
+  const SimulatedObject object = build_simulated_object(recording);
+  constexpr double pixel_rad = 0.002, margin_rad = 0.0065;
+  const auto [all, at_rim] = counted(object, recording, pixel_rad, 0);
+  const auto [some, inside] = counted(object, recording, pixel_rad, margin_rad);
+  EXPECT_LT(at_rim, pixel_rad);
+  EXPECT_GE(inside, margin_rad);
+  EXPECT_LT(inside, margin_rad + pixel_rad);
+  EXPECT_NEAR(double(some) / double(all), std::pow(1 - margin_rad / (0.05 / 0.55), 2), 0.02);
+  // What is hardly wider than twice the margin has nothing else to say.
+  const auto [few, here] = counted(object, recording, 0.01, 0.03);
+  EXPECT_EQ(few, counted(object, recording, 0.01, 0).first);
+  EXPECT_LT(here, 0.01);
+}
+
 TEST(RayChoice, IsMadeFromOneCast) {
   PressedBall ball;
   ASSERT_EQ(ball.optimum.termination, Termination::converged) << ball.optimum.message;

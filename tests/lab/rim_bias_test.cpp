@@ -9,6 +9,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "palpate/estimation/grazing.hpp"
+#include "palpate/geometry/ray_bundle.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/lab/built_in.hpp"
 #include "palpate/lab/robot.hpp"
@@ -28,6 +30,7 @@ struct Mean {
 struct Struck {
   Vec3 at_m;
   double angle_rad;  ///< between ray and normal
+  bool beside_outline;
 };
 
 using Errors = std::array<Mean, 18>;
@@ -45,12 +48,18 @@ Errors errors_of(const char* object, const char* sensor, int images, const BinOf
   options.camera_std_m = options.camera_std_rad = 0;
   LabRobot robot(options, make_object(object, truth));
   const geometry::TriangleTree tree(robot.object().surface);
+  const auto edges = geometry::surface_edges(tree.mesh().triangles);
   Environment environment;
   environment.planes = robot.scene().environment.planes;
   Errors errors;
   for (int image = 0; image < images; ++image) {
     const DepthFrame frame = robot.take_depth_image();
     const RayCloud rays = sensing::observe(frame, environment, {});
+    const geometry::RayBundle bundle(rays.directions);
+    const Vec3 eye = rays.origins_m.row(0);
+    const auto hits = bundle.meet(tree.mesh().vertices_m, tree.mesh().triangles, eye, Mat3::Identity());
+    const auto beside = bundle.beside_outline(tree.mesh().vertices_m, tree.mesh().triangles, edges, eye, Mat3::Identity(), hits.value(),
+                                              estimation::outline_margin_px / frame.camera.fx_px);
     for (Index i = 0; i < rays.range_m.size(); ++i) {
       const Vec3 direction = rays.directions.row(i);
       const auto hit = tree.cast(rays.origins_m.row(i), direction);
@@ -60,7 +69,8 @@ Errors errors_of(const char* object, const char* sensor, int images, const BinOf
       const double error = (rays.range_m(i) - hit->range_m) / rays.sigma_m(i);
       const double share = error / 4.685;  // of Tukey's cut
       if (std::abs(share) > 1) continue;
-      const std::size_t bin = bin_of(Struck{rays.origins_m.row(i).transpose() + hit->range_m * direction, std::acos(std::min(1.0, -normal.dot(direction)))});
+      const std::size_t bin = bin_of(Struck{rays.origins_m.row(i).transpose() + hit->range_m * direction, std::acos(std::min(1.0, -normal.dot(direction))),
+                                            beside.value()[static_cast<std::size_t>(i)] != 0});
       if (bin >= errors.size()) continue;
       Mean& mean = errors[bin];
       mean.sum += error * std::pow(1 - share * share, 2) / rays.sigma_m(i);
@@ -101,6 +111,18 @@ TEST(TableBias, RaysJustAboveTheTableAreRightOnAverage) {
   const Errors errors = errors_of("bar", "realsense_d435", 40, [](const Struck& struck) { return std::size_t(struck.at_m.z() / 0.005); });
   ASSERT_GT(errors[1].count, 3500);
   EXPECT_LT(std::abs(errors[1].in_deviations()), 3) << errors[1].over_sigma() << " sigma from 5 to 10 mm";
+}
+
+// Before a table that is little further away, pixels on both sides of the outline may mix both so that neither stands out.
+TEST(OutlineBias, RaysThatCountAreRightOnAverageAndThoseBesideTheOutlineAreNot) {
+  const Errors errors = errors_of("bar", "realsense_d435", 40, [](const Struck& struck) {
+    if (struck.angle_rad > 75 * M_PI / 180 || struck.at_m.z() < 0.01) return std::size_t(18);
+    return std::size_t(struck.beside_outline ? 1 : 0);
+  });
+  ASSERT_GT(errors[0].count, 400000);
+  EXPECT_LT(std::abs(errors[0].in_deviations()), 3.5) << errors[0].over_sigma() << " sigma";
+  ASSERT_GT(errors[1].count, 2000);
+  EXPECT_GT(errors[1].over_sigma(), 0.02) << errors[1].in_deviations() << " deviations: were they right, there would be no need to leave them out";
 }
 
 }  // namespace
