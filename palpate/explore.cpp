@@ -67,8 +67,9 @@ class Loop {
  private:
   void prepare(const Recording& scene) {
     SuggestOptions suggesting = options_.suggest;
-    suggesting.candidates.limits.force_n = std::min(suggesting.candidates.limits.force_n, options_.push.force_limit_n);
-    suggesting.candidates.limits.travel_m = std::min(suggesting.candidates.limits.travel_m, options_.push.travel_limit_m);
+    borne_ = acquisition::within(robot_.limits(), options_.push);
+    suggesting.candidates.limits.force_n = std::min(suggesting.candidates.limits.force_n, borne_.force_limit_n);
+    suggesting.candidates.limits.travel_m = std::min(suggesting.candidates.limits.travel_m, borne_.travel_limit_m);
     options_.suggest = suggesting;
     // What the robot's own sensors say of themselves.
     const DepthFrame frame = robot_.take_depth_image();
@@ -165,14 +166,14 @@ class Loop {
 
   /// A short touch says how stiff it is there; nothing of it is recorded.
   double first_step_n(const acquisition::PushPlan& plan, acquisition::PushOptions protocol) {
-    const double whole_m = protocol.travel_limit_m;
+    const double whole_m = std::min(protocol.travel_limit_m, borne_.travel_limit_m);
     protocol.travel_limit_m = std::min(options_.touch_travel_m, protocol.travel_limit_m);
     protocol.force_step_n = protocol.force_limit_n;
     protocol.unloading_steps = 0;
     const auto report = acquisition::run_push(robot_, plan, protocol, {}, hooks_.keep_going);
     if (!(report.highest_force_n > 0) || !(report.deepest_m > 0)) return options_.push.force_step_n;
     const double whole_n = report.highest_force_n / report.deepest_m * whole_m;
-    return std::max(1e-3, std::min(whole_n, options_.push.force_limit_n) / options_.levels);
+    return std::max(1e-3, std::min(whole_n, borne_.force_limit_n) / options_.levels);
   }
 
   /// The last push has a loaded step; else it is taken out of the recording again.
@@ -225,6 +226,7 @@ class Loop {
 
   acquisition::Robot& robot_;
   ExploreOptions options_;
+  acquisition::PushOptions borne_;  // of options_.push, what the robot bears
   const ExploreHooks& hooks_;
   Explored out_;
 };

@@ -32,7 +32,7 @@ struct ExploreOptions {
   SuggestOptions suggest;
   int levels = 4;                 ///< force steps of a push
   double touch_travel_m = 0.002;  ///< of the trial touch that sizes the first push's steps; it is not recorded
-  acquisition::PushOptions push;  ///< limits of force and travel are the lower of these and the plan's
+  acquisition::PushOptions push;  ///< limits of force and travel are the lowest of these, the plan's and the robot's
   IdentifyOptions identify;
 };
 

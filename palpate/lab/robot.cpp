@@ -147,6 +147,16 @@ struct LabRobot::Impl {
     const double along = offset.dot(site().direction);
     return (offset - along * site().direction).norm() < 0.014 ? along : 0;
   }
+  // Of a push that is to go through this point, near the surface or on it.
+  Vec3 where_it_meets(const Vec3& contact_m, const Vec3& direction) const {
+    constexpr double on_it_m = 1e-6, near_m = 0.03;
+    const geometry::TriangleTree surface(object.surface);
+    if (surface.within(contact_m, on_it_m * on_it_m)) return contact_m;
+    const auto deeper = surface.cast(contact_m, direction, near_m), before = surface.cast(contact_m, -direction, near_m);
+    const double deeper_m = deeper ? deeper->range_m : 2 * near_m, before_m = before ? before->range_m : 2 * near_m;
+    if (!deeper && !before) return contact_m;
+    return contact_m + (deeper_m < before_m ? deeper_m : -before_m) * direction;
+  }
   Vec3 sideways() const { return Vec3(site().direction.x(), site().direction.y(), 0); }
   // Travel of the pad into the object: what stick and arm yield is taken off, and the object slides rather than bear more
   // sideways than friction holds. Solved on the curve, which rises.
@@ -224,6 +234,7 @@ struct LabRobot::Impl {
   Pose T_base_camera, T_true_stated = Pose::Identity();
   Vec3 slid_m = Vec3::Zero();  // of the object on the table
   double clock_s = 0, moved_s = -1e3, fading_n = 0;
+  std::vector<DepthFrame> around;  // what was last looked at from all sides
 };
 
 LabRobot::LabRobot(const LabOptions& options) : LabRobot(options, cube_of(options.object)) {}
@@ -276,6 +287,18 @@ double LabRobot::travel_sigma_m() const {
   const Vec3& along = lab.site().direction;
   const Mat3 covariance = lab.mask.kinematics().position_covariance_m2(poses, lab.tip, Vec3::Zero(), lab.options.joint_std_rad);
   return std::max(1e-5, std::sqrt(along.dot(covariance * along)));
+}
+
+acquisition::RobotLimits LabRobot::limits() const {
+  acquisition::RobotLimits limits;
+  limits.force_n = readable_along_n(impl_->options.force);  // the stick is straight: a push is along the hand
+  return limits;
+}
+
+std::optional<DepthFrame> LabRobot::look(int view, int views) {
+  std::vector<DepthFrame>& around = impl_->around;  // their errors are drawn one after the other
+  if (around.size() != std::size_t(std::max(0, views))) around = look_around(views);
+  return around.at(std::size_t(view));
 }
 
 DepthFrame LabRobot::take_depth_image() {
@@ -395,11 +418,16 @@ acquisition::PushPlan LabRobot::plan(std::size_t site) {
 acquisition::PushPlan LabRobot::plan_at(const Vec3& contact_m, const Vec3& direction) {
   Impl& lab = *impl_;
   const auto& sites = lab.object.sites;
-  for (std::size_t s = 0; s < sites.size(); ++s)
-    if ((sites[s].contact_m - contact_m).norm() < 1e-9 && (sites[s].direction - direction).norm() < 1e-9) return plan(s);
-  lab.object.sites.push_back({"place " + std::to_string(sites.size() + 1), contact_m, direction});
-  lab.curves.emplace_back();
-  return plan(lab.object.sites.size() - 1);
+  const Vec3 met_m = lab.where_it_meets(contact_m, direction);
+  std::size_t site = 0;
+  while (site < sites.size() && ((sites[site].contact_m - met_m).norm() >= 1e-9 || (sites[site].direction - direction).norm() >= 1e-9)) ++site;
+  if (site == sites.size()) {
+    lab.object.sites.push_back({"place " + std::to_string(site + 1), met_m, direction});
+    lab.curves.emplace_back();
+  }
+  acquisition::PushPlan there = plan(site);
+  there.contact_m = contact_m;
+  return there;
 }
 
 bool LabRobot::reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m) const {
