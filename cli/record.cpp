@@ -106,15 +106,12 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   Recording recording = robot->scene();
   std::vector<acquisition::PushPlan> plans;
   for (std::size_t site = 0; site < robot->sites(); ++site) plans.push_back(robot->plan(site));
-  double not_before_s = 0;
   if (exists) {
     const Recording now = std::exchange(recording, io::read_recording_unchecked(folder));
     must_be_same_scene(recording, now, arguments.views > 0 && arguments.views == int(recording.rest.views.size()), folder);
     for (const acquisition::PushPlan& plan : plans)
       if (const Push* recorded = push_named(recording.pushes, plan.name)) must_be_same_push(*recorded, plan, protocol, folder);
     truth.go_on(recording.pushes);
-    if (!recording.pushes.empty() && !recording.pushes.back().steps.empty())
-      not_before_s = recording.pushes.back().steps.back().time_s + 1;
   } else if (arguments.views > 0) {
     if (!look_around(*robot, arguments.views, recording)) {
       session.say("stopped on request before the first push; nothing was recorded");
@@ -125,7 +122,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   const std::vector<Push> recorded = recording.pushes;
   NewFolder made_here(folder);
   io::RecordingWriter writer(folder, recording);
-  LaterRobot later(robot->robot(), not_before_s);
+  LaterRobot later(robot->robot(), not_before_s(recorded));
   LoggedRobot logged(later, recording.joint_names);
   Made made;
   for (std::size_t site = 0; site < plans.size() && !Session::interrupted(); ++site) {
