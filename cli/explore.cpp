@@ -182,7 +182,8 @@ int run(const Options& given, Session& session) {
   std::error_code code;
   const bool exists = fs::exists(given.out, code) && !fs::is_empty(given.out, code);
   if (exists && !given.resume)
-    throw Error("is there already; say --resume to go on, choose another folder or remove it (`palpate estimate` takes the recording in it)",
+    throw Error("is there already; say --resume to go on, choose another folder or remove it (`palpate estimate` takes the "
+                "recording in it)",
                 given.out.string());
   check_push_options(given.explore.push);
   ExploreOptions with_limit = given.explore;

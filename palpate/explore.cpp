@@ -164,7 +164,8 @@ class Loop {
       if (!step.loads.empty() && step.loads.front().force_n)
         made.report.highest_force_n = std::max(made.report.highest_force_n, step.loads.front().force_n->dot(load.direction));
       for (const Observation& seen : step.observations)
-        if (const auto* encoder = std::get_if<ToolTravel>(&seen)) made.report.deepest_m = std::max(made.report.deepest_m, encoder->travel_m);
+        if (const auto* encoder = std::get_if<ToolTravel>(&seen))
+          made.report.deepest_m = std::max(made.report.deepest_m, encoder->travel_m);
     }
     made.plan.force_n = made.report.highest_force_n;
     made.plan.travel_m = made.report.deepest_m;
@@ -282,7 +283,8 @@ class Loop {
   void estimate(bool whole) {
     IdentifyOptions options = options_.identify;
     options.fit.cross_checks = whole;
-    if (!out_.identified.answer.parameters.empty()) options.fit.young_start_pa = parameters(out_.identified.answer, "young_modulus").front().value;
+    if (!out_.identified.answer.parameters.empty())
+      options.fit.young_start_pa = parameters(out_.identified.answer, "young_modulus").front().value;
     out_.identified = identify(out_.recording, options, hooks_.on_progress);
   }
 

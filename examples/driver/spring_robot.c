@@ -136,7 +136,8 @@ static int take_depth_image(void* self, struct PalpateDepthImage* image) {
 
 /* How far along a ray the box that stands there begins, or the table. */
 static double range_to(const struct World* world, const double* from_m, const double* along) {
-  const double low[3] = {middle_x_m - world->half_m, -world->half_m, 0}, high[3] = {middle_x_m + world->half_m, world->half_m, world->top_m};
+  const double low[3] = {middle_x_m - world->half_m, -world->half_m, 0};
+  const double high[3] = {middle_x_m + world->half_m, world->half_m, world->top_m};
   double enters = 0, leaves = 1e9;
   for (int i = 0; i < 3; ++i) {
     const double a = (low[i] - from_m[i]) / along[i], b = (high[i] - from_m[i]) / along[i];
@@ -156,7 +157,8 @@ static int look_from(void* self, int view, int views, struct PalpateDepthImage* 
   /* Axes of the camera in the base frame, and the same as a quaternion: turned about z, tilted about the camera's x, looking down. */
   const double right[3] = {-sin(turn), cos(turn), 0}, lower[3] = {sin(down) * cos(turn), sin(down) * sin(turn), -cos(down)};
   const double forward[3] = {-cos(down) * cos(turn), -cos(down) * sin(turn), -sin(down)};
-  const double c = cos(pi / 4 - down / 2), s = sin(pi / 4 - down / 2), less = cos(turn / 2) - sin(turn / 2), more = cos(turn / 2) + sin(turn / 2);
+  const double c = cos(pi / 4 - down / 2), s = sin(pi / 4 - down / 2);
+  const double less = cos(turn / 2) - sin(turn / 2), more = cos(turn / 2) + sin(turn / 2);
   const double rotation[4] = {-s * less, c * less, c * more, -s * more};
   double* eye_m = image->T_base_camera.position_m;
   for (int i = 0; i < 4; ++i) image->T_base_camera.rotation_wxyz[i] = sqrt(0.5) * rotation[i];

@@ -4,8 +4,8 @@
  *   int palpate_make_robot(uint32_t abi, const char* settings, struct PalpateRobot* robot, char* error, size_t error_size);
  *
  * `palpate record --driver ./libdriver.so` loads it and runs the push protocol on what it fills in, `palpate explore` the loop
- * that chooses its own pushes. A small one is in examples/driver. Lengths in metres, angles in radians, forces in newtons, times in seconds; frames as in
- * docs/conventions.md. Every call is made from one thread. */
+ * that chooses its own pushes. A small one is in examples/driver. Lengths in metres, angles in radians, forces in newtons, times
+ * in seconds; frames as in docs/conventions.md. Every call is made from one thread. */
 #ifndef PALPATE_ACQUISITION_DRIVER_H
 #define PALPATE_ACQUISITION_DRIVER_H
 

@@ -420,7 +420,10 @@ acquisition::PushPlan LabRobot::plan_at(const Vec3& contact_m, const Vec3& direc
   const auto& sites = lab.object.sites;
   const Vec3 met_m = lab.where_it_meets(contact_m, direction);
   std::size_t site = 0;
-  while (site < sites.size() && ((sites[site].contact_m - met_m).norm() >= 1e-9 || (sites[site].direction - direction).norm() >= 1e-9)) ++site;
+  const auto is_there = [&](const PushSite& one) {
+    return (one.contact_m - met_m).norm() < 1e-9 && (one.direction - direction).norm() < 1e-9;
+  };
+  while (site < sites.size() && !is_there(sites[site])) ++site;
   if (site == sites.size()) {
     lab.object.sites.push_back({"place " + std::to_string(site + 1), met_m, direction});
     lab.curves.emplace_back();

@@ -106,11 +106,9 @@ TEST(RobotLimits, ThoseThatCannotBeAreNamedBeforeAnythingMoves) {
   refused({0, 1, 1}, "force_n");
   refused({1, -1, 1}, "travel_m");
   refused({1, 1, nan}, "speed_m_s");
-  for (const StopReason reason : {StopReason::force_limit, StopReason::travel_limit, StopReason::robot_force_limit, StopReason::robot_travel_limit})
-    EXPECT_TRUE(is_at_a_limit(reason));
-  for (const StopReason reason : {StopReason::slip, StopReason::contact_lost, StopReason::no_contact, StopReason::robot_limit,
-                                  StopReason::moved, StopReason::user})
-    EXPECT_FALSE(is_at_a_limit(reason));
+  using enum StopReason;
+  for (const StopReason reason : {force_limit, travel_limit, robot_force_limit, robot_travel_limit}) EXPECT_TRUE(is_at_a_limit(reason));
+  for (const StopReason reason : {slip, contact_lost, no_contact, robot_limit, moved, user}) EXPECT_FALSE(is_at_a_limit(reason));
 }
 
 struct LookingRobot : SpringRobot {
