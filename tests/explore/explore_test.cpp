@@ -150,6 +150,38 @@ TEST(Explore, BudgetRefusalAndUserEndIt) {
   EXPECT_EQ(half.message, "stopped on request");
 }
 
+// What the robot bears bounds what is planned, what the first touch sizes and what is pressed, and the report says so.
+TEST(Explore, TheRobotsOwnLimitsHold) {
+  struct Weak : BlockRobot {
+    using BlockRobot::BlockRobot;
+    acquisition::RobotLimits bears;
+    acquisition::RobotLimits limits() const override { return bears; }
+  };
+  ExploreOptions options = loop_options();
+  options.max_pushes = 2;
+  options.young_modulus_within = 1e-4;
+  Weak strong(3);
+  const Explored free = explored(strong, options).found;
+  ASSERT_EQ(free.pushes.size(), 2u);
+  double most_n = 0;
+  for (const auto& push : free.pushes) {
+    EXPECT_NE(push.report.stop, acquisition::StopReason::robot_force_limit);
+    most_n = std::max(most_n, push.report.highest_force_n);
+  }
+  Weak weak(3);
+  weak.bears.force_n = 0.4 * most_n;
+  const Explored held = explored(weak, options).found;
+  ASSERT_EQ(held.pushes.size(), 2u);
+  for (const auto& push : held.pushes) {
+    EXPECT_LE(push.plan.force_n, weak.bears.force_n * (1 + 1e-9));
+    EXPECT_LT(push.report.highest_force_n, weak.bears.force_n + 0.3) << push.name;
+  }
+  EXPECT_EQ(held.pushes.front().report.stop, acquisition::StopReason::robot_force_limit) << held.pushes.front().report.message;
+  for (const Push& push : held.recording.pushes)
+    EXPECT_GE(std::count_if(push.steps.begin(), push.steps.end(), [](const Step& step) { return !step.loads.empty(); }), options.levels)
+        << "in as many steps as are wanted";
+}
+
 TEST(Explore, BadOptionsAreNamed) {
   BlockRobot robot(1);
   ExploreHooks hooks;
