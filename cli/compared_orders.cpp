@@ -23,8 +23,9 @@ std::vector<OrderedRun> sorted(std::vector<OrderedRun> runs) {
 std::string middle_words(std::vector<OrderedRun> runs) {
   if (runs.empty()) return "no lab";
   runs = sorted(std::move(runs));
-  return fmt::format("{} pushes in the middle of {} labs ({} to {})", words(runs[runs.size() / 2]), runs.size(), words(runs.front()),
-                     words(runs.back()));
+  const OrderedRun& middle = runs[runs.size() / 2];
+  return fmt::format("{} push{} in the middle of {} labs ({} to {})", words(middle), middle.pushes == 1 ? "" : "es", runs.size(),
+                     words(runs.front()), words(runs.back()));
 }
 
 nlohmann::json by_seed_json(const std::string& order, const std::vector<OrderedRun>& runs) {

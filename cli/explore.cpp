@@ -154,6 +154,7 @@ void compare(Session& session, const Options& given, const Explored& found, nloh
     Options there = given;
     const std::uint64_t seed = session.seed + std::uint64_t(lab);
     there.explore.suggest.candidates.seed = there.explore.seed = seed;
+    there.explore.identify.fit.cross_checks = false;  // they are for verdicts, which nobody reads here
     for (Order& one : orders) {
       if (lab == 0 && one.order == PushOrder::next_best) continue;
       session.say(fmt::format("{}, {}:", lab == 0 ? "the same lab" : fmt::format("the lab of seed {}", seed), one.name));

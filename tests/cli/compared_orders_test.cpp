@@ -12,6 +12,7 @@ TEST(ComparedOrders, RunsThatDidNotComeToTheGoalAreTheLongest) {
   EXPECT_EQ(middle_words({{true, 5}, {true, 3}, {false, 4}}), "5 pushes in the middle of 3 labs (3 to more than 4)");
   EXPECT_EQ(middle_words({{true, 12}, {false, 12}, {false, 12}}), "more than 12 pushes in the middle of 3 labs (12 to more than 12)");
   EXPECT_EQ(middle_words({{true, 2}, {true, 4}}), "4 pushes in the middle of 2 labs (2 to 4)") << "not the better one";
+  EXPECT_EQ(middle_words({{true, 1}, {true, 1}}), "1 push in the middle of 2 labs (1 to 1)");
   EXPECT_EQ(middle_words({}), "no lab");
 }
 

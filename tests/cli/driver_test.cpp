@@ -180,6 +180,7 @@ TEST_F(Driver, WhatIsWrongIsSaidWithACure) {
   refused("record --driver '" + spring + "' " + one_push + " -o '" + path("recording") + "'", "--scene FOLDER", usage);
   const std::string explore = "explore --driver '" + spring + "' -o '" + path("recording") + "' --scene '" + scene + "' ";
   refused(explore + "--compare", "a driver's world has one only", usage);
+  refused(explore + "--seeds 3", "say --compare, too", usage);
   refused(explore + "--driver-settings 'soft 20000'", "Young's modulus (Pa) and Poisson ratio");
 }
 
