@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `palpate explore -o OUT`: the lab's robot, or a driver's, pushes, estimates and chooses the next best push until E and nu are known as
-// well as was asked for. OUT/recording grows step by step; result, model and report come at the end.
+// well as was asked for. OUT/recording grows step by step, exploration.json push by push; result, model and report come at the end.
+// A run that was cut off goes on with --resume.
 #include "palpate/explore.hpp"
 
 #include <fmt/format.h>
@@ -10,6 +11,10 @@
 #include <optional>
 #include <utility>
 
+#include "cli/compared_orders.hpp"
+#include "cli/earlier_exploration.hpp"
+#include "cli/exploration_file.hpp"
+#include "cli/later_robot.hpp"
 #include "cli/live_report.hpp"
 #include "cli/material_names.hpp"
 #include "cli/new_folder.hpp"
@@ -18,6 +23,7 @@
 #include "cli/push_options.hpp"
 #include "cli/push_robot.hpp"
 #include "cli/push_words.hpp"
+#include "cli/resumed_recording.hpp"
 #include "cli/truth_file.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -36,41 +42,10 @@ struct Options {
   ExploreOptions explore;
   fs::path out;
   std::string goal = "both", law, refine;
-  bool compare = false;
+  bool compare = false, resume = false;
+  int seeds = 1, views = 0;
   LiveOptions live;
 };
-
-nlohmann::json moduli_json(const std::vector<Parameter>& young) {
-  if (young.size() == 1) return young.front().value;
-  nlohmann::json regions;
-  for (const Parameter& one : young) regions[one.region] = one.value;
-  return regions;
-}
-
-std::string moduli_words(const std::vector<Parameter>& young) {
-  std::string words;
-  for (const Parameter& one : young)
-    words += fmt::format("{}{}{}{}", words.empty() ? "" : ", ", one.region, one.region.empty() ? "" : " ",
-                         report::quantity(one.value, "Pa"));
-  return words;
-}
-
-nlohmann::json json_of(const ExploredPush& push) {
-  const auto& at = push.plan.candidate;
-  return {{"push", push.name},
-          {"contact_m", {at.contact_m.x(), at.contact_m.y(), at.contact_m.z()}},
-          {"direction", {at.direction.x(), at.direction.y(), at.direction.z()}},
-          {"stop", acquisition::to_words(push.report.stop)},
-          {"highest_force_n", push.report.highest_force_n},
-          {"deepest_m", push.report.deepest_m},
-          {"pushes_planned", push.pushes_planned > 0 ? nlohmann::json(push.pushes_planned) : nlohmann::json()},
-          {"promised", spread_json(push.plan.expected)},
-          {"found", spread_json(push.found)},
-          {"young_modulus_pa", moduli_json(push.young_moduli)},
-          {"young_modulus_within_95", young_modulus_half_width(push)},
-          {"poisson_ratio", push.poisson_ratio.value},
-          {"poisson_ratio_within_95", poisson_ratio_half_width(push.poisson_ratio)}};
-}
 
 std::string plans_of(const ExploredPush& push) {
   if (push.pushes_planned == 0) return "";
@@ -80,24 +55,29 @@ std::string plans_of(const ExploredPush& push) {
 
 /// What a loop leaves on the disk; a loop that recorded nothing leaves nothing, so that it can be run again.
 struct Kept {
-  Kept(const fs::path& out, const Recording& scene, std::optional<nlohmann::json> known)
-      : folder(out), recording(out / "recording", scene), truth(out / "truth.json", std::move(known)) {}
+  /// @param scene  with the pushes of an earlier run
+  Kept(const fs::path& out, const Recording& scene, TruthFile of_steps)
+      : folder(out), truth(std::move(of_steps)), pushes(out / "exploration.json"), recording(out / "recording", scene) {
+    pushes.go_on(scene.pushes);
+  }
   NewFolder folder;
-  io::RecordingWriter recording;
   TruthFile truth;
+  ExplorationFile pushes;
+  io::RecordingWriter recording;
 };
 
 /// One whole loop; in the lab, on an object of its own. `kept` only where it is recorded, `live` where it may be watched.
-Explored run_loop(Session& session, const Options& given, PushRobot& robot, PushOrder order, Kept* kept, LiveReport* live) {
+/// @param scene  with pushes where it goes on
+Explored run_loop(Session& session, const Options& given, PushRobot& robot, const Recording& scene, PushOrder order, Kept* kept,
+                  LiveReport* live) {
   ExploreOptions options = given.explore;
   options.order = order;
   if (!(options.push.travel_limit_m > 0)) options.push.travel_limit_m = robot.travel_limit_m();
   options.suggest.candidates.reachable = [&](const Vec3& contact_m, const Vec3& direction) {
     return robot.reaches(contact_m, direction, options.push.start_distance_m);
   };
-  Recording scene = robot.scene();
-  if (!given.law.empty()) scene.model.material = given.law;
-  const bool first = order == PushOrder::next_best;
+  LaterRobot arm(robot.robot(), not_before_s(scene.pushes));
+  const bool first = kept != nullptr;
   ExploreHooks hooks;
   hooks.plan = [&](const estimation::PushCandidate& at) { return robot.plan_at(at.contact_m, at.direction); };
   std::string pushing;
@@ -120,6 +100,13 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
     if (report.stop == acquisition::StopReason::slip) session.warn(fmt::format("{}: {}", pushing, report.message));
   };
   hooks.on_push = [&](const ExploredPush& push) {
+    if (kept != nullptr) kept->pushes.add(push);
+    if (push.earlier) {
+      session.say(fmt::format("{} and all before it, by an earlier run: E {} within {:.1f} %, nu {:.3f} within {:.3f}", push.name,
+                              moduli_words(push.young_moduli), 100 * young_modulus_half_width(push), push.poisson_ratio.value,
+                              poisson_ratio_half_width(push.poisson_ratio)));
+      return;
+    }
     const Vec3 &at = push.plan.candidate.contact_m, &along = push.plan.candidate.direction;
     session.say(fmt::format(
         "{}{} at ({:.3f} {:.3f} {:.3f}) along ({:+.2f} {:+.2f} {:+.2f}): E {} within {:.1f} % (promised {}), nu {:.3f} "
@@ -135,22 +122,68 @@ Explored run_loop(Session& session, const Options& given, PushRobot& robot, Push
     hooks.on_progress = live->watch(hooks.on_progress);
     options.identify.fit.on_estimate = live->on_estimate(scene);
   }
-  return explore(robot.robot(), scene, options, hooks);
+  return explore(arm, scene, options, hooks);
 }
 
-std::string count_of(const Explored& run) {
-  const std::size_t pushes = run.pushes.size() + static_cast<std::size_t>(run.fruitless);
-  return fmt::format("{} push{}", pushes, pushes == 1 ? "" : "es");
-}
+int count(const Explored& run) { return static_cast<int>(run.pushes.size()) + run.fruitless; }
+
+std::string count_of(const Explored& run) { return fmt::format("{} push{}", count(run), count(run) == 1 ? "" : "es"); }
 
 /// What the goal took, as far as it is known.
 std::string needed(const Explored& run) { return (run.reached ? "" : "more than ") + count_of(run); }
 
+/// What stands before the robot, and which law it is taken to have.
+Recording scene_of(const Options& given, const PushRobot& robot) {
+  Recording scene = robot.scene();
+  if (!given.law.empty()) scene.model.material = given.law;
+  if (const auto wrong = wrong_material(scene.model.material)) throw Error(*wrong, given.robot.scene.string() + ": model.material");
+  return scene;
+}
+
+/// The other orders in the same lab; with --seeds in further labs, too, and the next best push there.
+void compare(Session& session, const Options& given, const Explored& found, nlohmann::json& json) {
+  struct Order {
+    PushOrder order;
+    const char* name;
+    std::vector<OrderedRun> runs;
+  };
+  Order orders[] = {{PushOrder::next_best, "next best push", {{found.reached, count(found)}}},
+                    {PushOrder::random, "random order", {}},
+                    {PushOrder::best_repeated, "best place repeated", {}}};
+  for (int lab = 0; lab < given.seeds; ++lab) {
+    Options there = given;
+    const std::uint64_t seed = session.seed + std::uint64_t(lab);
+    there.explore.suggest.candidates.seed = there.explore.seed = seed;
+    there.explore.identify.fit.cross_checks = false;  // they are for verdicts, which nobody reads here
+    for (Order& one : orders) {
+      if (lab == 0 && one.order == PushOrder::next_best) continue;
+      session.say(fmt::format("{}, {}:", lab == 0 ? "the same lab" : fmt::format("the lab of seed {}", seed), one.name));
+      const auto another = push_robot(given.robot, seed);  // its noise starts anew
+      Recording scene = scene_of(given, *another);
+      if (given.views > 0 && !look_around(*another, given.views, scene)) return;
+      const Explored other = run_loop(session, there, *another, scene, one.order, nullptr, nullptr);
+      if (Session::interrupted()) return;
+      one.runs.push_back({other.reached, count(other)});
+      if (lab > 0) continue;
+      session.say(fmt::format("{}: {}; next best push: {}", one.name, needed(other), needed(found)));
+      nlohmann::json told = {{"order", one.name}, {"reached", other.reached}, {"pushes", nlohmann::json::array()}};
+      for (const auto& push : other.pushes) told["pushes"].push_back(json_of(push));
+      json["compared"].push_back(told);
+    }
+  }
+  if (given.seeds == 1) return;
+  for (const Order& one : orders) {
+    session.say(fmt::format("{}: {}", one.name, middle_words(one.runs)));
+    json["by_seed"].push_back(by_seed_json(one.name, one.runs));
+  }
+}
+
 int run(const Options& given, Session& session) {
   must_take_files(given.out);
   std::error_code code;
-  if (fs::exists(given.out, code) && !fs::is_empty(given.out, code))
-    throw Error("is there already, and explore begins anew; choose another folder or remove it (`palpate estimate` takes the "
+  const bool exists = fs::exists(given.out, code) && !fs::is_empty(given.out, code);
+  if (exists && !given.resume)
+    throw Error("is there already; say --resume to go on, choose another folder or remove it (`palpate estimate` takes the "
                 "recording in it)",
                 given.out.string());
   check_push_options(given.explore.push);
@@ -161,13 +194,25 @@ int run(const Options& given, Session& session) {
     if (const auto wrong = wrong_material(given.law)) throw Error(*wrong, "--law");
   if (given.compare && !given.robot.driver.empty())
     throw Error("compares orders on fresh objects of the lab, and a driver's world has one only; leave it out", "--compare");
+  if (given.seeds > 1 && !given.compare) throw Error("says in how many labs orders are compared; say --compare, too", "--seeds");
   LiveReport live(given.live, session, given.out.filename().string());
   const auto robot = push_robot(given.robot, session.seed);
-  Recording scene = robot->scene();
-  if (!given.law.empty()) scene.model.material = given.law;
-  if (const auto wrong = wrong_material(scene.model.material)) throw Error(*wrong, given.robot.scene.string() + ": model.material");
-  Kept kept(given.out, scene, robot->truth());
-  Explored found = run_loop(session, given, *robot, PushOrder::next_best, &kept, &live);
+  Recording scene = scene_of(given, *robot);
+  Options loop = given;
+  loop.explore.go_on = exists;
+  TruthFile truth(given.out / "truth.json", robot->truth());
+  if (exists) {
+    EarlierExploration earlier = earlier_exploration(given.out, scene, given.views);
+    scene = std::move(earlier.recording);
+    truth.go_on(scene.pushes);
+    for (const std::string& words : earlier.words) session.warn(words);
+  } else if (given.views > 0 && !look_around(*robot, given.views, scene)) {
+    session.say("stopped on request before the first push; nothing was recorded");
+    session.result({{"format", "palpate-exploration/1"}, {"reached", false}, {"message", "stopped on request"}});
+    return exit_numbers;
+  }
+  Kept kept(given.out, scene, std::move(truth));
+  Explored found = run_loop(session, loop, *robot, scene, PushOrder::next_best, &kept, &live);
   if (found.pushes.empty()) {
     session.warn(found.message);
     session.result({{"format", "palpate-exploration/1"}, {"reached", false}, {"message", found.message}});
@@ -188,22 +233,9 @@ int run(const Options& given, Session& session) {
   live.finish(answer, found.recording, (given.out / "report.html").string());
   nlohmann::json json = {{"format", "palpate-exploration/1"}, {"reached", found.reached},
                          {"message", found.message},          {"fruitless", found.fruitless},
-                         {"pushes", nlohmann::json::array()}, {"result", io::result_json(answer)}};
-  for (const auto& push : found.pushes) json["pushes"].push_back(json_of(push));
-  if (given.compare && !Session::interrupted()) {
-    for (const auto& [order, name] :
-         {std::pair{PushOrder::random, "random order"}, {PushOrder::best_repeated, "best place repeated"}}) {
-      session.say(fmt::format("the same lab, {}:", name));
-      const auto another = push_robot(given.robot, session.seed);  // its noise starts anew
-      const Explored other = run_loop(session, given, *another, order, nullptr, nullptr);
-      if (Session::interrupted()) break;
-      session.say(fmt::format("{}: {}; next best push: {}", name, needed(other), needed(found)));
-      nlohmann::json one = {{"order", name}, {"reached", other.reached}, {"pushes", nlohmann::json::array()}};
-      for (const auto& push : other.pushes) one["pushes"].push_back(json_of(push));
-      json["compared"].push_back(one);
-    }
-  }
-  write_json(json, given.out / "exploration.json");
+                         {"pushes", kept.pushes.pushes(found)}, {"result", io::result_json(answer)}};
+  if (given.compare && !Session::interrupted()) compare(session, given, found, json);
+  kept.pushes.write(json);
   session.result(json);
   return found.reached && answer.termination == Termination::converged ? exit_done : exit_numbers;
 }
@@ -226,7 +258,12 @@ Run verbs::explore(CLI::App& app) {
   app.add_option("--for", given->goal, "young-modulus, poisson-ratio or both: what the next push is chosen for")
       ->check(CLI::IsMember({"young-modulus", "poisson-ratio", "both"}))
       ->capture_default_str();
+  app.add_flag("--resume", given->resume, "go on with a run that was cut off: its pushes are estimated once and count");
+  add_views_option(app, given->views);
   app.add_flag("--compare", given->compare, "also run the same lab with a random order and with the best place repeated");
+  app.add_option("--seeds", given->seeds, "with --compare: so many labs, from --seed on, and what is in the middle of them")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   app.add_option("--levels", options.levels, "force steps of a push")->check(CLI::Range(1, 20))->capture_default_str();
   app.add_option("--contacts", options.suggest.candidates.contacts, "places that are compared")
       ->check(CLI::Range(1, 500))

@@ -24,7 +24,6 @@ void LoggedRobot::put(const std::string& topic, const std::string& type, double 
 
 acquisition::RobotState LoggedRobot::read() {
   acquisition::RobotState state = robot_.read();
-  state.time_s += later_s_;
   const std::int64_t stamp = stamp_of(state.time_s);
   // About the origin of the frame that it is given in, as ROS has it.
   const Vec3 tip_m = state.T_base_tip.translation(), torque_nm = state.torque_nm.value_or(Vec3::Zero()) + tip_m.cross(state.force_n);
@@ -39,7 +38,6 @@ acquisition::RobotState LoggedRobot::read() {
 
 DepthFrame LoggedRobot::take_depth_image() {
   DepthFrame frame = robot_.take_depth_image();
-  frame.time_s += later_s_;
   const std::int64_t stamp = stamp_of(frame.time_s);
   put("/tf", "tf2_msgs/msg/TFMessage", frame.time_s,
       io::encode(std::vector<io::RosTransform>{{{stamp, "base"}, "camera", frame.T_base_camera}}));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -16,10 +15,7 @@ namespace palpate::cli {
 /// tared), poses of tip and camera, depth images. Nothing in the bag says what a push or a step is.
 class LoggedRobot : public acquisition::Robot {
  public:
-  /// @param not_before_s  the clock begins no earlier: a recording that goes on must not go back in time, a robot may have been
-  ///                      switched off in between
-  LoggedRobot(acquisition::Robot& robot, std::vector<std::string> joint_names, double not_before_s)
-      : robot_(robot), joint_names_(std::move(joint_names)), later_s_(not_before_s > 0 ? std::max(0.0, not_before_s - robot.read().time_s) : 0) {}
+  LoggedRobot(acquisition::Robot& robot, std::vector<std::string> joint_names) : robot_(robot), joint_names_(std::move(joint_names)) {}
 
   acquisition::RobotState read() override;
   acquisition::Motion move(const Pose& T_base_tip, double speed_m_s) override { return robot_.move(T_base_tip, speed_m_s); }
@@ -27,6 +23,8 @@ class LoggedRobot : public acquisition::Robot {
   DepthFrame take_depth_image() override;
   void wait(double duration_s) override { robot_.wait(duration_s); }
   double travel_sigma_m() const override { return robot_.travel_sigma_m(); }
+  acquisition::RobotLimits limits() const override { return robot_.limits(); }
+  std::optional<DepthFrame> look(int view, int views) override { return robot_.look(view, views); }
 
   /// True when every image so far said which of its pixels show the robot.
   bool is_masked() const { return masked_; }
@@ -42,7 +40,6 @@ class LoggedRobot : public acquisition::Robot {
   io::BagFolder bag_;
   DepthFrame camera_;  ///< of the last image, without its pixels
   std::vector<std::string> joint_names_;
-  double later_s_ = 0;
   bool masked_ = true;
 };
 

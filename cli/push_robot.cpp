@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <functional>
+#include <utility>
 
 #include "cli/driver_library.hpp"
 #include "cli/number_checks.hpp"
+#include "cli/session.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
@@ -78,7 +80,6 @@ class FromLab : public PushRobot {
     return places_.empty() ? lab_.object().force_step_at(lab_.object().sites[site]) : lab_.object().force_step_n;
   }
   double travel_limit_m() const override { return lab_.object().travel_limit_m; }
-  std::vector<DepthFrame> look_around(int views) const override { return lab_.look_around(views); }
   std::optional<nlohmann::json> truth() const override { return truth_json(lab_); }
   nlohmann::json truth_of(const Push& push, const Step& step) const override { return truth_json(push, step, lab_); }
 
@@ -132,9 +133,6 @@ class FromDriver : public PushRobot {
   }
   double force_step_n(std::size_t) const override { return acquisition::PushOptions{}.force_step_n; }
   double travel_limit_m() const override { return acquisition::PushOptions{}.travel_limit_m; }
-  std::vector<DepthFrame> look_around(int) const override {
-    throw Error("a driver's camera is not carried around: put the views into the scene's `rest.views`", "--views");
-  }
 
  private:
   Vec3 into_the_object(const Vec3& contact_m) const {
@@ -171,6 +169,28 @@ void add_robot_options(CLI::App& app, RobotArguments& arguments) {
       ->needs("--driver")
       ->group(own_robot);
   app.add_option("--tool", arguments.tool, "with --driver: of the scene (default: its first)")->needs("--driver")->group(own_robot);
+}
+
+void add_views_option(CLI::App& app, int& views) {
+  app.add_option("--views", views,
+                 "look at the untouched object from this many sides and let `estimate` build its shape from that; 0: its shape is given. "
+                 "Of drivers those that have the call `look`")
+      ->check(CLI::Range(0, 64))
+      ->capture_default_str();
+}
+
+bool look_around(PushRobot& robot, int views, Recording& scene) {
+  auto frames = acquisition::look_around(robot.robot(), views, [] { return !Session::interrupted(); });
+  if (!frames)
+    throw Error("the driver does not carry its camera around (it has no call `look`): give the object's shape in the scene, or put "
+                "views of it into the scene's `rest.views`",
+                "--views");
+  if (int(frames->size()) < views) return false;
+  scene.rest.views = std::move(*frames);
+  scene.rest.surface.reset();
+  scene.rest.volume.reset();
+  scene.rest.observed_triangles.reset();
+  return true;
 }
 
 void add_contact_options(CLI::App& app, RobotArguments& arguments) {

@@ -24,6 +24,8 @@ struct RobotArguments {
 
 /// What add_lab_options adds, and --driver, --driver-settings, --scene, --tool.
 void add_robot_options(CLI::App& app, RobotArguments& arguments);
+/// --views, of record and explore.
+void add_views_option(CLI::App& app, int& views);
 /// --contact and --direction of the pushes that are to be made.
 void add_contact_options(CLI::App& app, RobotArguments& arguments);
 
@@ -40,12 +42,14 @@ class PushRobot {
   /// Between recorded steps, where the user says nothing.
   virtual double force_step_n(std::size_t site) const = 0;
   virtual double travel_limit_m() const = 0;
-  /// @throws Error where the robot cannot carry its camera around.
-  virtual std::vector<DepthFrame> look_around(int views) const = 0;
   /// What only a simulation knows; nothing where the world is real.
   virtual std::optional<nlohmann::json> truth() const { return {}; }
   virtual nlohmann::json truth_of(const Push&, const Step&) const { return {}; }
 };
+
+/// The object's shape as it is seen from so many sides, in place of the scene's.
+/// @returns false where the user stopped it  @throws Error where the robot does not carry its camera around
+bool look_around(PushRobot& robot, int views, Recording& scene);
 
 /// @throws Error for what the arguments say wrong together, or a driver that cannot be used.
 std::unique_ptr<PushRobot> push_robot(const RobotArguments& arguments, std::uint64_t seed);

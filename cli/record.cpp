@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/later_robot.hpp"
 #include "cli/logged_robot.hpp"
 #include "cli/new_folder.hpp"
 #include "cli/paths.hpp"
@@ -76,7 +77,7 @@ nlohmann::json json_of(const acquisition::PushPlan& plan, const acquisition::Pus
 /// The force or the object ended it, not the robot or the user.
 bool ended_well(acquisition::StopReason stop) {
   using enum acquisition::StopReason;
-  return stop == force_limit || stop == travel_limit || stop == slip || stop == contact_lost;
+  return acquisition::is_at_a_limit(stop) || stop == slip || stop == contact_lost;
 }
 
 const Push* push_named(const std::vector<Push>& pushes, const std::string& name) {
@@ -105,23 +106,24 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   Recording recording = robot->scene();
   std::vector<acquisition::PushPlan> plans;
   for (std::size_t site = 0; site < robot->sites(); ++site) plans.push_back(robot->plan(site));
-  double not_before_s = 0;
   if (exists) {
     const Recording now = std::exchange(recording, io::read_recording_unchecked(folder));
     must_be_same_scene(recording, now, arguments.views > 0 && arguments.views == int(recording.rest.views.size()), folder);
     for (const acquisition::PushPlan& plan : plans)
       if (const Push* recorded = push_named(recording.pushes, plan.name)) must_be_same_push(*recorded, plan, protocol, folder);
     truth.go_on(recording.pushes);
-    if (!recording.pushes.empty() && !recording.pushes.back().steps.empty())
-      not_before_s = recording.pushes.back().steps.back().time_s + 1;
   } else if (arguments.views > 0) {
-    recording.rest.views = robot->look_around(arguments.views);
-    recording.rest.surface.reset();
+    if (!look_around(*robot, arguments.views, recording)) {
+      session.say("stopped on request before the first push; nothing was recorded");
+      session.result({{"recording", arguments.output}, {"steps", 0}, {"pushes", nlohmann::json::array()}});
+      return exit_numbers;
+    }
   }
   const std::vector<Push> recorded = recording.pushes;
   NewFolder made_here(folder);
   io::RecordingWriter writer(folder, recording);
-  LoggedRobot logged(robot->robot(), recording.joint_names, not_before_s);
+  LaterRobot later(robot->robot(), not_before_s(recorded));
+  LoggedRobot logged(later, recording.joint_names);
   Made made;
   for (std::size_t site = 0; site < plans.size() && !Session::interrupted(); ++site) {
     const acquisition::PushPlan plan = robot->plan(site);  // the robot then presses there
@@ -219,10 +221,7 @@ Run verbs::record(CLI::App& app) {
   auto arguments = std::make_shared<RecordArguments>();
   app.add_flag("--demo", arguments->demo, "the built-in recording: a foam cube on a table, pressed from above, simulated");
   app.add_option("-o,--out,--output", arguments->output, "folder to write; must not exist or be empty")->required();
-  app.add_option("--views", arguments->views,
-                 "look at the untouched object from this many sides and let `estimate` build its shape from that; 0: its shape is given")
-      ->check(CLI::Range(0, 64))
-      ->capture_default_str();
+  add_views_option(app, arguments->views);
   app.add_option("--truth", arguments->truth,
                  "file for what the simulation knows and the recording does not (default: beside the recording, OUTPUT.truth.json; "
                  "with --demo: not written)");

@@ -128,6 +128,11 @@ void must_be_same_scene(const Recording& there, const Recording& now, bool by_vi
   as.same("model's material", there.model.material, now.model.material);
 }
 
+double not_before_s(const std::vector<Push>& pushes) {
+  constexpr double pause_s = 1;
+  return pushes.empty() || pushes.back().steps.empty() ? 0 : pushes.back().steps.back().time_s + pause_s;
+}
+
 void must_be_same_push(const Push& recorded, const acquisition::PushPlan& plan, const acquisition::PushOptions& protocol,
                        const std::filesystem::path& folder) {
   const Comparison as(folder);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/recording.hpp"
@@ -17,5 +18,8 @@ void must_be_same_scene(const Recording& there, const Recording& now, bool by_vi
 /// @throws Error where the push of this name was recorded elsewhere, along another direction or with another tool
 void must_be_same_push(const Push& recorded, const acquisition::PushPlan& plan, const acquisition::PushOptions& protocol,
                        const std::filesystem::path& folder);
+
+/// When a robot's clock may go on after these pushes, s; 0 where there are none.
+double not_before_s(const std::vector<Push>& pushes);
 
 }  // namespace palpate::cli

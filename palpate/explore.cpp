@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <utility>
+#include <variant>
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/target_plan.hpp"
@@ -29,10 +31,12 @@ class Loop {
       : robot_(robot), options_(options), hooks_(hooks) {
     out_.recording = scene;
     out_.recording.pushes.clear();
+    if (options.go_on) earlier_ = scene.pushes;
     prepare(scene);
   }
 
   Explored run() {
+    if (!take_up()) return end("stopped on request");
     std::vector<RatedPush> fixed_order;
     while (out_.message.empty()) {
       if (hooks_.keep_going && !hooks_.keep_going()) return end("stopped on request");
@@ -67,8 +71,10 @@ class Loop {
  private:
   void prepare(const Recording& scene) {
     SuggestOptions suggesting = options_.suggest;
-    suggesting.candidates.limits.force_n = std::min(suggesting.candidates.limits.force_n, options_.push.force_limit_n);
-    suggesting.candidates.limits.travel_m = std::min(suggesting.candidates.limits.travel_m, options_.push.travel_limit_m);
+    borne_ = acquisition::within(robot_.limits(), options_.push);
+    suggesting.candidates.limits.force_n = std::min(suggesting.candidates.limits.force_n, borne_.force_limit_n);
+    suggesting.candidates.limits.travel_m = std::min(suggesting.candidates.limits.travel_m, borne_.travel_limit_m);
+    if (options_.go_on) step_back();
     options_.suggest = suggesting;
     // What the robot's own sensors say of themselves.
     const DepthFrame frame = robot_.take_depth_image();
@@ -98,6 +104,89 @@ class Loop {
     }
     const Vec3 variance = (squares / count - (sum / count).cwiseAbs2()).cwiseMax(0.0);
     return std::max(1e-4, std::sqrt(variance.mean()));
+  }
+
+  /// A run that was killed has left the tip where it was: the way to the next place must not lead through the object.
+  void step_back() {
+    const Pose tip = robot_.read().T_base_tip;
+    const Vec3 along = tip.linear().col(2);
+    double deep_m = 0;
+    if (!earlier_.empty() && is_pressed(earlier_.back()))
+      deep_m = std::clamp((tip.translation() - last_load(earlier_.back()).contact_m).dot(along), 0.0, borne_.travel_limit_m);
+    for (const double share : {1.0, 0.5, 0.25, 0.125}) {  // as far as the robot does
+      if (hooks_.keep_going && !hooks_.keep_going()) return;
+      Pose back = tip;
+      back.translation() -= share * (deep_m + borne_.start_distance_m) * along;
+      if (robot_.move(back, borne_.approach_speed_m_s) == acquisition::Motion::done) return;
+    }
+  }
+
+  static bool is_pressed(const Push& push) {
+    return std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) { return !step.loads.empty(); });
+  }
+  static const Load& last_load(const Push& pressed) {
+    for (auto step = pressed.steps.rbegin();; ++step)
+      if (!step->loads.empty()) return step->loads.front();
+  }
+
+  /// What an earlier run recorded. @returns false where the user stopped the estimate
+  bool take_up() {
+    for (const Push& push : earlier_) {
+      number_ = std::max(number_ + 1, number_in(push.name));
+      if (is_pressed(push)) {
+        out_.recording.pushes.push_back(push);
+        out_.pushes.push_back(as_recorded(push));
+      } else {
+        ++out_.fruitless;
+        if (!push.steps.empty() && push.steps.front().T_base_tip) forget_before(*push.steps.front().T_base_tip);
+      }
+    }
+    if (out_.pushes.empty()) return true;
+    estimate(false);
+    if (out_.identified.answer.termination == Termination::cancelled) return false;
+    if (judge(out_.pushes.back())) tell_of_last();
+    return true;
+  }
+
+  static ExploredPush as_recorded(const Push& push) {
+    constexpr double unknown = std::numeric_limits<double>::infinity();
+    ExploredPush made;
+    made.name = push.name;
+    made.earlier = true;
+    const Load& load = last_load(push);
+    made.plan.candidate.contact_m = load.contact_m;
+    made.plan.candidate.direction = load.direction;
+    made.plan.expected.log_young_std = made.plan.expected.poisson_std = unknown;
+    made.found = made.plan.expected;
+    made.report.message = "made by an earlier run";
+    made.report.contact_m = load.contact_m;
+    for (const Step& step : push.steps) {
+      if (!step.loads.empty() && step.loads.front().force_n)
+        made.report.highest_force_n = std::max(made.report.highest_force_n, step.loads.front().force_n->dot(load.direction));
+      for (const Observation& seen : step.observations)
+        if (const auto* encoder = std::get_if<ToolTravel>(&seen))
+          made.report.deepest_m = std::max(made.report.deepest_m, encoder->travel_m);
+    }
+    made.plan.force_n = made.report.highest_force_n;
+    made.plan.travel_m = made.report.deepest_m;
+    return made;
+  }
+
+  /// Of "push 7".
+  static int number_in(const std::string& name) {
+    const std::size_t digits = name.find_last_not_of("0123456789") + 1;
+    return digits < name.size() && name.size() - digits < 9 ? std::stoi(name.substr(digits)) : 0;
+  }
+
+  /// The place that a tip in front of the object was to push at.
+  void forget_before(const Pose& T_base_tip) {
+    constexpr double same_m = 0.003;  // an arm repeats to some tenths of a millimetre
+    const Vec3 along = T_base_tip.linear().col(2);
+    for (const auto& one : out_.scene.candidates) {
+      const Vec3 ahead_m = one.contact_m - T_base_tip.translation();
+      if (one.direction.dot(along) < 0.999 || (ahead_m - ahead_m.dot(along) * along).norm() > same_m) continue;
+      return forget(estimation::PushCandidate(one));
+    }
   }
 
   estimation::SpreadTarget target() const { return {options_.young_modulus_within, options_.poisson_ratio_within}; }
@@ -136,7 +225,7 @@ class Loop {
 
   void push(ExploredPush& next, bool stiffness_known) {
     acquisition::PushPlan plan = hooks_.plan(next.plan.candidate);
-    plan.name = next.name = "push " + std::to_string(out_.pushes.size() + static_cast<std::size_t>(out_.fruitless) + 1);
+    plan.name = next.name = "push " + std::to_string(++number_);
     acquisition::PushOptions protocol = options_.push;
     protocol.travel_limit_m = std::min(protocol.travel_limit_m, next.plan.travel_m);
     if (stiffness_known) {
@@ -165,22 +254,21 @@ class Loop {
 
   /// A short touch says how stiff it is there; nothing of it is recorded.
   double first_step_n(const acquisition::PushPlan& plan, acquisition::PushOptions protocol) {
-    const double whole_m = protocol.travel_limit_m;
+    const double whole_m = std::min(protocol.travel_limit_m, borne_.travel_limit_m);
     protocol.travel_limit_m = std::min(options_.touch_travel_m, protocol.travel_limit_m);
     protocol.force_step_n = protocol.force_limit_n;
     protocol.unloading_steps = 0;
     const auto report = acquisition::run_push(robot_, plan, protocol, {}, hooks_.keep_going);
     if (!(report.highest_force_n > 0) || !(report.deepest_m > 0)) return options_.push.force_step_n;
     const double whole_n = report.highest_force_n / report.deepest_m * whole_m;
-    return std::max(1e-3, std::min(whole_n, options_.push.force_limit_n) / options_.levels);
+    return std::max(1e-3, std::min(whole_n, borne_.force_limit_n) / options_.levels);
   }
 
   /// The last push has a loaded step; else it is taken out of the recording again.
   bool pressed() {
     auto& pushes = out_.recording.pushes;
     if (pushes.size() == out_.pushes.size()) return false;
-    for (const Step& step : pushes.back().steps)
-      if (!step.loads.empty()) return true;
+    if (is_pressed(pushes.back())) return true;
     pushes.pop_back();
     return false;
   }
@@ -195,22 +283,33 @@ class Loop {
   void estimate(bool whole) {
     IdentifyOptions options = options_.identify;
     options.fit.cross_checks = whole;
-    if (!out_.pushes.empty()) options.fit.young_start_pa = parameters(out_.identified.answer, "young_modulus").front().value;
+    if (!out_.identified.answer.parameters.empty())
+      options.fit.young_start_pa = parameters(out_.identified.answer, "young_modulus").front().value;
     out_.identified = identify(out_.recording, options, hooks_.on_progress);
   }
 
   void take_in(ExploredPush next) {
+    if (!judge(next)) return;
+    out_.pushes.push_back(std::move(next));
+    tell_of_last();
+  }
+
+  /// @returns false where there is no estimate to judge by
+  bool judge(ExploredPush& next) {
     const Identification& answer = out_.identified.answer;
     if (answer.parameters.empty()) {
       out_.message = "the estimate did not work out: " + answer.message;
-      return;
+      return false;
     }
     next.young_moduli = parameters(answer, "young_modulus");
     next.poisson_ratio = parameters(answer, "poisson_ratio").front();
     next.found = estimation::expected_after(estimation::after_fit(out_.recording, answer), {});
     out_.reached = young_modulus_half_width(next) <= options_.young_modulus_within &&
                    poisson_ratio_half_width(next.poisson_ratio) <= options_.poisson_ratio_within;
-    out_.pushes.push_back(std::move(next));
+    return true;
+  }
+
+  void tell_of_last() {
     if (hooks_.on_push) hooks_.on_push(out_.pushes.back());
     const bool two = out_.pushes.back().young_moduli.size() == 1;
     if (out_.reached) out_.message = std::string(two ? "both" : "all") + " intervals are as narrow as was asked for";
@@ -225,7 +324,10 @@ class Loop {
 
   acquisition::Robot& robot_;
   ExploreOptions options_;
+  acquisition::PushOptions borne_;  // of options_.push, what the robot bears
   const ExploreHooks& hooks_;
+  std::vector<Push> earlier_;
+  int number_ = 0;  // of the last push
   Explored out_;
 };
 
@@ -247,7 +349,7 @@ void check(const ExploreOptions& o) {
 
 double young_modulus_half_width(const Parameter& young) { return 0.5 * (young.upper_95 - young.lower_95) / young.value; }
 double young_modulus_half_width(const ExploredPush& push) {
-  double widest = 0;
+  double widest = push.young_moduli.empty() ? std::numeric_limits<double>::infinity() : 0;
   for (const Parameter& one : push.young_moduli) widest = std::max(widest, young_modulus_half_width(one));
   return widest;
 }

@@ -32,8 +32,11 @@ struct ExploreOptions {
   SuggestOptions suggest;
   int levels = 4;                 ///< force steps of a push
   double touch_travel_m = 0.002;  ///< of the trial touch that sizes the first push's steps; it is not recorded
-  acquisition::PushOptions push;  ///< limits of force and travel are the lower of these and the plan's
+  acquisition::PushOptions push;  ///< limits of force and travel are the lowest of these, the plan's and the robot's
   IdentifyOptions identify;
+  /// The scene's pushes are those of a run that was cut off: they are estimated once and count as made. The tip goes back along the
+  /// tool first, for it may still stand in the object. false: pushes of the scene are not looked at.
+  bool go_on = false;
 };
 
 /// @throws Error naming the option that is out of range.
@@ -42,7 +45,10 @@ void check(const ExploreOptions& options);
 /// One push of the loop, and what it gave.
 struct ExploredPush {
   std::string name;
-  estimation::RatedPush plan;  ///< `expected` is what was promised for after it
+  /// Of an earlier run, whose recording says where it pushed and what came of it: what was planned, why it ended and what stood
+  /// after it is not known. Only the last of them has an estimate, from all of them.
+  bool earlier = false;
+  estimation::RatedPush plan;  ///< `expected` is what was promised for after it; infinite where that is not known
   int pushes_planned = 0;      ///< from this one on, until the goal; 0: not within max_pushes, or not planned
   acquisition::PushReport report;
   std::vector<Parameter> young_moduli;     ///< of every region, or one; estimated from all pushes so far
@@ -56,6 +62,7 @@ struct Explored {
   PushScene scene;
   std::vector<ExploredPush> pushes;
   int fruitless = 0;     ///< pushes that found nothing to press on; they count, and their places are not tried again
+                         ///< (of an earlier run those that recorded a step)
   bool reached = false;  ///< the goal
   std::string message;   ///< why it ended, in plain words
 };
@@ -71,14 +78,15 @@ struct ExploreHooks {
   OnProgress on_progress;
 };
 
-/// @param scene  object, supports, tools and priors without pushes; with `regions`, every part's E is wanted
+/// @param scene  object, supports, tools and priors; with `regions`, every part's E is wanted. Pushes: see ExploreOptions::go_on;
+///               one without a step under load is fruitless, one that was cut off counts by the loads that it has
 /// @throws Error where no push is possible, no hook plans one, or no answer can exist.
 Explored explore(acquisition::Robot& robot, const Recording& scene, const ExploreOptions& options,
                  const ExploreHooks& hooks);
 
 /// Half of a 95 % interval over E (relative) and of nu.
 double young_modulus_half_width(const Parameter& young_modulus);
-/// Of the least known region.
+/// Of the least known region. Of a push without an estimate: infinite.
 double young_modulus_half_width(const ExploredPush& push);
 double poisson_ratio_half_width(const Parameter& poisson_ratio);
 

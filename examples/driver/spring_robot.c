@@ -6,6 +6,8 @@
  *   palpate record --driver ./libspring_robot.so --driver-settings 800 --scene scene --contact 0.5 0 0.1 -o on_a_spring
  *   palpate check on_a_spring --stiffness 800
  *   palpate explore --driver ./libspring_robot.so --driver-settings "soft 20000 0.3" --scene soft_scene -o on_a_block
+ *   palpate record --driver ./libspring_robot.so --driver-settings "soft 20000 0.3" --scene soft_scene --views 6 \
+ *       --contact 0.5 0 0.2 --force-limit 1.5 --force-step 0.5 -o looked_at
  *
  * A plate goes down as a whole and has no Young's modulus; the block of 20 kPa and 0.3 has one that explore can find.
  */
@@ -102,6 +104,18 @@ static int stop_robot(void* self) {
   return PALPATE_DONE;
 }
 
+/* What all images have in common. */
+static void fill_in(struct World* world, struct PalpateDepthImage* image) {
+  image->time_s = world->clock_s;
+  image->width_px = width_px;
+  image->height_px = height_px;
+  image->fx_px = image->fy_px = focal_px;
+  image->cx_px = 79.5;
+  image->cy_px = 59.5;
+  image->sigma_m = 0.0005;
+  image->depth_m = world->depth_m;
+}
+
 static int take_depth_image(void* self, struct PalpateDepthImage* image) {
   struct World* world = self;
   for (int row = 0; row < height_px; ++row)
@@ -113,17 +127,58 @@ static int take_depth_image(void* self, struct PalpateDepthImage* image) {
       if (fabs(x * depth) > world->half_m || fabs(y * depth) > world->half_m) depth = camera_m;
       world->depth_m[row * width_px + column] = (float)(depth + 0.0005 * noise(world));
     }
-  image->time_s = world->clock_s;
-  image->width_px = width_px;
-  image->height_px = height_px;
-  image->fx_px = image->fy_px = focal_px;
-  image->cx_px = 79.5;
-  image->cy_px = 59.5;
+  fill_in(world, image);
   image->T_base_camera.position_m[0] = middle_x_m;
   image->T_base_camera.position_m[2] = camera_m;
   image->T_base_camera.rotation_wxyz[1] = 1; /* half a turn about x: looks down */
-  image->sigma_m = 0.0005;
-  image->depth_m = world->depth_m;
+  return PALPATE_DONE;
+}
+
+/* How far along a ray the box that stands there begins, or the table. */
+static double range_to(const struct World* world, const double* from_m, const double* along) {
+  const double low[3] = {middle_x_m - world->half_m, -world->half_m, 0};
+  const double high[3] = {middle_x_m + world->half_m, world->half_m, world->top_m};
+  double enters = 0, leaves = 1e9;
+  for (int i = 0; i < 3; ++i) {
+    const double a = (low[i] - from_m[i]) / along[i], b = (high[i] - from_m[i]) / along[i];
+    enters = fmax(enters, fmin(a, b));
+    leaves = fmin(leaves, fmax(a, b));
+  }
+  if (enters < leaves) return enters;
+  return along[2] < 0 ? -from_m[2] / along[2] : 0; /* 0: nothing is there */
+}
+
+/* A second camera goes around what stands there: a ring that looks down by a third of a right angle, then from above. Its place is
+ * known exactly; a real one states what it errs by. The stick stays above, out of its sight. */
+static int look_from(void* self, int view, int views, struct PalpateDepthImage* image) {
+  struct World* world = self;
+  const int above = view == views - 1;
+  const double away_m = 0.8, turn = above ? 0 : 2 * pi * view / (views - 1) + pi / 4, down = above ? 0.5 * pi : pi / 6;
+  /* Axes of the camera in the base frame, and the same as a quaternion: turned about z, tilted about the camera's x, looking down. */
+  const double right[3] = {-sin(turn), cos(turn), 0}, lower[3] = {sin(down) * cos(turn), sin(down) * sin(turn), -cos(down)};
+  const double forward[3] = {-cos(down) * cos(turn), -cos(down) * sin(turn), -sin(down)};
+  const double c = cos(pi / 4 - down / 2), s = sin(pi / 4 - down / 2);
+  const double less = cos(turn / 2) - sin(turn / 2), more = cos(turn / 2) + sin(turn / 2);
+  const double rotation[4] = {-s * less, c * less, c * more, -s * more};
+  double* eye_m = image->T_base_camera.position_m;
+  for (int i = 0; i < 4; ++i) image->T_base_camera.rotation_wxyz[i] = sqrt(0.5) * rotation[i];
+  for (int i = 0; i < 3; ++i) eye_m[i] = (i == 0 ? middle_x_m : i == 2 ? 0.5 * world->top_m : 0) - away_m * forward[i];
+  for (int row = 0; row < height_px; ++row)
+    for (int column = 0; column < width_px; ++column) {
+      const double x = (column - 79.5) / focal_px, y = (row - 59.5) / focal_px;
+      double along[3];
+      for (int i = 0; i < 3; ++i) along[i] = forward[i] + x * right[i] + y * lower[i];
+      const double depth = range_to(world, eye_m, along); /* along has length 1 along the optical axis */
+      world->depth_m[row * width_px + column] = depth > 0 ? (float)(depth + 0.0005 * noise(world)) : 0;
+    }
+  fill_in(world, image);
+  return PALPATE_DONE;
+}
+
+static int own_limits(void* self, struct PalpateLimits* limits) {
+  (void)self;
+  limits->force_n = 40; /* of the load cell */
+  limits->speed_m_s = 0.1;
   return PALPATE_DONE;
 }
 
@@ -147,8 +202,9 @@ int palpate_make_robot(uint32_t abi, const char* settings, struct PalpateRobot* 
   double stiffness = 800, young_pa = 0, poisson = 0;
   int end = 0;
   const int soft = sscanf(settings, "soft %lf %lf %n", &young_pa, &poisson, &end) == 2;
-  if (abi != PALPATE_ROBOT_ABI) {
-    snprintf(error, error_size, "this driver is for version %u of palpate's robots, not %u", PALPATE_ROBOT_ABI, abi);
+  if (abi < PALPATE_ROBOT_ABI) {
+    snprintf(error, error_size, "this driver is for version %u of palpate's robots, and the program has %u; take a newer program, or "
+                                "build the driver with that one's header", PALPATE_ROBOT_ABI, abi);
     return PALPATE_FAILED;
   }
   if (!soft && *settings != '\0' && sscanf(settings, "%lf %n", &stiffness, &end) != 1) stiffness = 0;
@@ -182,5 +238,7 @@ int palpate_make_robot(uint32_t abi, const char* settings, struct PalpateRobot* 
   robot->reaches = reaches;
   robot->last_error = last_error;
   robot->destroy = free;
+  robot->limits = own_limits;
+  robot->look = look_from;
   return PALPATE_DONE;
 }

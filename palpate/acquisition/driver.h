@@ -4,8 +4,8 @@
  *   int palpate_make_robot(uint32_t abi, const char* settings, struct PalpateRobot* robot, char* error, size_t error_size);
  *
  * `palpate record --driver ./libdriver.so` loads it and runs the push protocol on what it fills in, `palpate explore` the loop
- * that chooses its own pushes. A small one is in examples/driver. Lengths in metres, angles in radians, forces in newtons, times in seconds; frames as in
- * docs/conventions.md. Every call is made from one thread. */
+ * that chooses its own pushes. A small one is in examples/driver. Lengths in metres, angles in radians, forces in newtons, times
+ * in seconds; frames as in docs/conventions.md. Every call is made from one thread. */
 #ifndef PALPATE_ACQUISITION_DRIVER_H
 #define PALPATE_ACQUISITION_DRIVER_H
 
@@ -16,8 +16,9 @@
 extern "C" {
 #endif
 
-/** Changes whenever a struct or the meaning of a call does. */
-#define PALPATE_ROBOT_ABI 1u
+/** Changes whenever a struct or the meaning of a call does. A program uses drivers of its own version and of every one before it:
+ *  1: the first. 2: `limits` and `look` at the end of PalpateRobot. */
+#define PALPATE_ROBOT_ABI 2u
 #define PALPATE_ROBOT_ENTRY "palpate_make_robot"
 enum { PALPATE_MAX_JOINTS = 64 };
 
@@ -59,7 +60,14 @@ struct PalpateDepthImage {
                                           by the scene's description of it */
 };
 
-/** Filled in by palpate_make_robot. `self` is handed to every call. All calls but `reaches` are required. */
+/** What the robot itself bears, whatever a push asks for. Comes infinite: what is left so has no limit of its own. */
+struct PalpateLimits {
+  double force_n;   /**< of the tip along a push: what hand and sensor bear, or what the sensor can tell once it is tared */
+  double travel_m;  /**< into the object, from first contact */
+  double speed_m_s; /**< of the tip */
+};
+
+/** Filled in by palpate_make_robot. `self` is handed to every call. All calls but `reaches`, `limits` and `look` are required. */
 struct PalpateRobot {
   uint32_t abi; /**< PALPATE_ROBOT_ABI of the header that the driver was built with */
   void* self;
@@ -73,9 +81,16 @@ struct PalpateRobot {
   int (*reaches)(void* self, const struct PalpatePose* T_base_tip); /**< not 0: gets there; NULL: not known beforehand */
   const char* (*last_error)(void* self);
   void (*destroy)(void* self);
+  /* Since version 2 */
+  int (*limits)(void* self, struct PalpateLimits* limits); /**< asked before every push; NULL: none but what move() refuses */
+  /** Carries the camera to the `view`-th, from 0, of `views` places of the robot's own choosing around the untouched object, some
+      of them from above, and takes an image there. The arm does not hide the object, or the mask says where: palpate does not
+      know the joints then. NULL: the camera is not carried around. */
+  int (*look)(void* self, int view, int views, struct PalpateDepthImage* image);
 };
 
-/** @param abi  PALPATE_ROBOT_ABI of the program; answer PALPATE_FAILED when it is not yours
+/** @param abi  PALPATE_ROBOT_ABI of the program; before anything else answer PALPATE_FAILED when it is less than yours: `*robot` is
+ *              too short then. A program that a driver refuses asks once more as version 1, for drivers that want no other
  *  @param settings  what the user said with --driver-settings ("" otherwise): an address, a file, ...
  *  @param robot  comes zeroed
  *  @param error  room for `error_size` characters that say, after PALPATE_FAILED, what to do */

@@ -14,6 +14,7 @@ namespace palpate::acquisition {
 namespace {
 
 constexpr int largest_side_px = 16384;
+constexpr std::uint32_t first_abi = 1;  // its struct is the beginning of today's, which it leaves zeroed from there on
 
 PalpatePose pose_to_c(const Pose& pose) {
   const Eigen::Quaterniond q(pose.linear());
@@ -21,21 +22,45 @@ PalpatePose pose_to_c(const Pose& pose) {
   return {{p.x(), p.y(), p.z()}, {q.w(), q.x(), q.y(), q.z()}};
 }
 
+struct Made {
+  PalpateRobot robot{};
+  bool done = false;
+  std::string words;  // why not
+};
+
+Made make_as(std::uint32_t abi, MakeRobot make, const std::string& settings) {
+  Made made;
+  std::array<char, 1024> error{};
+  made.done = make(abi, settings.c_str(), &made.robot, error.data(), error.size()) == PALPATE_DONE;
+  error.back() = '\0';
+  made.words = error.data();
+  return made;
+}
+
+/// A driver cannot be asked for its version before it is made, and those of the first one refuse any other.
+PalpateRobot made_robot(MakeRobot make, const std::string& settings, const std::string& name) {
+  const Made own = make_as(PALPATE_ROBOT_ABI, make, settings);
+  if (own.done) return own.robot;
+  const Made first = make_as(first_abi, make, settings);
+  if (first.done) return first.robot;
+  if (own.words.empty()) throw Error("did not start and does not say why; ask its makers, or check its settings", name);
+  // One of the two may be about the version only. Nobody but a person can tell which.
+  throw Error(first.words.empty() || first.words == own.words ? own.words : own.words + " (asked as version 1: " + first.words + ")", name);
+}
+
 }  // namespace
 
 DriverRobot::DriverRobot(MakeRobot make, const std::string& settings, std::string name) : name_(std::move(name)) {
-  std::array<char, 1024> error{};
-  const int answer = make(PALPATE_ROBOT_ABI, settings.c_str(), &robot_, error.data(), error.size());
-  error.back() = '\0';
-  const PalpateRobot made = std::exchange(robot_, {});  // what is refused is not destroyed: its layout may be another one
-  if (answer != PALPATE_DONE)
-    throw Error(error[0] != '\0' ? std::string(error.data())
-                                 : std::string("did not start and does not say why; ask its makers, or check its settings"),
+  PalpateRobot made = made_robot(make, settings, name_);  // what is refused is not destroyed: its layout may be another one
+  if (made.abi < first_abi || made.abi > PALPATE_ROBOT_ABI)
+    throw Error("was built for version " + std::to_string(made.abi) + " of driver.h, this program knows versions " +
+                    std::to_string(first_abi) + " to " + std::to_string(PALPATE_ROBOT_ABI) +
+                    "; build the driver anew with this program's header",
                 name_);
-  if (made.abi != PALPATE_ROBOT_ABI)
-    throw Error("was built for version " + std::to_string(made.abi) + " of driver.h, this program has version " +
-                    std::to_string(PALPATE_ROBOT_ABI) + "; build the driver anew with this program's header",
-                name_);
+  if (made.abi < 2) {
+    made.limits = nullptr;
+    made.look = nullptr;
+  }
   const auto need = [&](bool there, const char* call) {
     if (!there) throw Error("leaves the call `" + std::string(call) + "` empty; fill it in", name_);
   };
@@ -111,8 +136,19 @@ void DriverRobot::wait(double duration_s) { expect_done("wait", robot_.wait(robo
 DepthFrame DriverRobot::take_depth_image() {
   PalpateDepthImage given{};
   expect_done("take_depth_image", robot_.take_depth_image(robot_.self, &given));
+  return frame_of("take_depth_image", given);
+}
+
+std::optional<DepthFrame> DriverRobot::look(int view, int views) {
+  if (robot_.look == nullptr) return std::nullopt;
+  PalpateDepthImage given{};
+  expect_done("look", robot_.look(robot_.self, view, views, &given));
+  return frame_of("look", given);
+}
+
+DepthFrame DriverRobot::frame_of(const char* call, const PalpateDepthImage& given) const {
   const auto need = [&](bool good, const char* what) {
-    if (!good) failed("take_depth_image", what);
+    if (!good) failed(call, what);
   };
   need(given.width_px > 0 && given.height_px > 0 && given.width_px <= largest_side_px && given.height_px <= largest_side_px,
        "width_px, height_px: must be from 1 to 16384");
@@ -129,7 +165,7 @@ DepthFrame DriverRobot::take_depth_image() {
   frame.camera.fy_px = given.fy_px;
   frame.camera.cx_px = given.cx_px;
   frame.camera.cy_px = given.cy_px;
-  frame.T_base_camera = pose_of("take_depth_image", "T_base_camera", given.T_base_camera);
+  frame.T_base_camera = pose_of(call, "T_base_camera", given.T_base_camera);
   frame.pose_std_m = given.pose_std_m;
   frame.pose_std_rad = given.pose_std_rad;
   if (given.noise_model != nullptr) {
@@ -149,6 +185,20 @@ double DriverRobot::travel_sigma_m() const {
   const double sigma_m = robot_.travel_sigma_m(robot_.self);
   if (!(sigma_m > 0) || !std::isfinite(sigma_m)) failed("travel_sigma_m", "must be positive");
   return sigma_m;
+}
+
+RobotLimits DriverRobot::limits() const {
+  RobotLimits limits;
+  if (robot_.limits == nullptr) return limits;
+  PalpateLimits given{limits.force_n, limits.travel_m, limits.speed_m_s};
+  expect_done("limits", robot_.limits(robot_.self, &given));
+  const auto need = [&](double limit, const char* field) {
+    if (!(limit > 0)) failed("limits", std::string(field) + ": must be positive; leave it infinite where there is no limit");
+  };
+  need(given.force_n, "force_n");
+  need(given.travel_m, "travel_m");
+  need(given.speed_m_s, "speed_m_s");
+  return {given.force_n, given.travel_m, given.speed_m_s};
 }
 
 bool DriverRobot::reaches(const Pose& T_base_tip) const {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -32,12 +33,30 @@ void check(const PushOptions& o) {
   sensing::check(o.slip);
 }
 
+PushOptions within(const RobotLimits& limits, PushOptions options) {
+  check(limits);
+  options.force_limit_n = std::min(options.force_limit_n, limits.force_n);
+  options.travel_limit_m = std::min(options.travel_limit_m, limits.travel_m);
+  options.approach_speed_m_s = std::min(options.approach_speed_m_s, limits.speed_m_s);
+  options.push_speed_m_s = std::min(options.push_speed_m_s, limits.speed_m_s);
+  return options;
+}
+
+bool is_at_a_limit(StopReason reason) {
+  using enum StopReason;
+  return reason == force_limit || reason == travel_limit || reason == robot_force_limit || reason == robot_travel_limit;
+}
+
 const char* to_words(StopReason reason) {
   switch (reason) {
     case StopReason::force_limit:
       return "force limit";
     case StopReason::travel_limit:
       return "travel limit";
+    case StopReason::robot_force_limit:
+      return "force limit of the robot";
+    case StopReason::robot_travel_limit:
+      return "travel limit of the robot";
     case StopReason::slip:
       return "slip";
     case StopReason::contact_lost:

@@ -51,12 +51,28 @@ struct PushOptions {
 /// @throws Error naming the option that is out of range.
 void check(const PushOptions& options);
 
+/// The push as a robot of these limits makes it: the lower of both.
+/// @throws Error naming the limit that is not positive.
+PushOptions within(const RobotLimits& limits, PushOptions options);
+
 /// Prior of the travel's zero, m: it is traced back to about half an increment, from tips that are known to `travel_sigma_m`.
 double travel_offset_std_m(const PushOptions& options, double travel_sigma_m);
 
-/// moved: a push that goes on finds contact elsewhere than the part that is recorded.
-enum class StopReason { force_limit, travel_limit, slip, contact_lost, no_contact, robot_limit, moved, user };
+enum class StopReason {
+  force_limit,  ///< as the options had it
+  travel_limit,
+  robot_force_limit,  ///< of RobotLimits, lower than the options'
+  robot_travel_limit,
+  slip,
+  contact_lost,
+  no_contact,
+  robot_limit,  ///< the robot refused a motion
+  moved,        ///< a push that goes on finds contact elsewhere than the part that is recorded
+  user
+};
 const char* to_words(StopReason reason);
+/// The push was whole: as far as it was to go.
+bool is_at_a_limit(StopReason reason);
 
 struct PushReport {
   StopReason stop = StopReason::user;
@@ -82,7 +98,7 @@ struct PushReport {
 /// flight.
 using OnStep = std::function<void(const Push& push, const Step& step)>;
 
-/// Runs one push.
+/// Runs one push, within the robot's own limits.
 /// @param keep_going  asked before every motion and while it waits; false stops the robot where it is (StopReason::user)
 /// @param so_far  steps of the same push that an earlier run has recorded: they are not recorded again, and the force rises
 ///                from where they end; where the way back had begun, from its top once more. Travel counts from their zero,

@@ -10,7 +10,12 @@ namespace palpate::acquisition {
 
 PushRun::PushRun(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
                  const std::function<bool()>& keep_going, const Push* so_far)
-    : robot_(robot), plan_(plan), options_(options), on_step_(on_step), keep_going_(keep_going) {
+    : robot_(robot),
+      plan_(plan),
+      asked_(options),
+      options_(within(robot.limits(), options)),
+      on_step_(on_step),
+      keep_going_(keep_going) {
   push_.name = plan.name;
   push_.site = plan.site;
   if (!so_far) return;
@@ -41,7 +46,7 @@ void PushRun::push() {
     look_at_rest();
     const Stopped stop = is_pressed_already() ? Stopped{StopReason::force_limit, "only the look after it was missing"} : press();
     told(stop);
-    if (stop.reason == StopReason::force_limit || stop.reason == StopReason::travel_limit) go_back_step_by_step();
+    if (is_at_a_limit(stop.reason)) go_back_step_by_step();
   } catch (const Stopped& stop) {
     told(stop);
   }

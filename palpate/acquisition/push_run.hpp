@@ -109,6 +109,10 @@ class PushRun {
 
   Stopped rise();
 
+  // Whose limit it was that ended the push.
+  Stopped at_force_limit() const;
+  Stopped at_travel_limit() const;
+
   // What an earlier run has on record is not recorded again, but the way back starts from it as it did: settled.
   void end_rise(bool top_recorded) {
     if (top_recorded)
@@ -187,7 +191,8 @@ class PushRun {
 
   Robot& robot_;
   const PushPlan& plan_;
-  const PushOptions& options_;
+  const PushOptions asked_;    // what the user wants
+  const PushOptions options_;  // and of that, what the robot bears
   const OnStep& on_step_;
   const std::function<bool()>& keep_going_;
   Push push_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <sstream>
 #include <utility>
 
 #include "palpate/sensing/push_events.hpp"
@@ -81,11 +82,11 @@ Stopped PushRun::rise() {
     if (recorded_.contact_m && now >= step_n()) begin_where_the_force_began();  // as early as in the part that is recorded
     if (now >= options_.force_limit_n) {
       end_rise(top_recorded);
-      return {StopReason::force_limit, "the force reached its limit"};
+      return at_force_limit();
     }
     if (travel(state) >= options_.travel_limit_m - 1e-9) {
       end_rise(top_recorded);
-      return {StopReason::travel_limit, "the travel reached its limit"};
+      return at_travel_limit();
     }
     if (now >= std::min(target, options_.force_limit_n)) {
       // The motion that got there was picked for its own error, too: the tip stands deeper than the encoders say more often
@@ -100,6 +101,21 @@ Stopped PushRun::rise() {
     }
     advance(state);
   }
+}
+
+Stopped PushRun::at_force_limit() const {
+  if (options_.force_limit_n == asked_.force_limit_n) return {StopReason::force_limit, "the force reached its limit"};
+  std::ostringstream words;
+  words << "the force reached the robot's own limit of " << options_.force_limit_n << " N; " << asked_.force_limit_n << " N were asked for";
+  return {StopReason::robot_force_limit, words.str()};
+}
+
+Stopped PushRun::at_travel_limit() const {
+  if (options_.travel_limit_m == asked_.travel_limit_m) return {StopReason::travel_limit, "the travel reached its limit"};
+  std::ostringstream words;
+  words << "the travel reached the robot's own limit of " << 1000 * options_.travel_limit_m << " mm; " << 1000 * asked_.travel_limit_m
+        << " mm were asked for";
+  return {StopReason::robot_travel_limit, words.str()};
 }
 
 void PushRun::advance(const RobotState& state) {

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the push protocol needs of a robot. A driver implements these six calls; the lab's software arm is one of them.
+// What the push protocol needs of a robot. A driver implements these six calls, and the two that not every robot can answer where
+// it can; the lab's software arm is one of them.
 #pragma once
 
+#include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +22,17 @@ struct RobotState {
   /// Of the tool on the object about the tip, base frame; a constant bias is allowed. It says where a force acts. Nothing: not measured.
   std::optional<Vec3> torque_nm;
 };
+
+/// What the robot itself bears, whatever a push asks for. Infinite: no limit of its own, or one that it keeps by refusing motions.
+struct RobotLimits {
+  static constexpr double none = std::numeric_limits<double>::infinity();
+  double force_n = none;    ///< of the tip along a push: what hand and sensor bear, or what the sensor can tell
+  double travel_m = none;   ///< into the object, from first contact
+  double speed_m_s = none;  ///< of the tip
+};
+
+/// @throws Error naming the limit that is not positive.
+void check(const RobotLimits& limits);
 
 enum class Motion {
   done,     ///< the tip is there
@@ -39,6 +53,18 @@ class Robot {
   virtual void wait(double duration_s) = 0;
   /// Standard deviation of the encoders' tip position along a push.
   virtual double travel_sigma_m() const = 0;
+  /// Asked before every push, which then ends at the lower of these and its own. A robot that wraps another hands them on.
+  virtual RobotLimits limits() const { return {}; }
+  /// Carries its camera to the `view`-th, from 0, of `views` places of its own choosing around the untouched object and looks from
+  /// there; the arm does not hide the object, or the image's mask says where. Nothing, and no motion: its camera is not carried.
+  virtual std::optional<DepthFrame> look([[maybe_unused]] int view, [[maybe_unused]] int views) { return std::nullopt; }
 };
+
+/// One image from each of so many places around the untouched object.
+/// @param views  at least 1
+/// @param keep_going  asked before each of them; false stops the robot, and there are fewer images then
+/// @returns nothing where the robot does not carry its camera  @throws Error for less than one view, and whatever the robot
+///          throws: it is stopped then.
+std::optional<std::vector<DepthFrame>> look_around(Robot& robot, int views, const std::function<bool()>& keep_going = {});
 
 }  // namespace palpate::acquisition

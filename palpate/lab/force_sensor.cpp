@@ -11,6 +11,8 @@
 namespace palpate::lab {
 namespace {
 
+constexpr double gravity_m_s2 = 9.81;
+
 Vec3 as_read(Vec3 value, double unit, const Vec3& range) {
   for (int k = 0; k < 3; ++k) {
     if (unit > 0) value(k) = unit * std::round(value(k) / unit);
@@ -67,6 +69,11 @@ void check(const ForceSensorOptions& o) {
   need(o.tool_mass_kg >= 0, "tool_mass_kg", "must not be negative");
 }
 
+double readable_along_n(const ForceSensorOptions& o) {
+  const double borne_n = gravity_m_s2 * o.tool_mass_kg + 3 * o.bias_n;
+  return std::max(0.1 * o.range_along_n, o.range_along_n - borne_n);
+}
+
 ForceSensor::ForceSensor(const ForceSensorOptions& options, Random& once, Random of_torque) : options_(options) {
   check(options);
   bias_n_ = options.bias_n * once.normal3();
@@ -80,7 +87,7 @@ ForceSensor::ForceSensor(const ForceSensorOptions& options, Random& once, Random
 
 Vec3 ForceSensor::read(const Vec3& true_force_n, const Mat3& R_base_sensor, double time_s, Random& noise) const {
   // A reaction on the tool is the force on the object with the other sign; drivers turn it round, and so the weight too.
-  const Vec3 weight_n(0, 0, 9.81 * options_.tool_mass_kg);
+  const Vec3 weight_n(0, 0, gravity_m_s2 * options_.tool_mass_kg);
   const Vec3 along_axes = R_base_sensor.transpose() * (true_force_n + weight_n);
   const Vec3 force = scale_ * (gain_ * along_axes) + bias_n_ + drift_n_s_ * time_s + options_.sigma_n * noise.normal3();
   const double across_n = options_.range_n;
@@ -88,7 +95,7 @@ Vec3 ForceSensor::read(const Vec3& true_force_n, const Mat3& R_base_sensor, doub
 }
 
 Vec3 ForceSensor::read_torque(const Vec3& true_torque_nm, const Mat3& R_base_sensor, Random& noise) const {
-  const Vec3 weight_n(0, 0, 9.81 * options_.tool_mass_kg), centre_m(0, 0, options_.tool_centre_m);
+  const Vec3 weight_n(0, 0, gravity_m_s2 * options_.tool_mass_kg), centre_m(0, 0, options_.tool_centre_m);
   const Vec3 along_axes = R_base_sensor.transpose() * true_torque_nm + centre_m.cross(Vec3(R_base_sensor.transpose() * weight_n));
   const Vec3 torque = scale_ * along_axes + torque_bias_nm_ + options_.torque_sigma_nm * noise.normal3();
   return as_read(torque, options_.torque_unit_nm, Vec3::Constant(options_.torque_range_nm));

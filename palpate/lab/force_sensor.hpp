@@ -39,6 +39,10 @@ ForceSensorOptions force_sensor(std::string_view name);
 /// @throws Error naming the option that is out of range.
 void check(const ForceSensorOptions& options);
 
+/// The highest force along the hand that is told whatever else the sensor bears: the tool's weight, and a zero that nobody knows
+/// beforehand.
+double readable_along_n(const ForceSensorOptions& options);
+
 /// One sensor as it came out of the box: bias, drift, scale and cross-talk are drawn once, along its own axes.
 class ForceSensor {
  public:

@@ -57,6 +57,10 @@ class LabRobot : public acquisition::Robot {
   DepthFrame take_depth_image() override;
   void wait(double duration_s) override;
   double travel_sigma_m() const override;
+  /// As much force as the sensor can tell: beyond its range the reading stays, however hard the tip presses.
+  acquisition::RobotLimits limits() const override;
+  /// One image of look_around().
+  std::optional<DepthFrame> look(int view, int views) override;
 
   /// Images of the untouched object from a camera that is carried around it: `views` - 1 on a ring that looks down by a third
   /// of a right angle (half a ring in front of a wall), the last from above. Every pose errs anew by camera_std_m and
@@ -73,7 +77,8 @@ class LabRobot : public acquisition::Robot {
   Recording scene() const;
   /// The push at one of the object's sites (the cube has one): the robot then presses there. @throws Error when out of range.
   acquisition::PushPlan plan(std::size_t site = 0);
-  /// The push at any other place of the object: it becomes a site of its own.
+  /// The push at any other place of the object: it becomes a site of its own. A place that is not quite on the surface, as one that
+  /// was found by looking, stays the expected contact; what is pressed is where the push meets the surface.
   acquisition::PushPlan plan_at(const Vec3& contact_m, const Vec3& direction);
   /// Whether the arm gets there, at the contact and where the approach starts.
   bool reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m = 0.05) const;

@@ -7,7 +7,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <functional>
 
 #include "palpate/core/error.hpp"
@@ -106,12 +108,88 @@ TEST_F(DriverRobotTest, ADriverOfAnotherVersionOrWithoutACallIsNotUsed) {
   world.made = PALPATE_FAILED;
   EXPECT_THAT(refusal([] { DriverRobot(make, "x", "lib"); }), HasSubstr("lib: cannot start with x"));
   world.made = PALPATE_DONE;
-  world.robot.abi = PALPATE_ROBOT_ABI + 1;
-  EXPECT_THAT(refusal([] { DriverRobot(make, "", "lib"); }), HasSubstr("build the driver anew"));
+  for (const std::uint32_t other : {0u, PALPATE_ROBOT_ABI + 1}) {
+    world.robot.abi = other;
+    EXPECT_THAT(refusal([] { DriverRobot(make, "", "lib"); }), HasSubstr("build the driver anew"));
+  }
   world.robot.abi = PALPATE_ROBOT_ABI;
   world.robot.wait = nullptr;
   EXPECT_THAT(refusal([] { DriverRobot(make, "", "lib"); }), HasSubstr("`wait`"));
   EXPECT_EQ(world.destroyed, 0);
+}
+
+// The struct of version 1, which ends before `limits`: a driver of then touches no more of today's than that.
+constexpr std::size_t size_of_first = offsetof(PalpateRobot, limits);
+static_assert(size_of_first == offsetof(PalpateRobot, destroy) + sizeof(void (*)(void*)), "what is new comes after what was there");
+
+int make_first(std::uint32_t abi, const char*, PalpateRobot* robot, char* error, std::size_t error_size) {
+  if (abi != 1) {
+    std::snprintf(error, error_size, "this driver is for version 1 of palpate's robots, not %u", unsigned(abi));
+    return PALPATE_FAILED;
+  }
+  if (world.made != PALPATE_DONE) {
+    std::snprintf(error, error_size, "the cable is out");
+    return world.made;
+  }
+  world.robot.abi = 1;
+  std::memcpy(robot, &world.robot, size_of_first);
+  return PALPATE_DONE;
+}
+
+TEST_F(DriverRobotTest, ADriverOfTheFirstVersionIsStillUsed) {
+  const auto works = [](MakeRobot old_driver) {
+    DriverRobot robot(old_driver, "", "lib");
+    EXPECT_EQ(robot.read().T_base_tip.translation(), Vec3(1, 2, 3));
+    EXPECT_EQ(robot.limits().force_n, RobotLimits::none);
+    EXPECT_FALSE(robot.look(0, 3));
+  };
+  works(make_first);
+  // One that never asked which version the program has, and whose tail is whatever it is.
+  world.robot.abi = 1;
+  world.robot.limits = [](void*, PalpateLimits*) { return int(PALPATE_FAILED); };
+  world.robot.look = [](void*, int, int, PalpateDepthImage*) { return int(PALPATE_FAILED); };
+  works(make);
+  EXPECT_EQ(world.destroyed, 2);
+  // What it says of its own trouble is not lost behind what it says of the version.
+  world.made = PALPATE_FAILED;
+  EXPECT_THAT(refusal([] { DriverRobot(make_first, "", "lib"); }),
+              HasSubstr("lib: this driver is for version 1 of palpate's robots, not 2 (asked as version 1: the cable is out)"));
+}
+
+TEST_F(DriverRobotTest, LimitsAndViewsAreHandedThroughWhereTheyAreThere) {
+  {
+    DriverRobot robot(make, "", "lib");
+    EXPECT_EQ(robot.limits().force_n, RobotLimits::none);
+    EXPECT_EQ(robot.limits().speed_m_s, RobotLimits::none);
+    EXPECT_FALSE(robot.look(0, 3));
+  }
+  world.robot.limits = [](void*, PalpateLimits* limits) { return limits->force_n = 30, world.answer; };
+  world.robot.look = [](void*, int view, int views, PalpateDepthImage* image) {
+    *image = world.image;
+    image->time_s = 10 * view + views;
+    return world.answer;
+  };
+  DriverRobot robot(make, "", "lib");
+  EXPECT_EQ(robot.limits().force_n, 30);
+  EXPECT_EQ(robot.limits().travel_m, RobotLimits::none) << "as it came";
+  const auto frame = robot.look(1, 3);
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->time_s, 13);
+  EXPECT_EQ(frame->T_base_camera.translation(), Vec3(0, 0, 1));
+  world.image.fx_px = 0;
+  EXPECT_THAT(refusal([&] { robot.look(0, 3); }), HasSubstr("lib, look: fx_px"));
+  world.answer = PALPATE_FAILED;
+  EXPECT_THAT(refusal([&] { robot.limits(); }), HasSubstr("lib, limits: the cable is out"));
+  EXPECT_THAT(refusal([&] { robot.look(0, 3); }), HasSubstr("lib, look: the cable is out"));
+}
+
+TEST_F(DriverRobotTest, ALimitThatIsNoneIsNamed) {
+  world.robot.limits = [](void*, PalpateLimits* limits) { return limits->travel_m = world.sigma_m, int(PALPATE_DONE); };
+  DriverRobot robot(make, "", "lib");
+  for (const double wrong : {0.0, -1.0, std::nan("")}) {
+    world.sigma_m = wrong;
+    EXPECT_THAT(refusal([&] { robot.limits(); }), HasSubstr("lib, limits: travel_m: must be positive"));
+  }
 }
 
 TEST_F(DriverRobotTest, WhatCannotBeIsNamed) {

@@ -126,6 +126,41 @@ TEST_F(Driver, ExploresAHalfSpaceWhoseModulusComesOut) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "explored/truth.json")) << "nobody knows it";
 }
 
+TEST_F(Driver, ItsOwnLimitEndsThePushAndIsNamed) {
+  ASSERT_EQ(palpate(record(spring, "--contact 0.5 0 0.1 --force-limit 45 --force-step 10 --driver-settings 2000")), 0) << folder.get("err");
+  const nlohmann::json push = nlohmann::json::parse(folder.get("out")).at("pushes").at(0);
+  EXPECT_EQ(push.at("stop"), "force limit of the robot");
+  EXPECT_EQ(push.at("message"), "the force reached the robot's own limit of 40 N; 45 N were asked for");
+  EXPECT_NEAR(push.at("highest_force_n"), 40, 1.2);
+}
+
+// Its camera goes around the block, and the shape comes from there: nothing of the scene's own is in the recording.
+TEST_F(Driver, LooksAroundAndTheShapeComesFromWhatItSees) {
+  const std::string block = "--driver-settings 'soft 20000 0.3' --scene '" PALPATE_SOURCE_DIR "/examples/driver/soft_scene' ";
+  const std::string words = "--json record --driver '" + spring + "' " + block + "-o '" + path("recording") +
+                            "' --contact 0.5 0 0.2 --force-limit 1.5 --force-step 0.5 --views 6";
+  ASSERT_EQ(palpate(words), 0) << folder.get("err");
+  const Recording made = read_recording(folder.path() / "recording");
+  EXPECT_TRUE(check_recording(made).empty());
+  ASSERT_EQ(made.rest.views.size(), 6u);
+  EXPECT_FALSE(made.rest.surface);
+  for (const DepthFrame& view : made.rest.views) {  // where the camera says that it stands, it sees the block's middle
+    const Vec3 middle = view.T_base_camera.inverse() * Vec3(0.5, 0, 0.1);
+    EXPECT_NEAR(middle.x(), 0, 1e-9);
+    EXPECT_NEAR(middle.y(), 0, 1e-9);
+    EXPECT_NEAR(middle.z(), 0.8, 1e-9);
+  }
+  EXPECT_EQ(palpate(words + " --resume"), 0) << "nothing is missing, and nobody looks again: " << folder.get("err");
+  ASSERT_EQ(palpate("--json model '" + path("recording") + "' -o '" + path("model") + "'"), 0) << folder.get("err");
+  const nlohmann::json model = nlohmann::json::parse(folder.get("out"));
+  EXPECT_NEAR(model.at("volume_m3").get<double>() / 0.008, 1, 0.03) << folder.get("out");
+}
+
+TEST_F(Driver, OneOfTheFirstVersionIsStillUsed) {
+  ASSERT_EQ(palpate(record(PALPATE_FIRST_ROBOT, one_push)), 0) << folder.get("err");
+  EXPECT_EQ(read_recording(folder.path() / "recording").pushes.at(0).steps.size(), 8u);
+}
+
 TEST_F(Driver, WhatIsWrongIsSaidWithACure) {
   constexpr int usage = 2;
   const auto refused = [&](const std::string& arguments, const std::string& words, int code = 3) {
@@ -141,10 +176,11 @@ TEST_F(Driver, WhatIsWrongIsSaidWithACure) {
   refused(record(spring), "say where to push", usage);
   refused(record(spring, one_push + " --tool hammer"), "is no tool of the scene; its first is stick");
   refused(record(spring, one_push + " --direction 0 0 0"), "must not be zero", usage);
-  refused(record(spring, one_push + " --views 3"), "rest.views", usage);
+  refused(record(PALPATE_FIRST_ROBOT, one_push + " --views 3"), "--views: the driver does not carry its camera around", usage);
   refused("record --driver '" + spring + "' " + one_push + " -o '" + path("recording") + "'", "--scene FOLDER", usage);
   const std::string explore = "explore --driver '" + spring + "' -o '" + path("recording") + "' --scene '" + scene + "' ";
   refused(explore + "--compare", "a driver's world has one only", usage);
+  refused(explore + "--seeds 3", "say --compare, too", usage);
   refused(explore + "--driver-settings 'soft 20000'", "Young's modulus (Pa) and Poisson ratio");
 }
 

@@ -2,12 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // `palpate record` as a process that is stopped, killed, left by its reader, asked to go on with something else, or given what
 // cannot be: no recorded step is lost, nothing moves that need not, and every refusal has its cure.
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -16,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/running_program.hpp"
 #include "io/recording_folder.hpp"
 #include "palpate/io/recording.hpp"
 
@@ -31,57 +30,8 @@ const std::string scene = PALPATE_SOURCE_DIR "/examples/driver/scene";
 const std::string spring = PALPATE_SPRING_ROBOT;
 constexpr int numbers = 1, usage = 2, input = 3;
 
-class Record : public testing::Test {
+class Record : public RunningProgram {
  protected:
-  void SetUp() override {
-    if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
-  }
-  std::string path(const std::string& name) const { return (folder.path() / name).string(); }
-
-  /// Starts the program; its messages come out of `messages_`.
-  pid_t start(std::vector<std::string> words) {
-    int ends[2];
-    if (pipe(ends) != 0) return -1;
-    words.insert(words.begin(), PALPATE_CLI);
-    const pid_t child = fork();
-    if (child == 0) {
-      setenv("PATIENT_ROBOT_LOG", path("calls").c_str(), 1);
-      dup2(ends[1], STDERR_FILENO);
-      dup2(ends[1], STDOUT_FILENO);
-      close(ends[0]);
-      close(ends[1]);
-      std::vector<char*> arguments;
-      for (std::string& word : words) arguments.push_back(word.data());
-      arguments.push_back(nullptr);
-      execv(PALPATE_CLI, arguments.data());
-      _exit(127);
-    }
-    close(ends[1]);
-    messages_ = fdopen(ends[0], "r");
-    return child;
-  }
-  /// Reads messages until one holds `words`.
-  bool says(const std::string& words) {
-    char line[4096];
-    while (std::fgets(line, sizeof line, messages_) != nullptr) {
-      said += line;
-      if (std::string(line).find(words) != std::string::npos) return true;
-    }
-    return false;
-  }
-  int wait_for(pid_t child) {
-    while (says("\n")) {
-    }
-    std::fclose(messages_);
-    int status = 0;
-    waitpid(child, &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
-  }
-  int palpate(const std::vector<std::string>& words) {
-    said.clear();
-    return wait_for(start(words));
-  }
-
   std::vector<std::string> record(const std::string& driver, std::vector<std::string> more = {}) const {
     std::vector<std::string> words{"record", "--driver", driver, "--scene", scene, "-o", path("recording"), "--force-limit", "6"};
     words.insert(words.end(), more.begin(), more.end());
@@ -93,10 +43,6 @@ class Record : public testing::Test {
     return words;
   }
   Recording made() const { return read_recording(folder.path() / "recording"); }
-
-  const TemporaryFolder folder{"record"};
-  std::string said;
-  FILE* messages_ = nullptr;
 };
 
 // The lab's objects are pushed where the user wants, too: on their surface, and there only.

@@ -13,45 +13,11 @@
 #include <functional>
 #include <vector>
 
-#include "block_robot.hpp"
+#include "small_loop.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate {
 namespace {
-
-ExploreOptions loop_options() {
-  ExploreOptions options;
-  options.young_modulus_within = 0.04;
-  options.poisson_ratio_within = 0.014;
-  options.max_pushes = 12;
-  options.levels = 2;
-  options.suggest.candidates.contacts = 8;
-  options.suggest.candidates.tilts = 1;
-  options.push.unloading_steps = 0;
-  options.push.contact_std_m = 1e-3;
-  options.push.settling_timeout_s = 3;
-  options.identify.fit.cross_checks = false;
-  return options;
-}
-
-struct Tried {
-  Explored found;
-  int begun = 0, steps = 0, told = 0;
-};
-
-Tried explored(BlockRobot& robot, const ExploreOptions& options, const std::function<bool()>& keep_going = {}) {
-  Tried run;
-  ExploreHooks hooks;
-  hooks.plan = [&](const estimation::PushCandidate& at) { return robot.plan(at); };
-  hooks.on_push_begin = [&](const Push&) { ++run.begun; };
-  hooks.on_step = [&](const Push&, const Step&) { ++run.steps; };
-  hooks.on_push = [&](const ExploredPush&) { ++run.told; };
-  hooks.keep_going = keep_going;
-  run.found = explore(robot, robot.scene(), options, hooks);
-  return run;
-}
-
-std::size_t count(const Explored& run) { return run.pushes.size() + static_cast<std::size_t>(run.fruitless); }
 
 TEST(Explore, EndsWhenBothIntervalsAreAsNarrowAsAskedForAndHoldTheTruth) {
   BlockRobot robot(1);
@@ -179,9 +145,41 @@ TEST(Explore, BudgetRefusalAndUserEndIt) {
 
   BlockRobot stopped(2);
   int asked = 0;
-  const Explored half = explored(stopped, options, [&] { return ++asked < 60; }).found;
+  const Explored half = explored(stopped, options, [&](const Tried&) { return ++asked < 60; }).found;
   EXPECT_FALSE(half.reached);
   EXPECT_EQ(half.message, "stopped on request");
+}
+
+// What the robot bears bounds what is planned, what the first touch sizes and what is pressed, and the report says so.
+TEST(Explore, TheRobotsOwnLimitsHold) {
+  struct Weak : BlockRobot {
+    using BlockRobot::BlockRobot;
+    acquisition::RobotLimits bears;
+    acquisition::RobotLimits limits() const override { return bears; }
+  };
+  ExploreOptions options = loop_options();
+  options.max_pushes = 2;
+  options.young_modulus_within = 1e-4;
+  Weak strong(3);
+  const Explored free = explored(strong, options).found;
+  ASSERT_EQ(free.pushes.size(), 2u);
+  double most_n = 0;
+  for (const auto& push : free.pushes) {
+    EXPECT_NE(push.report.stop, acquisition::StopReason::robot_force_limit);
+    most_n = std::max(most_n, push.report.highest_force_n);
+  }
+  Weak weak(3);
+  weak.bears.force_n = 0.4 * most_n;
+  const Explored held = explored(weak, options).found;
+  ASSERT_EQ(held.pushes.size(), 2u);
+  for (const auto& push : held.pushes) {
+    EXPECT_LE(push.plan.force_n, weak.bears.force_n * (1 + 1e-9));
+    EXPECT_LT(push.report.highest_force_n, weak.bears.force_n + 0.3) << push.name;
+  }
+  EXPECT_EQ(held.pushes.front().report.stop, acquisition::StopReason::robot_force_limit) << held.pushes.front().report.message;
+  for (const Push& push : held.recording.pushes)
+    EXPECT_GE(std::count_if(push.steps.begin(), push.steps.end(), [](const Step& step) { return !step.loads.empty(); }), options.levels)
+        << "in as many steps as are wanted";
 }
 
 TEST(Explore, BadOptionsAreNamed) {

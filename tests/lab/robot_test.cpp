@@ -82,6 +82,55 @@ TEST(LabRobot, PushIsRecordedAsItHappened) {
   EXPECT_LT(worst, 0.003);
 }
 
+// A sensor at its end says the same force however hard the tip presses: the push ends before that.
+TEST(LabRobot, ItsLimitIsWhatItsSensorCanTell) {
+  for (const auto& [name, most_n] : {std::pair{"schunk_ftcl_050", 300.0}, {"ati_gamma", 100.0}}) {
+    LabOptions options = quick();
+    options.force = force_sensor(name);
+    const double force_n = LabRobot(options).limits().force_n;
+    EXPECT_LT(force_n, most_n - 9.81 * options.force.tool_mass_kg) << name;
+    EXPECT_GT(force_n, 0.9 * most_n) << name;
+  }
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    LabOptions options = quick();
+    options.seed = seed;
+    options.force.range_along_n = 8;
+    LabRobot robot(options);
+    const double limit_n = robot.limits().force_n;
+    EXPECT_NEAR(limit_n, 8 - 3 - 2.94, 0.01);
+    const acquisition::PushReport report = acquisition::run_push(robot, robot.plan(), small_push(), {});
+    EXPECT_EQ(report.stop, acquisition::StopReason::robot_force_limit) << seed << ": " << report.message;
+    EXPECT_NEAR(report.highest_force_n, limit_n, 0.8) << seed << ": an arm that errs by 0.3 mm";
+  }
+}
+
+TEST(LabRobot, LooksAtOneViewAfterTheOther) {
+  LabRobot robot(quick());
+  const std::vector<DepthFrame> at_once = robot.look_around(3);
+  const auto in_turn = acquisition::look_around(robot, 3);
+  ASSERT_TRUE(in_turn);
+  ASSERT_EQ(in_turn->size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ((*in_turn)[k].depth_m, at_once[k].depth_m);
+    EXPECT_TRUE((*in_turn)[k].T_base_camera.isApprox(at_once[k].T_base_camera));
+  }
+  EXPECT_THROW(acquisition::look_around(robot, 0), Error);
+}
+
+// A place that a camera found is off by what the camera errs: contact comes a little before or behind it.
+TEST(LabRobot, APlaceBesideTheSurfaceIsPressedWhereThePushMeetsIt) {
+  for (const double off_m : {-0.004, 0.003}) {
+    LabRobot robot(LabOptions{}, make_object("bar", {}));
+    const PushSite top = robot.object().sites.at(1);
+    const acquisition::PushPlan plan = robot.plan_at(top.contact_m + off_m * top.direction, top.direction);
+    EXPECT_LT((plan.contact_m - top.contact_m - off_m * top.direction).norm(), 1e-12) << "that is where it is expected";
+    acquisition::PushOptions protocol = small_push();
+    protocol.travel_limit_m = 0.002;
+    const acquisition::PushReport report = acquisition::run_push(robot, plan, protocol, {});
+    EXPECT_LT((report.contact_m - top.contact_m).norm(), 1.5e-3) << report.message;
+  }
+}
+
 // Travels err from step to step by what each of them states, and all of a push together by what its zero states.
 TEST(LabRobot, TravelsErrAsTheyState) {
   double steps = 0, spread = 0, zeros = 0;
