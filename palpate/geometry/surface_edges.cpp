@@ -11,8 +11,8 @@ std::vector<SurfaceEdge> surface_edges(const Triangles& triangles) {
   sides.reserve(static_cast<std::size_t>(3 * triangles.rows()));
   for (Index t = 0; t < triangles.rows(); ++t)
     for (Index k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax(Index{triangles(t, k)}, Index{triangles(t, (k + 1) % 3)});
-      sides.push_back({low, high, {t, -1}});
+      const Index a = triangles(t, k), b = triangles(t, (k + 1) % 3);
+      sides.push_back({std::min(a, b), std::max(a, b), {t, -1}});
     }
   const auto key = [](const SurfaceEdge& side) { return std::tie(side.from, side.to, side.triangles[0]); };
   std::sort(sides.begin(), sides.end(), [&](const SurfaceEdge& a, const SurfaceEdge& b) { return key(a) < key(b); });

@@ -119,8 +119,8 @@ TEST(BesideOutline, OfWhatStandsBeforeAnotherIsOnBothSidesAndWhatIsHiddenHasNone
     on_wide += near && from_front > 0;
     clear += far;
   }
-  EXPECT_GT(on_front, 300);
-  EXPECT_GT(on_wide, 300);
+  EXPECT_GT(on_front, 200);
+  EXPECT_GT(on_wide, 200);
   EXPECT_GT(clear, 5000);
 }
 
