@@ -78,6 +78,23 @@ TEST_F(FinerMesh, IsTakenUntilTheErrorInYoungsModulusIsAsSmallAsAskedFor) {
   RecordProperty("fine_estimate_percent", std::to_string(100 * share(fine.answer)));
 }
 
+// E may be right on a mesh that puts nu off.
+TEST_F(FinerMesh, IsTakenForThePoissonRatioToo) {
+  const Identified coarse = within(1);
+  ASSERT_EQ(coarse.volume.tetrahedra.rows(), 144);
+  double young = 0, ratio = 0;
+  for (const auto& entry : coarse.answer.budget) {
+    if (entry.input != "mesh") continue;
+    young = entry.young_modulus_percent / 100 / mesh_left_over;
+    ratio = std::abs(entry.poisson_shift) / mesh_left_over;
+  }
+  ASSERT_GT(ratio, 1.5 * young) << "this block's mesh does more to E";
+  const double between = std::sqrt(young * ratio);
+  const Identified fine = within(between);
+  EXPECT_GT(fine.volume.tetrahedra.rows(), 144);
+  EXPECT_NE(fine.answer.provenance.at("coarser meshes").find(" of nu"), std::string::npos);
+}
+
 // The change is asked with small strains, which say too little of a body that is not linear.
 TEST_F(FinerMesh, IsTakenSoonerForABodyThatIsNotLinear) {
   for (const bool linear : {true, false}) {
