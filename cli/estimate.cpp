@@ -166,7 +166,7 @@ Run verbs::estimate(CLI::App& app) {
   app.add_option("--refine", given->refine, "none or auto: finer under the tool (overrides the recording's)")
       ->check(CLI::IsMember({"none", "auto"}));
   app.add_option("--mesh-tolerance", given->mesh_tolerance,
-                 "with refine auto: fit again on a finer mesh while what the mesh does to E is above this share (0.01 = 1 %), or to nu above this number")
+                 "with refine auto: fit again on a finer mesh while the mesh's own share of E is above this (0.01 = 1 %)")
       ->check(positive_number());
   app.add_option("--regions", given->regions,
                  "parts with an E of their own: recorded (what the recording says), by-site (one around each site that was pushed) or none")

@@ -24,8 +24,8 @@ struct IdentifyOptions {
   std::string regions = "recorded";  ///< or "by-site": one around each site that was pushed; or "none"
   std::optional<std::pair<double, double>> poisson_range;
   std::optional<double> poisson_fixed;
-  /// With `refine: auto`: while what the mesh does to E is estimated to be more than this share, or to nu more than this number,
-  /// and more than a third of all else that is not known of it, the object is fitted again on a finer mesh.
+  /// With `refine: auto`: while what the mesh does to E is estimated to be more than this share, and more than a third of all
+  /// else that is not known of E, the object is fitted again on a finer mesh.
   double mesh_tolerance = 0.01;
   estimation::FitOptions fit;
 };

@@ -56,14 +56,6 @@ std::vector<double> young_stds(const MatrixX& covariance, const std::vector<int>
   return out;
 }
 
-/// @param covariance  of the unknowns `moving`; 0 where nu is none of them
-double poisson_std(const MatrixX& covariance, const std::vector<int>& moving) {
-  const auto place = std::find(moving.begin(), moving.end(), static_cast<int>(poisson));
-  if (place == moving.end()) return 0;
-  const Index nu = place - moving.begin();
-  return std::sqrt(covariance(nu, nu));
-}
-
 /// E and nu where the search stands: no interval yet.
 std::vector<Parameter> parameters_so_far(const VectorX& unknowns) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -295,15 +287,12 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   std::unique_ptr<MeshCorrection> correction;
   std::optional<AnswerShift> mesh;
   int load_cases_of_meshes = 0;
-  // No mesh need be finer than what else is known of E and nu.
-  const auto doubt_of = [&](AnswerShift by_mesh) {
-    MeshDoubt out{std::move(by_mesh), young_stds(covariance, moving, unknowns.ratio_count()), poisson_std(covariance, moving), {}};
+  // No mesh need be finer than what else is known of E.
+  const auto young_stds_known = [&] {
+    std::vector<double> out = young_stds(covariance, moving, unknowns.ratio_count());
     if (doubt == nullptr || !doubt->effect) return out;
-    for (const AnswerShift& shift : doubt->effect->shifts) {
-      for (std::size_t r = 0; r < out.young_std.size(); ++r)
-        out.young_std[r] = std::hypot(out.young_std[r], shift.of_region(static_cast<Index>(r)).log_young);
-      out.poisson_std = std::hypot(out.poisson_std, shift.poisson);
-    }
+    for (std::size_t r = 0; r < out.size(); ++r)
+      for (const AnswerShift& shift : doubt->effect->shifts) out[r] = std::hypot(out[r], shift.of_region(static_cast<Index>(r)).log_young);
     return out;
   };
   while (finer != nullptr && optimum.termination == Termination::converged) {
@@ -315,9 +304,9 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     };
     mesh = shown_by(*finer, memory != nullptr ? &memory->finer : nullptr);
     if (!mesh || !options.take_finer) break;
-    MeshDoubt found = doubt_of(*mesh);
-    found.shown_by = [&](const FinerModel& by) { return shown_by(by, nullptr); };
-    const FinerMesh* better = options.take_finer(found);
+    const FinerMesh* better =
+        options.take_finer({*mesh, young_stds_known(),
+                            [&](const FinerModel& by) { return shown_by(by, nullptr); }});
     if (better == nullptr) break;
     bool corrected = MeshCorrection::applies_to(model);
     if (corrected) {

@@ -33,7 +33,6 @@ struct FinerMesh {
 struct MeshDoubt {
   AnswerShift shift;              ///< that it causes, as the finer one shows it
   std::vector<double> young_std;  ///< what all else leaves unknown of E, as a share of it: a region each
-  double poisson_std = 0;         ///< and of nu
   /// The same as another mesh shows it, of the one that was fitted with; nothing when the caller asked to stop.
   std::function<std::optional<AnswerShift>(const FinerModel&)> shown_by;
 };
@@ -48,7 +47,7 @@ struct FitOptions {
   bool stresses = true;                   ///< von Mises stress of every step, for figures
   int threads = 1;
   OnEstimate on_estimate;                 ///< for those who watch; empty: nobody does
-  /// Asked once it is known what the mesh does to E and nu and what all else leaves unknown of them: a mesh that is
+  /// Asked once it is known what the mesh does to E and what all else leaves unknown of it (a region each): a mesh that is
   /// fine enough, or nullptr. The fit goes on with it where it can (MeshCorrection); else it ends at its optimum, without
   /// intervals (no covariance), and the caller fits again on that mesh.
   std::function<const FinerMesh*(const MeshDoubt&)> take_finer;

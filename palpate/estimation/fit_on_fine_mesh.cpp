@@ -29,10 +29,8 @@ std::string mesh_words(const SimulatedObject& object) {
 }
 
 struct Excess {
-  double young = 0;        // share of E
-  double young_share = 0;  // of what is borne of it
-  double poisson = 0;
-  double share = 0;  // of what is borne of E or nu, whichever bears it less
+  double young = 0;  // share of E
+  double share = 0;  // of what is borne
 };
 
 /// Small strains, which are asked what a mesh does, have said less than half of it where strains were large
@@ -41,8 +39,8 @@ double share_borne(const SimulatedObject& object) {
   return fem::material_law(object.material).is_linear() ? 1 : 0.35;
 }
 
-/// Of what a mesh does to E, in the region that bears it least, and to nu: a bar's may be 0.014 % off in E and 0.004 in nu.
-/// @param tolerance  what is borne of E (a share) and of nu where the change is told right
+/// Of what a mesh does to E, in the region that bears it least.
+/// @param tolerance  what is borne of E where the change is told right
 /// @param borne      share of that which is borne
 Excess most_excess(const MeshDoubt& found, const AnswerShift& by_mesh, double tolerance, double borne) {
   constexpr double hardly = 1.0 / 3;  // of all else: a mesh's error below that widens the interval by a twentieth at most
@@ -50,10 +48,8 @@ Excess most_excess(const MeshDoubt& found, const AnswerShift& by_mesh, double to
   for (std::size_t r = 0; r < found.young_std.size(); ++r) {
     const double young = std::abs(by_mesh.of_region(static_cast<Index>(r)).log_young);
     const double share = young / (borne * std::max(tolerance, hardly * found.young_std[r]));
-    if (share > most.young_share) most.young = young, most.young_share = share;
+    if (share > most.share) most = {young, share};
   }
-  most.poisson = std::abs(by_mesh.poisson);
-  most.share = std::max(most.young_share, most.poisson / (borne * std::max(tolerance, hardly * found.poisson_std)));
   return most;
 }
 
@@ -100,11 +96,6 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
     text << std::setprecision(2) << 100 * share << " %";
     return text.str();
   };
-  const auto of_poisson = [](double off) {
-    std::ostringstream text;
-    if (off > 0) text << ", " << std::setprecision(2) << off << " of nu";
-    return text.str();
-  };
   FitOptions fit_options = options;
   std::string history;
   std::optional<FinerModel> finer;
@@ -117,7 +108,7 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
     bool too_coarse = false;
     fit_options.take_finer = [&](const MeshDoubt& found) -> const FinerMesh* {
       const Excess excess = most_excess(found, found.shift, mesh_tolerance, share_borne(object));
-      too_coarse = share_borne(object) * excess.young_share > 1;
+      too_coarse = share_borne(object) * excess.share > 1;
       if (excess.share <= 1 || refinements == most_refinements) return nullptr;
       const FinerModel& shows = taken.empty() ? *finer : *taken.back().finer;
       const Recording& at = taken.empty() ? recording : taken.back().mesh.recording;
@@ -125,7 +116,7 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
       auto next = better_mesh(at, on, shows, found, mesh_tolerance, fill_anew);
       if (!next) return nullptr;
       ++refinements;
-      history += mesh_words(on) + ": " + percent(excess.young) + " of E" + of_poisson(excess.poisson) + "; ";
+      history += mesh_words(on) + ": " + percent(excess.young) + " of E; ";
       Taken& now = taken.emplace_back();
       now.mesh = std::move(next->mesh);
       now.finer = std::move(next->finer);

@@ -8,9 +8,9 @@
 
 namespace palpate::estimation {
 
-/// Fits, and with `refine: auto` once more on a finer mesh as long as what the mesh does to E or nu is estimated to be more than
-/// `mesh_tolerance` (a share of E; of nu, the number) and more than a third of all else that is not known of it (both times 0.35
-/// where the body is not linear, of which the estimate has said less than half): the mesh that showed the error, where most
+/// Fits, and with `refine: auto` once more on a finer mesh as long as what the mesh does to E is estimated to be more than
+/// `mesh_tolerance` (a share of E) and more than a third of all else that is not known of E (both times 0.35 where the body is not
+/// linear, of which the estimate has said less than half): the mesh that showed the error, where most
 /// of it is made elsewhere than under the tools, else what refined_within finds. Leaves recording and object as
 /// they were fitted last; the answer's provenance says which meshes were taken.
 /// @param doubt  other shapes of a side that nobody saw; nullptr: none
