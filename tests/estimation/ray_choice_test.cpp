@@ -19,6 +19,20 @@ namespace {
 
 constexpr double sigma_m = 2e-3, young_pa = 2e4, true_nu = 0.3, force_n = 10;
 
+/// Truth and fit are one body of linear tetrahedra: only what rays do is tested.
+Recording on_a_table(TriMesh surface) {
+  Recording recording;
+  recording.rest.surface = std::move(surface);
+  recording.model.material = "linear";
+  recording.model.element = "tet4";
+  Support table;
+  table.name = "table";
+  table.kind = SupportKind::plane;
+  table.select = NodeSelection::plane;
+  recording.supports = {table};
+  return recording;
+}
+
 /// A ball on its foot that a pad presses, as a camera beside it sees it, without and with the load.
 struct PressedBall {
   Recording recording;
@@ -30,15 +44,8 @@ struct PressedBall {
 
   PressedBall() {
     const Vec3 centre(0, 0, 0.065);
-    recording.rest.surface = lab::implicit_surface([centre](const Vec3& p) { return (p - centre).norm() - 0.075; },
-                                                   {Vec3(-0.085, -0.085, 0), Vec3(0.085, 0.085, 0.15), 0.008});
-    recording.model.material = "linear";
-    recording.model.element = "tet4";  // truth and fit are one body: only what rays do is tested
-    Support table;
-    table.name = "table";
-    table.kind = SupportKind::plane;
-    table.select = NodeSelection::plane;
-    recording.supports = {table};
+    recording = on_a_table(lab::implicit_surface([centre](const Vec3& p) { return (p - centre).norm() - 0.075; },
+                                                 {Vec3(-0.085, -0.085, 0), Vec3(0.085, 0.085, 0.15), 0.008}));
     Tool pad;
     pad.name = "pad";
     pad.shape = ToolShape::disc;
@@ -134,15 +141,7 @@ TEST(RayChoice, TheSameRaysCountForEveryPoissonRatio) {
 
 /// Beyond a sharp edge there is no facet that a ray grazes before it misses: rays that count come and go at full weight.
 TEST(RayChoice, ARayThatComesToMissASharpEdgeGoesOnAsTheEdge) {
-  Recording recording;
-  recording.rest.surface = lab::box_surface({-0.05, -0.05, 0}, {0.05, 0.05, 0.1}, 8);
-  recording.model.material = "linear";
-  recording.model.element = "tet4";
-  Support table;
-  table.name = "table";
-  table.kind = SupportKind::plane;
-  table.select = NodeSelection::plane;
-  recording.supports = {table};
+  Recording recording = on_a_table(lab::box_surface({-0.05, -0.05, 0}, {0.05, 0.05, 0.1}, 8));
   Tool pad;
   pad.name = "pad";
   pad.shape = ToolShape::disc;
@@ -261,15 +260,7 @@ std::pair<Index, double> counted(const SimulatedObject& object, const Recording&
 }
 
 TEST(RayChoice, LeavesTheRaysBesideTheOutline) {
-  Recording recording;
-  recording.rest.surface = lab::box_surface({-0.05, -0.05, 0}, {0.05, 0.05, 0.1}, 6);
-  recording.model.material = "linear";
-  recording.model.element = "tet4";
-  Support table;
-  table.name = "table";
-  table.kind = SupportKind::plane;
-  table.select = NodeSelection::plane;
-  recording.supports = {table};
+  Recording recording = on_a_table(lab::box_surface({-0.05, -0.05, 0}, {0.05, 0.05, 0.1}, 6));
   Push push;
   push.name = "untouched";
   push.steps.resize(1);
