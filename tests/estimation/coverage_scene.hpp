@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "estimation/calculix_response.hpp"
 #include "estimation/coverage_rows.hpp"
 #include "estimation/finer_near.hpp"
 #include "estimation/random_field.hpp"
@@ -42,8 +43,8 @@ struct Draw {
 class Scene {
  public:
   static constexpr double sigma_m = 2e-3;
-  static constexpr int levels = 6, points = 2000;
-  /// Truths are solved by CalculiX (C3D10) instead of our own solver, on the same mesh of theirs.
+  static constexpr int levels = 6, points = 2000, calculix_points = 9;
+  /// Truths are solved by CalculiX (C3D10) instead of our own solver, on the same mesh of theirs. May change between draws.
   bool by_calculix = false;
   double noise = 1;  ///< of the depths, in sigma_m: 0 shows what meshes do to the answer
 
@@ -130,7 +131,8 @@ class Scene {
   }
   estimation::FitMemory& memory() { return memory_; }
   Index true_tetrahedra() const { return static_cast<Index>(mesh_.tetrahedra.rows()); }
-  double solver_error() const { return response_->interpolation_error(); }
+  /// Of the truth between the Poisson ratios that it is solved at, relative to the largest motion.
+  double solver_error() const { return calculix_ ? calculix_->error() : response_->interpolation_error(); }
 
   Draw draw(const Row& row, std::uint64_t seed) {
     enum Stream : std::uint64_t { of_truth, of_contact, of_tare, of_pose, of_rest, of_points, of_noise, of_correlated, of_outliers };
@@ -249,19 +251,29 @@ class Scene {
     return std::make_unique<fem::Statics>(mesh_, "linear", std::move(boundary), options);
   }
 
+  /// Watched rows for unit forces along x, y, z at E = 1.
+  MatrixX solved_by_calculix(const Vec3& contact_m, double poisson) const {
+    constexpr double young_pa = 1e4;  // its digits are few, but not those of the exponent
+    Eigen::SparseMatrix<double> watched;
+    const auto statics = statics_at(contact_m, watched);
+    const Eigen::SparseMatrix<double> forces = fem::spread_over_patch(mesh_, contact_m, spec_.pad_radius_m);
+    MatrixX moved(watched.rows(), 3);
+    for (int axis = 0; axis < 3; ++axis) {
+      const VectorX u = fem::calculix_displacements(mesh_, held_nodes(), VectorX(forces.col(axis)), false, young_pa, poisson);
+      if (!u.allFinite()) throw std::runtime_error("CalculiX (ccx) gave no displacements");
+      moved.col(axis) = young_pa * (watched * u);
+    }
+    return moved;
+  }
+
   Unit unit_response(const Vec3& contact_m, double poisson) {
     Unit out;
     if (by_calculix) {
-      constexpr double young_pa = 1e4;  // its digits are few, but not those of the exponent
-      Eigen::SparseMatrix<double> watched;
-      const auto statics = statics_at(contact_m, watched);
-      const Eigen::SparseMatrix<double> forces = fem::spread_over_patch(mesh_, contact_m, spec_.pad_radius_m);
-      MatrixX moved(watched.rows(), 3);
-      for (int axis = 0; axis < 3; ++axis) {
-        const VectorX u = fem::calculix_displacements(mesh_, held_nodes(), VectorX(forces.col(axis)), false, young_pa, poisson);
-        if (!u.allFinite()) throw std::runtime_error("CalculiX (ccx) gave no displacements");
-        moved.col(axis) = young_pa * (watched * u);
+      if (contact_m == spec_.contact_m && !calculix_) {
+        calculix_.emplace([&](double nu) { return solved_by_calculix(contact_m, nu); }, recording_.model.poisson_lower,
+                          recording_.model.poisson_upper, calculix_points);
       }
+      const MatrixX moved = contact_m == spec_.contact_m ? calculix_->at(poisson) : solved_by_calculix(contact_m, poisson);
       out.moved = moved.topRows(moved.rows() - 3);
       out.pad = moved.bottomRows<3>();
     } else if (contact_m == spec_.contact_m) {
@@ -346,6 +358,7 @@ class Scene {
   Eigen::SparseMatrix<double> watched_;
   std::unique_ptr<fem::Statics> statics_;
   std::unique_ptr<fem::LinearResponse> response_;
+  std::optional<CalculixResponse> calculix_;  // made when it is first asked for
   std::unique_ptr<geometry::TriangleTree> tree_;
   Points normals_;
   Vec3 centre_m_ = Vec3::Zero();  // of what the camera sees at rest
