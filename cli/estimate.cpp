@@ -21,6 +21,7 @@
 #include "palpate/io/result.hpp"
 #include "palpate/report/report.hpp"
 #include "palpate/report/words.hpp"
+#include "palpate/suggest.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -129,6 +130,7 @@ int estimate(Session& session, const Options& given) {
   IdentifyOptions options = identify_options(given, session);
   options.fit.on_estimate = live.on_estimate(recording);
   Identified found = identify(recording, options, progress);
+  name_push_for_poisson(recording, found, session.thread_count(), progress);
   Identification& answer = found.answer;
   answer.provenance["recording path"] = std::filesystem::absolute(given.recording).lexically_normal().string();
   answer.provenance["seed"] = std::to_string(session.seed);
