@@ -299,6 +299,19 @@ void judge_equilibrium(const VerdictInput& in, std::vector<Verdict>& out) {
 
 }  // namespace
 
+std::optional<Verdict> several_minima(const Starts& starts) {
+  const std::vector<Minimum> others = hardly_told_apart(starts);
+  if (others.empty()) return std::nullopt;
+  const auto words = [](const Minimum& at) {
+    return "E " + quantity(std::exp(at.log_young), "Pa") + " with nu " + number(at.poisson, "{:.3f}");
+  };
+  std::string also;
+  for (const Minimum& other : others) also += (also.empty() ? "" : ", ") + words(other);
+  return Verdict{"several_minima", "The data fit in more than one place: the answer is " + words(starts.minima.front()) + ", but " + also +
+                                       " is as likely within the noise, and the interval holds only the first. Say which it is by "
+                                       "`--young-modulus-start`, or press otherwise (other loads, another place) so that they part."};
+}
+
 Verdict partly_seen(const ShapeDoubt& doubt) {
   const std::optional<ShapeEffect>& effect = doubt.effect;
   std::string said = number(100 * doubt.unseen_share, "{:.0f}") + " % of the object's surface was not seen, and is a guess. ";
