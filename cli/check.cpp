@@ -25,11 +25,12 @@ struct Options {
   estimation::SelfCheckOptions check;
 };
 
-/// "+6.1 % +- 0.4 %"
+/// "+6.1 %"
 std::string written(const estimation::CheckedError& error, double value) {
   if (error.unit == "1") return fmt::format("{:+.2f} %", 100 * value);
-  if (error.unit == "m") return fmt::format("{:+.2f} mm", 1e3 * value);
-  if (error.unit == "rad") return fmt::format("{:+.3f} deg", value * 180 / EIGEN_PI);
+  if (error.unit == "m") return fmt::format("{:+.3f} mm", 1e3 * value);
+  constexpr double degrees = 57.29577951308232;  // EIGEN_PI is a long double, which is printed with all its digits
+  if (error.unit == "rad") return fmt::format("{:+.3f} deg", value * degrees);
   if (error.unit == "m/N") return fmt::format("{:+.4f} mm/N", 1e3 * value);
   return fmt::format("{:+.3f} {}", value, error.unit);
 }
@@ -56,14 +57,15 @@ int run(const Options& given, Session& session) {
                          {"depth_rms_m", check.depth_rms_m},   {"errors", nlohmann::json::array()},
                          {"verdicts", nlohmann::json::array()}};
   bool fine = check.converged;
+  std::string undetermined;
   for (const auto& error : check.errors) {
+    const bool open = !error.determined && !error.name.starts_with("force_tare");
+    if (open) undetermined += (undetermined.empty() ? "" : ", ") + error.name;
     const std::string stated =
         error.stated_std > 0 ? "stated within " + written(error, error.stated_std).substr(1) : "stated as exact";
     session.say(fmt::format("  {:<24} {:>14} +- {:<12} {:<26} {}", error.name, written(error, error.value),
                             written(error, error.std).substr(1), stated,
-                            !error.determined && !error.name.starts_with("force_tare") ? "not determined"
-                            : error.consistent                                         ? "consistent"
-                                                                                       : "NOT CONSISTENT"));
+                            open ? "not determined" : error.consistent ? "consistent" : "NOT CONSISTENT"));
     json["errors"].push_back({{"name", error.name},
                               {"unit", error.unit},
                               {"value", error.value},
@@ -81,7 +83,10 @@ int run(const Options& given, Session& session) {
     fine = fine && verdict.code != "does_not_fit";
   }
   if (!check.message.empty()) session.warn(check.message);
-  if (fine) session.say("everything that these pushes determine is consistent with what the recording states");
+  if (fine && undetermined.empty())
+    session.say("all of this is consistent with what the recording states");
+  else if (fine)
+    session.say("what these pushes determine is consistent with what the recording states; nothing is known of " + undetermined);
   json["consistent"] = fine;
   session.result(json);
   return fine ? exit_done : exit_numbers;

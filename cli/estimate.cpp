@@ -21,6 +21,7 @@
 #include "palpate/io/result.hpp"
 #include "palpate/report/report.hpp"
 #include "palpate/report/words.hpp"
+#include "palpate/suggest.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -129,6 +130,7 @@ int estimate(Session& session, const Options& given) {
   IdentifyOptions options = identify_options(given, session);
   options.fit.on_estimate = live.on_estimate(recording);
   Identified found = identify(recording, options, progress);
+  name_push_for_poisson(recording, found, session.thread_count(), progress);
   Identification& answer = found.answer;
   answer.provenance["recording path"] = std::filesystem::absolute(given.recording).lexically_normal().string();
   answer.provenance["seed"] = std::to_string(session.seed);
@@ -160,7 +162,7 @@ Run verbs::estimate(CLI::App& app) {
   app.add_option("-o,--out", given->out, "folder for result.json, model/ and report.html")->required();
   app.add_option("--method", given->method, "palpate, or paper: the algorithm of Frank et al. 2010 as a baseline")
       ->check(CLI::IsMember({"palpate", "paper"}));
-  app.add_option("--material", given->material, "material law (overrides the recording's)");
+  app.add_option("--material", given->material, "material law (overrides the recording's): " + material_list());
   app.add_option("--element", given->element, "tet4, tet10 or auto (overrides the recording's)")
       ->check(CLI::IsMember({"tet4", "tet10", "auto"}));
   app.add_option("--refine", given->refine, "none or auto: finer under the tool (overrides the recording's)")

@@ -14,9 +14,11 @@
 #include "cli/material_names.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/quantity.hpp"
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_names.hpp"
+#include "palpate/sensing/static_scatter.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -237,6 +239,27 @@ void tell(Session& session, const Recording& recording, const json& all) {
   for (const json& push : all["pushes"]) tell_push(session, push);
 }
 
+/// What a wrong sigma does to the intervals is seen before anything is fitted.
+void tell_scatter(Session& session, const Recording& recording, json& all) {
+  all["static_scatter"] = json::array();
+  for (const sensing::StaticScatter& one : sensing::static_scatter(recording)) {
+    all["static_scatter"].push_back({{"what", one.what},
+                                     {"unit", one.unit},
+                                     {"repeats", one.repeats},
+                                     {"differences", one.differences},
+                                     {"measured", one.measured},
+                                     {"stated", one.stated},
+                                     {"doubtful", one.doubtful()}});
+    const std::string measured = quantity(one.measured, one.unit), stated = quantity(one.stated, one.unit);
+    session.say(fmt::format("noise      {}: {} rms, measured from {} unloaded {}; stated {}", one.what, measured, one.repeats,
+                            one.what == "depth" ? "frames" : "readings", stated));
+    if (one.doubtful())
+      session.warn(fmt::format("{}: unloaded repeats scatter by {}, {:.2g} times the stated {}: intervals would be {}; state what the "
+                               "sensor does (unless object, arm or light changed between them)",
+                               one.what, measured, one.ratio, stated, one.ratio > 1 ? "too narrow" : "too wide"));
+  }
+}
+
 struct Arguments {
   std::filesystem::path recording, mapping;
 };
@@ -268,6 +291,7 @@ int look(Session& session, const Arguments& given) {
                              {"taken_off_s", acquisition::believed_offset_s(clock)},
                              {"left_std_s", acquisition::left_std_s(clock)}});
   tell(session, recording, all);
+  if (problems.empty()) tell_scatter(session, recording, all);
   for (const std::string& warning : recording.warnings) session.warn(warning);
   for (const io::Problem& problem : problems) session.warn(fmt::format("wrong      {}: {}", problem.where, problem.what));
   const std::size_t left_out = all.contains("bag") ? all["bag"]["left_out"].size() : 0;

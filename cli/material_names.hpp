@@ -6,6 +6,9 @@
 
 namespace palpate::cli {
 
+/// "linear, corotational, ...": all that there are.
+std::string material_list();
+
 /// What is wrong with a material's name and which there are, or nothing.
 std::optional<std::string> wrong_material(const std::string& name);
 

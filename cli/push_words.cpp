@@ -5,8 +5,6 @@
 
 #include <cmath>
 
-#include "palpate/report/words.hpp"
-
 namespace palpate::cli {
 namespace {
 
@@ -23,17 +21,6 @@ std::string percent_95(double log_std) {
 }
 
 std::string plain_95(double std) { return std::isfinite(std) ? fmt::format("{:.3f}", quantile_975 * std) : "-"; }
-
-std::string push_words(const estimation::RatedPush& push, const PushScene& scene) {
-  const Vec3 &at = push.candidate.contact_m, &along = push.candidate.direction;
-  std::string words = fmt::format("push at ({:.4f} {:.4f} {:.4f}) along ({:+.2f} {:+.2f} {:+.2f}) up to {} (about {})",
-                                  at.x(), at.y(), at.z(), along.x(), along.y(), along.z(),
-                                  report::quantity(push.force_n, "N"), report::quantity(push.travel_m, "m"));
-  // Of an answer with one E nobody asks where it is pressed.
-  if (push.expected.region_log_young_std.size() > 1) words += ", on " + scene.simulated.region_names[std::size_t(push.region)];
-  if (push.view >= 0 && scene.viewpoints.size() > 1) words += ", seen by " + scene.viewpoints[std::size_t(push.view)].name;
-  return words;
-}
 
 std::string stop_words(const acquisition::PushPlan& plan, const acquisition::PushReport& report, double start_distance_m) {
   if (report.stop != acquisition::StopReason::robot_limit) return report.message;

@@ -16,9 +16,6 @@ std::string percent_95(double log_std);
 /// "0.024"
 std::string plain_95(double std);
 
-/// "push at (0.6000 0.0100 0.1500) along (+0.00 +0.00 -1.00) up to 8.20 N (about 9.10 mm), seen by camera 2"
-std::string push_words(const estimation::RatedPush& push, const PushScene& scene);
-
 /// Why a push ended. Where the robot would not move, which push that was and what to try.
 std::string stop_words(const acquisition::PushPlan& plan, const acquisition::PushReport& report, double start_distance_m);
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -84,6 +85,25 @@ nlohmann::json moduli_json(const estimation::Knowledge& known) {
   nlohmann::json regions;
   for (std::size_t r = 0; r < known.regions.size(); ++r) regions[known.regions[r]] = known.young_modulus_of(static_cast<int>(r));
   return regions;
+}
+
+/// What the rows of the table promise, as far as it is printed.
+std::string promise_words(const estimation::RatedPush& push, estimation::PushGoal goal) {
+  std::string words;
+  if (goal != estimation::PushGoal::poisson_ratio) words += percent_95(push.expected.region_log_young_std(push.region));
+  if (goal != estimation::PushGoal::young_modulus) words += " " + plain_95(push.expected.poisson_std);
+  return words;
+}
+
+/// "1 to 3, 6 to 7": rows that promise the same to the last digit that is printed. Empty: there are none.
+std::string ties(const estimation::PushRanking& ranking, std::size_t shown) {
+  std::string words;
+  for (std::size_t first = 0, after = 0; first < shown; first = after) {
+    after = first + 1;
+    while (after < shown && promise_words(ranking.pushes[after], ranking.goal) == promise_words(ranking.pushes[first], ranking.goal)) ++after;
+    if (after > first + 1) words += fmt::format("{}{} to {}", words.empty() ? "" : ", ", first + 1, after);
+  }
+  return words;
 }
 
 double young_std_there(const estimation::RatedPush& push) { return push.expected.region_log_young_std(push.region); }
@@ -192,6 +212,8 @@ int run(const Options& given, Session& session) {
                     in_regions ? "   " + knowledge.regions[std::size_t(push.region)] : "",
                     several_views && push.view >= 0 ? "   " + scene.viewpoints[std::size_t(push.view)].name : ""));
   }
+  if (const std::string same = ties(ranking, std::min(ranking.pushes.size(), std::size_t(given.show))); !same.empty())
+    session.say("  no " + same + " promise the same within rounding: their order says nothing, take the one that is easiest to make");
   nlohmann::json json = {{"format", "palpate-suggestion/1"},
                          {"goal", given.goal},
                          {"tool", scene.tool},

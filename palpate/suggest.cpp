@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/suggest.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -9,6 +11,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/quantity.hpp"
 #include "palpate/estimation/grazing.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
@@ -238,6 +241,16 @@ std::string why_not_to_build_on(const Identification& so_far) {
   for (const Verdict& verdict : so_far.verdicts)
     if (std::find(std::begin(moved), std::end(moved), verdict.code) != std::end(moved)) return verdict.code + ": " + verdict.message;
   return {};
+}
+
+std::string push_words(const estimation::RatedPush& push, const PushScene& scene) {
+  const Vec3 at = push.candidate.contact_m + Vec3::Zero(), along = push.candidate.direction + Vec3::Zero();  // "+0.00", never "-0.00"
+  std::string words = fmt::format("push at ({:.4f} {:.4f} {:.4f}) along ({:+.2f} {:+.2f} {:+.2f}) up to {} (about {})", at.x(), at.y(),
+                                  at.z(), along.x(), along.y(), along.z(), quantity(push.force_n, "N"), quantity(push.travel_m, "m"));
+  // Of an answer with one E nobody asks where it is pressed.
+  if (push.expected.region_log_young_std.size() > 1) words += ", on " + scene.simulated.region_names[std::size_t(push.region)];
+  if (push.view >= 0 && scene.viewpoints.size() > 1) words += ", seen by " + scene.viewpoints[std::size_t(push.view)].name;
+  return words;
 }
 
 PushScene prepare_pushes(const Recording& recording, const SuggestOptions& options, const OnProgress& progress) {

@@ -15,6 +15,8 @@
 
 namespace palpate {
 
+struct Identified;
+
 struct SuggestOptions {
   estimation::PushGoal goal = estimation::PushGoal::both;
   /// With the robot's limits. Where `reachable` is empty and the recording has a robot, its joints' limits decide.
@@ -56,5 +58,14 @@ PushScene prepare_pushes(const Recording& recording, const SuggestOptions& optio
 /// @param so_far  what the pushes until now gave; nullptr: before the first touch
 estimation::PushRanking suggest(const PushScene& scene, const Identification* so_far, const SuggestOptions& options,
                                 const OnProgress& progress = {});
+
+/// "push at (0.6000 0.0100 0.1500) along (+0.00 +0.00 -1.00) up to 8.20 N (about 9.10 mm), seen by camera 2"
+std::string push_words(const estimation::RatedPush& push, const PushScene& scene);
+
+/// Where `nu_not_determined` was said: its message gets the push that would narrow nu the most, with the interval that it
+/// promises. Pushes are compared on the mesh that was fitted with. Nothing is added where no push can be planned (a tool that is
+/// not round, say) or where what is known cannot be built on; then `palpate suggest` says why.
+/// @param recording  that was identified: its cameras and sensors are those of the next push
+void name_push_for_poisson(const Recording& recording, Identified& found, int threads = 1, const OnProgress& progress = {});
 
 }  // namespace palpate

@@ -174,9 +174,12 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     so_far.fit.load_cases = model.load_cases();
     options.on_estimate(so_far);
   };
+  Starts starts;
   Optimum optimum = options.start_is_answer ? optimise_annealed(objective, start, loss, optimiser, progress)
-                                            : optimise_from_several(objective, start, loss, optimiser, progress);
+                                            : optimise_from_several(objective, start, loss, optimiser, progress, starts);
   loss = optimum.loss;
+  if (!starts.minima.empty()) answer.provenance["starts of the search"] = to_words(starts);
+  if (const auto several = several_minima(starts)) answer.verdicts.push_back(*several);
 
   // False: there is no optimum to look at.
   const auto take = [&] {
@@ -221,6 +224,8 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
                                         {looks.left - 1, around(optimum, unknowns)});
     for (FitIteration& iteration : at_last.trace) iteration.round += round;
     at_last.trace.insert(at_last.trace.begin(), answer.trace.begin(), answer.trace.end());
+    at_last.provenance.merge(answer.provenance);
+    at_last.verdicts.insert(at_last.verdicts.begin(), answer.verdicts.begin(), answer.verdicts.end());
     at_last.fit.solves += model.solves();
     at_last.fit.load_cases += model.load_cases();
     return at_last;
@@ -397,7 +402,8 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   }
   answer.fit.solves = model.solves() + (correction ? correction->model().solves() : 0);
   answer.fit.load_cases = model.load_cases() + load_cases_of_meshes;
-  answer.verdicts = judge({recording, objective, optimum, residuals, answer, checks, doubts, certificate});
+  for (Verdict& verdict : judge({recording, objective, optimum, residuals, answer, checks, doubts, certificate}))
+    answer.verdicts.push_back(std::move(verdict));
   if (doubt != nullptr && !doubt->shapes.empty()) answer.verdicts.push_back(partly_seen(*doubt));
   answer.provenance["variance inflation of correlated points"] = std::to_string((loss.noise ? loss.noise->of_cells : 1) / loss.surface_weight);
   if (loss.noise)

@@ -98,6 +98,7 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
   };
   FitOptions fit_options = options;
   std::string history;
+  Identification first;  // what the search of the first mesh said of its starts
   std::optional<FinerModel> finer;
   if (recording.model.refine == "auto") finer = finer_model(recording, object, fill_anew);
   for (int refinements = 0;;) {
@@ -133,9 +134,15 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
     if (!taken.empty() && answer.covariance.size() == 0 && answer.termination == Termination::converged) {
       fit_options.young_start_pa = answer.parameters[0].value;
       fit_options.poisson_start = answer.parameters[1].value;
+      if (!fit_options.start_is_answer) {
+        first.provenance = std::move(answer.provenance);
+        first.verdicts = std::move(answer.verdicts);
+      }
       fit_options.start_is_answer = true;
       continue;
     }
+    answer.provenance.merge(first.provenance);
+    answer.verdicts.insert(answer.verdicts.begin(), first.verdicts.begin(), first.verdicts.end());
     const std::optional<double> error = mesh_error(answer);
     answer.provenance["mesh"] = mesh_words(object);
     answer.provenance["mesh's error in E"] = error ? percent(*error) : "not estimated";

@@ -233,41 +233,6 @@ Optimum optimise_annealed(Objective& objective, const VectorX& start, const Loss
   return at;
 }
 
-Optimum optimise_from_several(Objective& objective, const VectorX& start, const Loss& final_loss, const OptimiseOptions& options,
-                              const OnProgress& progress) {
-  constexpr double misfit = 1.5;  // robust spread of the residuals in standard deviations
-  Optimum best = optimise_annealed(objective, start, final_loss, options, progress);
-  if (best.termination == Termination::cancelled) return best;
-  if (best.evaluation.usable && objective.residual_scale() < misfit) return best;
-
-  // Candidates are compared by one loss, the widest: a narrow one would favour the fit that gives most points up.
-  Loss common = best.evaluation.usable ? fitting_loss(objective, final_loss) : final_loss;
-  const auto cost_of = [&](const Optimum& at) {
-    if (!at.evaluation.usable) return std::numeric_limits<double>::infinity();
-    objective.model().forget();
-    return objective.evaluate(at.unknowns, common, progress).cost;
-  };
-  double lowest = best.evaluation.usable ? cost_of(best) : std::numeric_limits<double>::infinity();
-  for (double factor : {0.25, 4.0}) {
-    VectorX other = start;
-    other(log_young) += std::log(factor);
-    objective.model().forget();
-    Optimum candidate = optimise_annealed(objective, other, final_loss, options, progress);
-    if (candidate.termination == Termination::cancelled) return candidate;
-    candidate.iterations += best.iterations;
-    const double cost = cost_of(candidate);
-    if (cost < lowest) {
-      lowest = cost;
-      best = std::move(candidate);
-    }
-  }
-  if (best.evaluation.usable) {  // the last evaluation is the answer's again
-    objective.model().forget();
-    best.evaluation = objective.evaluate(best.unknowns, best.loss, progress);
-  }
-  return best;
-}
-
 Loss fitting_loss(const Objective& objective, const Loss& loss) {
   Loss wider = loss;
   wider.tukey = loss.tukey * std::max(1.0, objective.residual_scale());

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/estimation/self_check.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -40,6 +42,7 @@ struct Reading {  // of one loaded step
 struct Touch {
   std::size_t push = 0;
   Vec3 tip_m = Vec3::Zero(), direction = Vec3::Zero();
+  double std_m = 0;
 };
 
 struct View {
@@ -107,7 +110,7 @@ Rows residuals(const Problem& p, const VectorX& x, bool with_rays = true) {
     const Vec3 tip = moved.apply_inverse(t.tip_m), along = moved.rotation().transpose() * t.direction;
     const double back_m = 0.1;
     const auto hit = p.tree.cast(tip - back_m * along, along);
-    rows.touch.push_back(hit ? (back_m - hit->range_m) / p.options.touch_std_m : 0);
+    rows.touch.push_back(hit ? (back_m - hit->range_m) / t.std_m : 0);
   }
   if (!with_rays) return rows;
   for (const View& view : p.views) {
@@ -231,6 +234,18 @@ RayCloud thinned(const RayCloud& rays) {
   return out;
 }
 
+/// Where the tip was at first contact: where the arm says it is now, less what it has travelled since; else the contact point, which
+/// is as uncertain as it is stated to be (one that was only planned is not where the tip was).
+std::optional<Touch> first_touch(std::size_t push, const Step& step, const Vec3& direction, double touch_std_m) {
+  if (step.T_base_tip)
+    for (const auto& observation : step.observations)
+      if (const auto* travel = std::get_if<ToolTravel>(&observation))
+        return Touch{push, step.T_base_tip->translation() - travel->travel_m * direction, direction, touch_std_m};
+  const Load& load = step.loads[0];
+  if (!load.contact_m.allFinite()) return std::nullopt;
+  return Touch{push, load.contact_m, direction, std::hypot(touch_std_m, load.contact_std_m)};
+}
+
 Problem problem_of(const Recording& recording, const TriMesh& surface, const Inputs& inputs,
                    const SelfCheckOptions& options) {
   const auto need = [](bool good, const char* field, const char* rule) {
@@ -254,7 +269,8 @@ Problem problem_of(const Recording& recording, const TriMesh& surface, const Inp
       const Load* load = step.loads.empty() ? nullptr : &step.loads[0];
       const double force_n = load != nullptr && load->force_n ? load->force_n->dot(direction) : 0;
       if (load != nullptr && load->force_n) {
-        if (!touched && load->contact_m.allFinite()) p.touches.push_back({k, load->contact_m, direction});
+        if (!touched)
+          if (const auto touch = first_touch(k, step, direction, options.touch_std_m)) p.touches.push_back(*touch);
         touched = true;
         for (const auto& observation : step.observations)
           if (const auto* travel = std::get_if<ToolTravel>(&observation))
@@ -303,11 +319,12 @@ void judge(const Problem& p, SelfCheck& check) {
     const std::string group = error.name.substr(0, error.name.find('['));
     if (group == "force_scale")
       said["force_scale_off"] =
-          "the force sensor reads " + std::to_string(100 * error.value) +
-          " % too much, which is as much error in Young's modulus: calibrate it, or state force_scale_std";
+          fmt::format("the force sensor reads {:.1f} % too {}", 100 * std::abs(error.value), error.value > 0 ? "much" : "little") +
+          ", which is as much error in Young's modulus: calibrate it, or state force_scale_std";
     else if (group == "compliance")
-      said["compliance_off"] = "stick and arm give way by " + std::to_string(1e3 * error.value) +
-                               " mm per newton more than tools.compliance_m_per_n says: add it there, and how well it is known as compliance_std_m_per_n";
+      said["compliance_off"] = fmt::format("stick and arm give way by {:.3g} mm per newton {}", 1e3 * std::abs(error.value),
+                                           error.value > 0 ? "more" : "less") +
+                               " than tools.compliance_m_per_n says: add it there, and how well it is known as compliance_std_m_per_n";
     else if (group == "force_tare")
       said["force_tare_off"] =
           "the force's zero is off by more than force_tare_std_n allows: tare just before each push, away from the object";

@@ -17,6 +17,8 @@ constexpr double least_settling = 0.01;    // of E
 constexpr double pattern_deviate = 4.3;    // one recording in a hundred thousand
 constexpr double pattern_inflation = 1.3;  // of the variance of cell means
 constexpr double largest_pressure = 0.4;   // over E: beyond it a Neo-Hookean solid under an even dead pressure caves in
+constexpr double softest_pa = 1;           // of gels that just keep their shape; both lie inside the ends of the search
+constexpr double stiffest_pa = 1.15e12;    // of diamond
 
 std::string number(double value, const char* format = "{:.3g}") { return fmt::format(fmt::runtime(format), value); }
 
@@ -40,6 +42,24 @@ void judge_young(const VerdictInput& in, std::vector<Verdict>& out) {
   }
 }
 
+/// What no solid has is a unit gone wrong, or a motion that had nothing to do with the force.
+void judge_young_bound(const VerdictInput& in, std::vector<Verdict>& out) {
+  for (const auto& parameter : in.answer.parameters) {
+    const bool soft = parameter.value < softest_pa;
+    if (parameter.name != "young_modulus" || (!soft && parameter.value < stiffest_pa)) continue;
+    out.push_back({"young_modulus_at_bound",
+                   "Young's modulus" + (parameter.region.empty() ? "" : " of region '" + parameter.region + "'") + " ran away to " +
+                       quantity(parameter.value, "Pa") + ", where no solid is (" +
+                       (soft ? "the softest gels have about 1 Pa" : "diamond has 1.1e12 Pa") +
+                       "). A unit is probably wrong: forces are in newton (" +
+                       (soft ? "kilonewtons make E a thousand times too small" : "millinewtons make E a thousand times too large") +
+                       ") and lengths in metres (" +
+                       (soft ? "millimetres make it a million times too small). Or what moved was not pressed: check the loads."
+                             : "kilometres make it a million times too large). Or what was pressed did not move: check that the "
+                               "surface is seen where it gives way.")});
+  }
+}
+
 void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
   const Unknown& nu = in.objective.unknowns()[poisson];
   if (nu.fixed) return;
@@ -51,7 +71,8 @@ void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
                      "These pushes hardly determine the Poisson ratio: its interval [" + number(parameter.lower_95) + ", " +
                          number(parameter.upper_95) +
                          "] is mostly the prior's. Push where the object can bulge sideways in view, or deeper, or from a "
-                         "second side; `palpate suggest` ranks pushes by how much they would narrow it."});
+                         "second side, or fix nu (`--poisson-ratio`) if it is known; `palpate suggest --for poisson-ratio` ranks "
+                         "pushes by how much they would narrow it."});
     }
   }
   if (determined && (in.optimum.poisson_at_lower || in.optimum.poisson_at_upper)) {
@@ -278,6 +299,19 @@ void judge_equilibrium(const VerdictInput& in, std::vector<Verdict>& out) {
 
 }  // namespace
 
+std::optional<Verdict> several_minima(const Starts& starts) {
+  const std::vector<Minimum> others = hardly_told_apart(starts);
+  if (others.empty()) return std::nullopt;
+  const auto words = [](const Minimum& at) {
+    return "E " + quantity(std::exp(at.log_young), "Pa") + " with nu " + number(at.poisson, "{:.3f}");
+  };
+  std::string also;
+  for (const Minimum& other : others) also += (also.empty() ? "" : ", ") + words(other);
+  return Verdict{"several_minima", "The data fit in more than one place: the answer is " + words(starts.minima.front()) + ", but " + also +
+                                       " is as likely within the noise, and the interval holds only the first. Say which it is by "
+                                       "`--young-modulus-start`, or press otherwise (other loads, another place) so that they part."};
+}
+
 Verdict partly_seen(const ShapeDoubt& doubt) {
   const std::optional<ShapeEffect>& effect = doubt.effect;
   std::string said = number(100 * doubt.unseen_share, "{:.0f}") + " % of the object's surface was not seen, and is a guess. ";
@@ -292,6 +326,7 @@ std::vector<Verdict> judge(const VerdictInput& input) {
   judge_end(input, verdicts);
   judge_fit(input, verdicts);
   judge_young(input, verdicts);
+  judge_young_bound(input, verdicts);
   judge_poisson(input, verdicts);
   judge_nuisances(input, verdicts);
   judge_state(input, verdicts);

@@ -9,6 +9,7 @@
 #include "palpate/estimation/doubts.hpp"
 #include "palpate/estimation/objective.hpp"
 #include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/several_starts.hpp"
 #include "palpate/estimation/shape_error.hpp"
 
 namespace palpate::estimation {
@@ -26,6 +27,9 @@ struct VerdictInput {
 
 /// What the numbers mean, in plain words; codes are stable and listed in docs/uncertainty.md.
 std::vector<Verdict> judge(const VerdictInput& input);
+
+/// Where the search came to places that the data hardly tell apart; nothing where it did not.
+std::optional<Verdict> several_minima(const Starts& starts);
 
 /// Of an object that was not seen from all sides.
 Verdict partly_seen(const ShapeDoubt& doubt);

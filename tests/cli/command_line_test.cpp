@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/fem/materials.hpp"
 #include "temporary_folder.hpp"
 
 namespace {
@@ -65,6 +66,12 @@ TEST(CommandLine, NewcomerIsToldThreeThingsToTry) {
   EXPECT_THAT(outcome.err, HasSubstr("palpate info"));
   EXPECT_THAT(outcome.err, HasSubstr("palpate estimate"));
   EXPECT_THAT(outcome.out, IsEmpty());
+}
+
+// docs/recording-format.md sends people there.
+TEST(CommandLine, HelpOfEstimateListsEveryLaw) {
+  const std::string help = palpate("estimate --help").out;
+  for (const palpate::fem::MaterialLaw* law : palpate::fem::material_table()) EXPECT_THAT(help, HasSubstr(std::string(law->name()))) << law->name();
 }
 
 TEST(CommandLine, MistypedVerbGetsSuggestionAndUsageCode) {

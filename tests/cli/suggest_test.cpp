@@ -9,8 +9,10 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "geometry/shapes.hpp"
 #include "palpate/io/recording.hpp"
@@ -117,6 +119,31 @@ TEST_F(Suggest, BeforeTheFirstTouchPushesAreSortedAndWithinTheLimits) {
   EXPECT_LT(answer.json["pushes"][0]["expected"]["poisson_std"].get<double>(), 0.1);
   ASSERT_EQ(answer.json["sequence"].size(), 3u);
   EXPECT_LT(answer.json["sequence"][2]["expected"]["poisson_std"], answer.json["sequence"][0]["expected"]["poisson_std"]);
+}
+
+// Three digits of nu are printed: rows that differ beyond them are ranked by what nobody sees.
+TEST_F(Suggest, RowsThatPromiseTheSameAreSaidToBeTies) {
+  const fs::path text = files_ / "text";
+  const std::string command = std::string(PALPATE_CLI) + " suggest " + folder_ + " --contacts 10 --tilts 1 --for poisson-ratio --show 40 > " +
+                              text.string() + " 2>&1";
+  ASSERT_EQ(WEXITSTATUS(std::system(command.c_str())), 0);
+  std::ifstream file(text);
+  std::vector<std::string> promised;  // "0.031", a row each
+  std::string ties;
+  for (std::string line; std::getline(file, line);) {
+    std::smatch part;
+    static const std::regex row(R"(^ +[0-9]+  [+-][0-9.]+ [+-][0-9.]+ [+-][0-9.]+ .* % +(?:[0-9.]+ %|-) +([0-9.]+)(?:   .*)?$)");
+    if (std::regex_match(line, part, row)) promised.push_back(part[1]);
+    if (line.find("promise the same within rounding") != std::string::npos) ties = line;
+  }
+  ASSERT_GT(promised.size(), 20u);
+  std::string expected;
+  for (std::size_t first = 0, after = 0; first < promised.size(); first = after) {
+    for (after = first + 1; after < promised.size() && promised[after] == promised[first];) ++after;
+    if (after > first + 1) expected += (expected.empty() ? "" : ", ") + std::to_string(first + 1) + " to " + std::to_string(after);
+  }
+  ASSERT_FALSE(expected.empty()) << "no ties here: this test says nothing";
+  EXPECT_NE(ties.find("no " + expected + " promise"), std::string::npos) << ties << "\nexpected " << expected;
 }
 
 TEST_F(Suggest, SameSeedSameAnswerAndIntervalsHardlyDependOnTheGuess) {

@@ -7,9 +7,12 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "geometry/shapes.hpp"
 #include "io/made_up_recording.hpp"
 #include "io/recording_folder.hpp"
 #include "palpate/io/bag_write.hpp"
+#include "palpate/io/recording.hpp"
+#include "sensing/still_life.hpp"
 
 namespace palpate::io {
 namespace {
@@ -160,6 +163,56 @@ TEST(InfoOfABag, SaysWhatTheMappingLeavesAloneAndWhatItsClocksAre) {
   EXPECT_NE(error["where"].get<std::string>().find("topics.depth[0].noise.model"), std::string::npos) << outcome.out;
   EXPECT_NE(error["where"].get<std::string>().find("mapping.yaml:"), std::string::npos) << outcome.out;
   EXPECT_NE(outcome.out.find("did you mean 'realsense_d435'?"), std::string::npos) << outcome.out;
+}
+
+/// The still life of a box on a table.
+void put_still_life(const TemporaryFolder& folder, const sensing::StillLife& truth) {
+  Recording recording = sensing::still_life(truth);
+  recording.name = "still life";
+  recording.rest.surface = shapes::box(Vec3(0.1, 0.1, 0.1), Vec3(0, 0, 0.6));
+  Support table;
+  table.name = "table";
+  table.kind = SupportKind::plane;
+  table.plane = {Vec3(0, 0, 0.6), Vec3::UnitZ()};
+  table.tolerance_m = 0.001;
+  recording.supports = {table};
+  Tool stick;
+  stick.name = "stick";
+  stick.shape = ToolShape::disc;
+  stick.radius_m = 0.01;
+  recording.tools = {stick};
+  for (Push& push : recording.pushes) {
+    push.name = "push " + std::to_string(&push - recording.pushes.data());
+    for (Step& step : push.steps)
+      for (Load& load : step.loads) {
+        load.tool = "stick";
+        load.contact_m = Vec3(0.05, 0.05, 0.7);
+      }
+  }
+  std::filesystem::remove_all(folder.path());
+  write_recording(recording, folder.path());
+}
+
+TEST_F(Info, ComparesTheScatterOfUnloadedStepsWithWhatIsStated) {
+  put_still_life(folder, {});
+  Outcome outcome = info_of(folder);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const nlohmann::json right = nlohmann::json::parse(outcome.out)["static_scatter"];
+  ASSERT_EQ(right.size(), 2u) << outcome.out;
+  EXPECT_EQ(right[0]["repeats"], 8);
+  EXPECT_NEAR(right[0]["measured"].get<double>(), 2e-3, 0.1 * 2e-3);
+  EXPECT_NE(outcome.err.find("measured from 8 unloaded frames; stated 2"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("intervals would be"), std::string::npos) << outcome.err;
+
+  sensing::StillLife wrong;
+  wrong.stated_depth_m = 1e-3;
+  wrong.stated_force_n = 0.25;
+  put_still_life(folder, wrong);
+  outcome = info_of(folder);
+  EXPECT_EQ(outcome.code, 0) << "a doubt is no error";
+  EXPECT_NE(outcome.err.find("intervals would be too narrow"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("intervals would be too wide"), std::string::npos) << outcome.err;
+  EXPECT_TRUE(nlohmann::json::parse(outcome.out)["static_scatter"][0]["doubtful"].get<bool>());
 }
 
 }  // namespace
