@@ -218,6 +218,13 @@ TEST(Compliance, ItsPriorBecomesTheErrorOfYoungsModulus) {
   EXPECT_NEAR(parameter(open, "young_modulus").std / 2e4, 2e-4 * stiffness_n_m, 0.02 * 2e-4 * stiffness_n_m);
   ASSERT_FALSE(open.budget.empty());
   EXPECT_EQ(open.budget.front().input, "compliance");
+  // Stated as exact it is in no interval, and is said all the same: a tenth of it.
+  const auto said = [&](const std::string& input) {
+    const auto at = std::find_if(exact.budget_if.begin(), exact.budget_if.end(), [&](const BudgetEntry& e) { return e.input == input; });
+    return at == exact.budget_if.end() ? -1 : at->young_modulus_percent;
+  };
+  EXPECT_NEAR(said("compliance"), 100 * 0.1 * compliance_m_per_n * stiffness_n_m, 0.5 * compliance_m_per_n * stiffness_n_m);
+  EXPECT_NEAR(said("force_scale"), 1, 0.01);
 }
 
 // ---- A pushed block, seen by noisy clouds.
