@@ -18,8 +18,8 @@ namespace {
 const std::vector<std::string> along_xyz{"_x", "_y", "_z"};
 
 template <class T>
-const T* any_of_type(const Step& step, const std::string& tool) {
-  for (const auto& observation : step.observations) {
+const T* any_of_type(const std::vector<TermInput>& seen, const std::string& tool) {
+  for (const TermInput& observation : seen) {
     const T* one = std::get_if<T>(&observation);
     if (one != nullptr && (one->tool.empty() || one->tool == tool)) return one;
   }
@@ -29,20 +29,23 @@ const T* any_of_type(const Step& step, const std::string& tool) {
 /// What is exact, and the copy in which it is not.
 class Exact {
  public:
-  Exact(const Recording& stated, Recording& more, const TypicalErrors& errors) : stated_(stated), more_(more), errors_(errors) {}
+  Exact(const Recording& stated, const Inputs& inputs, Recording& more, const TypicalErrors& errors)
+      : stated_(stated), inputs_(inputs), more_(more), errors_(errors) {}
 
   std::vector<ExactInput> take() { return std::move(found_); }
 
   void of_forces() {
     bool any = false;
+    std::size_t s = 0;
     for (std::size_t p = 0; p < stated_.pushes.size(); ++p) {
       const Push& push = stated_.pushes[p];
       double highest_n = 0;
       for (const Step& step : push.steps) {
         for (const Load& load : step.loads) {
           highest_n = std::max(highest_n, load.force_n.value_or(Vec3::Zero()).norm());
-          if (const Wrench* read = any_of_type<Wrench>(step, load.tool)) highest_n = std::max(highest_n, read->force_n.norm());
+          if (const Wrench* read = any_of_type<Wrench>(inputs_[s], load.tool)) highest_n = std::max(highest_n, read->force_n.norm());
         }
+        ++s;
       }
       any = any || highest_n > 0;
       if (push.force_tare_std_n > 0 || !(highest_n > 0)) continue;
@@ -90,12 +93,13 @@ class Exact {
 
   void of_travels() {
     std::set<std::string> yielding;
+    std::size_t s = 0;
     for (std::size_t p = 0; p < stated_.pushes.size(); ++p) {
       const Push& push = stated_.pushes[p];
       bool driven = false, read = false;
       for (const Step& step : push.steps) {
         for (const Load& load : step.loads) {
-          const bool travels = load.travel_m || any_of_type<ToolTravel>(step, load.tool) != nullptr;
+          const bool travels = load.travel_m || any_of_type<ToolTravel>(inputs_[s], load.tool) != nullptr;
           driven = driven || load.travel_m;
           read = read || (travels && !load.travel_m);
           const std::size_t t = tool_of(load);
@@ -105,6 +109,7 @@ class Exact {
           more_.tools[t].compliance_std_m_per_n = size;
           add("compliance", fmt::format("{:.2g} mm/N", 1e3 * size), "compliance_std_m_per_n", {{"compliance[" + tool.name + "]"}, size});
         }
+        ++s;
       }
       if (push.travel_offset_std_m > 0 || !(driven || read)) continue;
       more_.pushes[p].travel_offset_std_m = errors_.travel_m;
@@ -136,14 +141,14 @@ class Exact {
   }
 
   /// What a camera errs by it errs by in all its images.
-  void of_sensors(const Inputs& inputs, Inputs& more) {
+  void of_sensors(Inputs& more) {
     std::map<std::string, std::set<std::string>> offsets, turns;  // of a camera: endings of its unknowns' names
     std::set<std::string> biased, marked;
     std::size_t s = 0;
     for (const Push& push : stated_.pushes) {
       for (std::size_t k = 0; k < push.steps.size(); ++k, ++s) {
         const std::string in_step = "[" + push.name + ":" + std::to_string(k) + "]";
-        for (std::size_t i = 0; i < inputs[s].size(); ++i) {
+        for (std::size_t i = 0; i < inputs_[s].size(); ++i) {
           const auto pose = [&](auto& seen, const std::string& camera) {
             const std::string ending = "[" + camera + "]";
             if (seen.pose_std_m == 0) offsets[camera].insert(camera.empty() ? in_step : ending), seen.pose_std_m = errors_.camera_m;
@@ -201,6 +206,7 @@ class Exact {
   }
 
   const Recording& stated_;
+  const Inputs& inputs_;
   Recording& more_;
   const TypicalErrors& errors_;
   std::vector<ExactInput> found_;
@@ -210,12 +216,12 @@ class Exact {
 
 std::vector<ExactInput> free_exact_inputs(const Recording& recording, const Inputs& inputs, const TetMesh& mesh, Recording& more,
                                           Inputs& more_inputs, const TypicalErrors& errors) {
-  Exact exact(recording, more, errors);
+  Exact exact(recording, inputs, more, errors);
   exact.of_contacts();
   exact.of_forces();
   exact.of_travels();
   exact.of_body(mesh);
-  exact.of_sensors(inputs, more_inputs);
+  exact.of_sensors(more_inputs);
   return exact.take();
 }
 

@@ -227,6 +227,26 @@ TEST(Compliance, ItsPriorBecomesTheErrorOfYoungsModulus) {
   EXPECT_NEAR(said("force_scale"), 1, 0.01);
 }
 
+// Steps whose travel errs independently: weighed by their travels, var(log E) = sigma^2 / sum of travels squared.
+TEST(ImposedTravel, ItsNoiseBecomesTheErrorOfYoungsModulus) {
+  constexpr double sigma_m = 5e-5;
+  Recording recording = pressed_bar(linear_force_n, 2e4, 0.3);
+  recording.model.poisson_fixed = 0.3;
+  for (auto& step : recording.pushes[0].steps) std::get<Wrench>(step.observations[0]).force_sigma_n = 1e-5;
+  const auto object = simulated(kuhn_block(1, 1, 1, bar_m), "linear");
+  const Identification exact = fit(recording, object, wrenches_of(recording), {});
+  double squares = 0;
+  for (auto& step : recording.pushes[0].steps) {
+    squares += std::pow(*step.loads[0].travel_m, 2);
+    step.observations.push_back(ToolTravel{"", *step.loads[0].travel_m, sigma_m});
+  }
+  const Identification open = fit(recording, object, wrenches_of(recording), {});
+  const Parameter& young = parameter(open, "young_modulus");
+  EXPECT_NEAR(young.value, 2e4, 1);
+  EXPECT_NEAR(young.std / young.value, sigma_m / std::sqrt(squares), 0.02 * sigma_m / std::sqrt(squares));
+  EXPECT_LT(parameter(exact, "young_modulus").std, 0.1 * young.std);
+}
+
 // ---- A pushed block, seen by noisy clouds.
 
 void expect_inside(const Parameter& p, double truth) {
