@@ -78,6 +78,16 @@ void check_material(const std::string& material, const std::string& where) {
   if (const auto wrong = wrong_material(material)) throw Error(*wrong, where);
 }
 
+/// Of E, of every region's where there are several, and of nu.
+std::string budget_words(const BudgetEntry& entry) {
+  std::string young = fmt::format("{:6.2f} % of E", entry.young_modulus_percent);
+  for (std::size_t r = 0; r < entry.regions.size(); ++r) {
+    const std::string one = fmt::format("{:6.2f} % of E of {}", entry.regions[r].young_modulus_percent, entry.regions[r].region);
+    young = r == 0 ? one : young + "   " + one;
+  }
+  return fmt::format("{}   {:.4f} of nu", young, entry.poisson_shift);
+}
+
 void tell(Session& session, const Options& given, const Identification& answer) {
   for (const auto& parameter : answer.parameters) {
     const bool young = parameter.name == "young_modulus" && parameter.region.empty();
@@ -105,9 +115,11 @@ void tell(Session& session, const Options& given, const Identification& answer) 
   }
   if (given.budget) {
     session.say("error budget       what each input's uncertainty does to E and nu:");
-    for (const auto& entry : answer.budget) {
-      session.say(fmt::format("  {:<24} {:6.2f} % of E   {:.4f} of nu", entry.input, entry.young_modulus_percent, entry.poisson_shift));
-    }
+    for (const auto& entry : answer.budget) session.say(fmt::format("  {:<24} {}", entry.input, budget_words(entry)));
+    if (!answer.budget_if.empty())
+      session.say("not in the interval, since the recording states it as exact; what it would do were it off by that much:");
+    for (const auto& entry : answer.budget_if)
+      session.say(fmt::format("  {:<24} {}   if off by {} (in the interval with {})", entry.input, budget_words(entry), entry.off_by, entry.field));
   }
   for (const auto& verdict : answer.verdicts) session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
 }

@@ -56,11 +56,20 @@ struct HeldOut {
   double baseline_last_step_rms_m = 0;
 };
 
+struct RegionShare {
+  std::string region;
+  double young_modulus_percent = 0;
+};
+
 /// What one input's uncertainty does to the answer.
 struct BudgetEntry {
   std::string input;
-  double young_modulus_percent = 0;
+  double young_modulus_percent = 0;  ///< of several regions: the first one's
   double poisson_shift = 0;
+  std::vector<RegionShare> regions = {};  ///< E of every region, the first one's too; empty: there is one
+  // Of what a recording states as exactly known (Identification::budget_if):
+  std::string off_by = {};  ///< by how much it is taken to err, in words
+  std::string field = {};   ///< of the recording, that would make a nuisance of it
 };
 
 /// Everything a figure needs of one step: the simulated and the observed surface at the optimum.
@@ -107,6 +116,8 @@ struct Identification {
   FitSummary fit;
   HeldOut prediction;
   std::vector<BudgetEntry> budget;
+  /// What is in no interval, since the recording states it as exact: what it would do were it off by a typical size.
+  std::vector<BudgetEntry> budget_if;
   std::vector<Parameter> per_push;  ///< young_modulus of each push alone (region = push name)
   std::vector<Parameter> per_site;  ///< of all pushes at one place (region = its name); empty = one site
   Termination termination = Termination::failed;

@@ -5,6 +5,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/load_columns.hpp"
+#include "palpate/estimation/rigid_tool.hpp"
 
 namespace palpate::estimation {
 
@@ -21,7 +22,7 @@ std::optional<Recording> with_contacts_found(const Recording& recording, const F
       const double off = size_m > 0 ? (load.contact_found_m - before_m).norm() / size_m : 0;
       if (off > as_good_as_linear) {
         try {
-          load_columns(model.object().mesh, tool, load);
+          load.travel_m ? void(rigid_tool(model.object().mesh, tool, load)) : void(load_columns(model.object().mesh, tool, load));
         } catch (const Error&) {
           return std::nullopt;
         }

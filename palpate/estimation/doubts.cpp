@@ -9,6 +9,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/exact_inputs.hpp"
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/fem/regions.hpp"
 
@@ -124,22 +125,29 @@ struct ScoreTests {
   }
 };
 
+/// A ratio at its bound does not follow.
+std::vector<int> without_held_poisson(std::vector<int> moving, const Optimum& optimum) {
+  if (optimum.poisson_at_lower || optimum.poisson_at_upper) std::erase(moving, static_cast<int>(poisson));
+  return moving;
+}
+
 }  // namespace
 
 Doubts look_for_doubts(const Recording& recording, const Objective& objective, const Optimum& optimum, const Inputs& inputs,
                        const FitOptions& options, double factor, double misfit, const OnProgress& progress) {
   const ForwardModel& fitted = objective.model();
-  if (fitted.touches()) return {};
-  const Doubted more = doubted(recording, fitted.object().mesh);
+  Doubted more = doubted(recording, fitted.object().mesh);
+  Inputs more_inputs = inputs;
+  const std::vector<ExactInput> exact = free_exact_inputs(recording, inputs, fitted.object().mesh, more.recording, more_inputs);
   SimulatedObject object = fitted.object();
-  const bool divided = divide(object, recording);
-  if (more.asked.empty() && !divided) return {};
+  const bool divided = !fitted.touches() && divide(object, recording);
+  if (more.asked.empty() && !divided && exact.empty()) return {};
   Unknowns unknowns;
   constexpr double between_ratios = 1e-3;  // of a linear body's answers: the test is no finer
   ForwardModel model(more.recording, object, unknowns, statics_options(recording, fitted.object(), options),
                      nullptr, between_ratios);
   model.start_from(fitted);
-  Objective wider(model, inputs, unknowns);
+  Objective wider(model, more_inputs, unknowns);
   const std::vector<int> at = places(objective.unknowns(), unknowns);
   ForwardModel::Changes changes = fitted.changes();
   for (auto& change : changes)
@@ -147,6 +155,10 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   model.set_changes(std::move(changes));
   Optimum there = optimum;
   there.unknowns = unknowns.prior_mean();
+  // Nothing moves but what was fitted and what is doubted; budget_if looks at the others' columns.
+  for (int k = unknowns.parameter_count(); k < unknowns.size(); ++k) unknowns[k].fixed = true;
+  for (const auto& names : more.unknowns)
+    for (const int k : unknowns.named(names)) unknowns[k].fixed = false;
   for (std::size_t k = 0; k < at.size(); ++k) {
     const int old = static_cast<int>(k);
     there.unknowns(at[k]) = optimum.unknowns(old);
@@ -157,9 +169,11 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   if (!there.evaluation.usable) return {};
 
   Doubts out;
-  out.slip = contact_slip(wider, there, factor);
   std::vector<int> moving;
   for (int k : free_unknowns(objective.unknowns())) moving.push_back(at[static_cast<std::size_t>(k)]);
+  out.budget_if = budget_if(exact, unknowns, there.evaluation.curvature, without_held_poisson(moving, optimum), fitted.object().region_names);
+  if (fitted.touches()) return out;
+  out.slip = contact_slip(wider, there, factor);
   // A torque that says nothing of a contact stated as exactly known speaks here, with what it errs by.
   for (int k = 0; k < unknowns.size(); ++k) {
     const std::string& name = unknowns[k].name;

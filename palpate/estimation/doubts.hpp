@@ -34,10 +34,11 @@ struct Doubts {
   std::vector<Doubt> all;          ///< the one that explains most first
   std::optional<StepChange> slip;  ///< of contacts that are stated as exactly known (see contact_slip)
   std::optional<SiteStiffness> sites;  ///< where several places were pushed and no regions are given
+  std::vector<BudgetEntry> budget_if;  ///< what is stated as exactly known, were it off by a typical size
 };
 
-/// One evaluation at the optimum with everything unknown that is stated as exactly known, from the fit's own equilibria. Nothing is
-/// asked of bodies that lift off or are touched by rigid tools: their solutions cannot be handed over.
+/// One evaluation at the optimum with everything unknown that is stated as exactly known, from the fit's own equilibria. Bodies that lift
+/// off or are touched by rigid tools are solved anew, since their solutions cannot be handed over, and nothing but `budget_if` is asked of them.
 /// @param inputs  what `objective` was made of
 /// @param factor  information factor of robust rows
 /// @param misfit  chi2 per degree of freedom, where it is above one

@@ -18,23 +18,51 @@ std::string group_of(const std::string& name) {
 }
 
 struct Variances {
-  double log_young = 0, poisson = 0;
+  VectorX log_young;  // a region
+  double poisson = 0;
 };
 
-Variances variances_without(const MatrixX& hessian, const std::vector<int>& moving, const std::vector<bool>& known) {
+/// @param young  log_young_of_regions
+Variances variances_without(const MatrixX& hessian, const MatrixX& young, const std::vector<int>& moving, const std::vector<bool>& known) {
   std::vector<Index> keep;
   for (std::size_t k = 0; k < moving.size(); ++k) {
     if (!known[k]) keep.push_back(static_cast<Index>(k));
   }
-  const MatrixX kept = hessian(keep, keep);
+  const MatrixX kept = hessian(keep, keep), of_young = young(Eigen::all, keep);
   const MatrixX covariance = kept.ldlt().solve(MatrixX::Identity(kept.rows(), kept.cols()));
   const bool has_poisson = moving.size() > 1 && moving[1] == poisson;
-  return {covariance(0, 0), has_poisson ? covariance(1, 1) : 0};
+  return {(of_young * covariance * of_young.transpose()).diagonal(), has_poisson ? covariance(1, 1) : 0};
+}
+
+double largest_share(const BudgetEntry& entry) {
+  double largest = entry.young_modulus_percent;
+  for (const RegionShare& share : entry.regions) largest = std::max(largest, share.young_modulus_percent);
+  return largest;
 }
 
 }  // namespace
 
-std::vector<BudgetEntry> error_budget(const Unknowns& unknowns, const MatrixX& hessian, const std::vector<int>& moving) {
+void sort_by_share(std::vector<BudgetEntry>& budget) {
+  std::stable_sort(budget.begin(), budget.end(), [](const auto& a, const auto& b) { return largest_share(a) > largest_share(b); });
+}
+
+void set_young(BudgetEntry& entry, const VectorX& percent, const std::vector<std::string>& regions) {
+  entry.young_modulus_percent = percent(0);
+  entry.regions.clear();
+  for (Index r = 0; percent.size() > 1 && r < percent.size(); ++r) entry.regions.push_back({regions.at(static_cast<std::size_t>(r)), percent(r)});
+}
+
+MatrixX log_young_of_regions(const Unknowns& unknowns, const std::vector<int>& moving) {
+  MatrixX out = MatrixX::Zero(1 + unknowns.ratio_count(), static_cast<Index>(moving.size()));
+  out.col(0).setOnes();
+  for (std::size_t k = 0; k < moving.size(); ++k) {
+    if (moving[k] >= first_ratio && moving[k] < unknowns.parameter_count()) out(1 + moving[k] - first_ratio, static_cast<Index>(k)) = 1;
+  }
+  return out;
+}
+
+std::vector<BudgetEntry> error_budget(const Unknowns& unknowns, const MatrixX& hessian, const std::vector<int>& moving,
+                                      const std::vector<std::string>& regions) {
   std::map<std::string, std::vector<bool>> groups;
   std::vector<bool> all(moving.size(), false);
   for (std::size_t k = 0; k < moving.size(); ++k) {
@@ -44,17 +72,20 @@ std::vector<BudgetEntry> error_budget(const Unknowns& unknowns, const MatrixX& h
     members[k] = true;
     all[k] = true;
   }
-  const Variances total = variances_without(hessian, moving, std::vector<bool>(moving.size(), false));
-  const auto lost = [](double with, double without) { return std::sqrt(std::max(with - without, 0.0)); };
+  const MatrixX young = log_young_of_regions(unknowns, moving);
+  const Variances total = variances_without(hessian, young, moving, std::vector<bool>(moving.size(), false));
   std::vector<BudgetEntry> budget;
   for (const auto& [name, members] : groups) {
-    const Variances known = variances_without(hessian, moving, members);
-    budget.push_back({name, 100 * lost(total.log_young, known.log_young), lost(total.poisson, known.poisson)});
+    const Variances known = variances_without(hessian, young, moving, members);
+    BudgetEntry entry{name, 0, std::sqrt(std::max(total.poisson - known.poisson, 0.0))};
+    set_young(entry, 100 * (total.log_young - known.log_young).cwiseMax(0).cwiseSqrt(), regions);
+    budget.push_back(entry);
   }
-  const Variances noise = variances_without(hessian, moving, all);
-  budget.push_back({"sensor noise", 100 * std::sqrt(std::max(noise.log_young, 0.0)), std::sqrt(std::max(noise.poisson, 0.0))});
-  std::stable_sort(budget.begin(), budget.end(),
-                   [](const auto& a, const auto& b) { return a.young_modulus_percent > b.young_modulus_percent; });
+  const Variances noise = variances_without(hessian, young, moving, all);
+  BudgetEntry of_noise{"sensor noise", 0, std::sqrt(std::max(noise.poisson, 0.0))};
+  set_young(of_noise, 100 * noise.log_young.cwiseMax(0).cwiseSqrt(), regions);
+  budget.push_back(of_noise);
+  sort_by_share(budget);
   return budget;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "palpate/core/identification.hpp"
@@ -11,6 +12,17 @@ namespace palpate::estimation {
 /// How much each group of nuisances adds to the uncertainty: the part of the variance of log E and nu that vanishes when the
 /// group is taken as known, as a standard deviation (in per cent of E, and of nu). Ordered by its share in E.
 /// @param hessian  of the unknowns `moving` (log E first), priors included
-std::vector<BudgetEntry> error_budget(const Unknowns& unknowns, const MatrixX& hessian, const std::vector<int>& moving);
+/// @param regions  their names, where there are several
+std::vector<BudgetEntry> error_budget(const Unknowns& unknowns, const MatrixX& hessian, const std::vector<int>& moving,
+                                      const std::vector<std::string>& regions);
+
+/// The largest share in any region's E first.
+void sort_by_share(std::vector<BudgetEntry>& budget);
+
+/// Per cent of the E of every region as the first one's and, where there are several, by name.
+void set_young(BudgetEntry& entry, const VectorX& percent, const std::vector<std::string>& regions);
+
+/// log E of every region out of the unknowns `moving`, one a row: that of the first one, and a ratio's on top of it.
+MatrixX log_young_of_regions(const Unknowns& unknowns, const std::vector<int>& moving);
 
 }  // namespace palpate::estimation

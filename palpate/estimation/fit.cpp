@@ -45,14 +45,10 @@ std::vector<Parameter> young_of_parts(const std::vector<PartialYoung>& parts) {
 
 /// Of log E of every region.
 /// @param covariance  of the unknowns `moving`, log E first
-std::vector<double> young_stds(const MatrixX& covariance, const std::vector<int>& moving, Index ratios) {
+std::vector<double> young_stds(const Unknowns& unknowns, const MatrixX& covariance, const std::vector<int>& moving) {
+  const MatrixX young = log_young_of_regions(unknowns, moving);
   std::vector<double> out;
-  for (Index r = 0; r <= ratios; ++r) {
-    VectorX sum = VectorX::Unit(covariance.rows(), 0);  // a region's log E: that of the first one and a ratio's
-    const auto ratio = std::find(moving.begin(), moving.end(), first_ratio + r - 1);
-    if (r > 0 && ratio != moving.end()) sum(static_cast<Index>(ratio - moving.begin())) = 1;
-    out.push_back(std::sqrt(sum.dot(covariance * sum)));
-  }
+  for (Index r = 0; r < young.rows(); ++r) out.push_back(std::sqrt(young.row(r).dot(covariance * young.row(r).transpose())));
   return out;
 }
 
@@ -294,7 +290,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   int load_cases_of_meshes = 0;
   // No mesh need be finer than what else is known of E.
   const auto young_stds_known = [&] {
-    std::vector<double> out = young_stds(covariance, moving, unknowns.ratio_count());
+    std::vector<double> out = young_stds(unknowns, covariance, moving);
     if (doubt == nullptr || !doubt->effect) return out;
     for (std::size_t r = 0; r < out.size(); ++r)
       for (const AnswerShift& shift : doubt->effect->shifts) out[r] = std::hypot(out[r], shift.of_region(static_cast<Index>(r)).log_young);
@@ -335,7 +331,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   answer.fit.chi2_per_dof = summary.chi2_per_dof;
   answer.steps = step_fits(objective);
   add_bands(answer.steps, objective, covariance, moving);
-  answer.budget = error_budget(unknowns, hessian, moving);
+  answer.budget = error_budget(unknowns, hessian, moving, object.region_names);
 
   const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
   if (posterior.cancelled) {
@@ -347,15 +343,18 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));
   const auto widen_by = [&](const char* name, const std::vector<AnswerShift>& independent) {
     BudgetEntry entry{name};
+    VectorX percent = VectorX::Zero(static_cast<Index>(regions.size()));
     for (const AnswerShift& shift : independent) {
-      for (std::size_t r = 0; r < regions.size(); ++r)
-        widen(regions[r], shift.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
-      entry.young_modulus_percent = std::hypot(entry.young_modulus_percent, 100 * shift.log_young);
+      for (std::size_t r = 0; r < regions.size(); ++r) {
+        const Index region = static_cast<Index>(r);
+        widen(regions[r], shift.of_region(region), unknowns[poisson].lower, unknowns[poisson].upper);
+        percent(region) = std::hypot(percent(region), 100 * shift.of_region(region).log_young);
+      }
       entry.poisson_shift = std::hypot(entry.poisson_shift, shift.poisson);
     }
+    set_young(entry, percent, object.region_names);
     answer.budget.push_back(entry);
-    std::stable_sort(answer.budget.begin(), answer.budget.end(),
-                     [](const auto& a, const auto& b) { return a.young_modulus_percent > b.young_modulus_percent; });
+    sort_by_share(answer.budget);
   };
   if (mesh) {
     for (std::size_t r = 0; r < regions.size(); ++r)
@@ -394,6 +393,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     doubts = look_for_doubts(recording, objective, optimum, inputs, options, factor, std::max(1.0, summary.chi2_per_dof),
                              progress);
     certificate = model.certify(optimum.unknowns);
+    answer.budget_if = doubts.budget_if;
     answer.prediction = checks.held_out;
     if (regions.size() == 1) {  // of one region each, else
       answer.per_push = young_of_parts(checks.pushes);

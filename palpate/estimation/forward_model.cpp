@@ -38,6 +38,15 @@ std::vector<double> efforts(const Recording& recording) {
   return force;
 }
 
+/// Of an imposed motion in this one step: what the encoder that read it says of itself; 0 where none does.
+double travel_std_m(const Step& step, const Load& load) {
+  for (const auto& observation : step.observations) {
+    const auto* read = std::get_if<ToolTravel>(&observation);
+    if (read != nullptr && (read->tool.empty() || read->tool == load.tool) && read->sigma_m > 0) return read->sigma_m;
+  }
+  return 0;
+}
+
 }  // namespace
 
 ForwardModel::~ForwardModel() = default;
@@ -166,7 +175,8 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
           radii.back() = own->second;
         }
         const double std_n = load.force_n ? std::hypot(load.force_std_n, load.force_relative_std * load.force_n->norm()) : 0;
-        errors.push_back(unknowns.add_block("force_error" + in_step, "N", std_n, xyz));
+        errors.push_back(load.travel_m ? unknowns.add_block("travel_error" + in_step, "m", travel_std_m(push.steps[s], load), {""})
+                                       : unknowns.add_block("force_error" + in_step, "N", std_n, xyz));
       }
       force_error_.push_back(errors);
       contact_shift_.push_back(shifts);

@@ -265,7 +265,7 @@ class ForwardModel {
   Vec3 clamp_pivot_m_ = Vec3::Zero();
   std::vector<int> clamp_;                       // a step: first of six unknowns, or -1
   std::vector<int> slide_;                       // a step: first of as many unknowns as motions are free, or -1
-  std::vector<std::vector<int>> force_error_;    // a step and load: first of three unknowns, or -1
+  std::vector<std::vector<int>> force_error_;    // a step and load: first of three unknowns (imposed travel: the one), or -1
   std::vector<std::vector<int>> contact_shift_;  // a step and load: first of two unknowns, or -1
   std::map<int, Vec3> shift_direction_;          // of the push that such two unknowns are across
   std::vector<std::vector<int>> patch_radius_;   // a step and load: the unknown, or -1

@@ -7,6 +7,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/load_columns.hpp"
 #include "palpate/estimation/rigid_tool.hpp"
 
 namespace palpate::estimation {
@@ -43,6 +44,16 @@ MatrixX in_order(const MatrixX& from, const std::vector<int>& columns, const std
   return out;
 }
 
+/// True where some push says that it does not exactly know where this tool, whose motion is imposed, touches.
+bool stands_uncertainly(const Recording& recording, const Tool& tool) {
+  if (tool.shape == ToolShape::platen) return false;
+  for (const auto& push : recording.pushes)
+    for (const auto& step : push.steps)
+      for (const auto& load : step.loads)
+        if (load.tool == tool.name && load.travel_m && load.contact_std_m > 0) return true;
+  return false;
+}
+
 }  // namespace
 
 bool has_contacts(const Recording& recording) {
@@ -66,8 +77,14 @@ void ForwardModel::add_contacts(Body& body, const Push& push, std::vector<fem::R
                                 fem::Response::Options& options) {
   options.contacts = std::move(supports);
   for_each_driven(*recording_, push, [&](const Tool& tool, const Load& load) {
-    body.motion_column[tool.name] = body.node_motions + static_cast<int>(options.driven.size());
+    const auto next_column = [&] { return body.node_motions + static_cast<int>(options.driven.size()); };
+    body.motion_column[tool.name] = next_column();
     options.driven.push_back({options.contacts.size(), push_direction(tool, load)});
+    if (stands_uncertainly(*recording_, tool)) {
+      body.standing[tool.name] = {next_column(), load.direction};
+      for (const Vec3& tangent : tangents(load.direction))
+        options.driven.push_back({options.contacts.size(), way_along_surface(object_.mesh, tool, load, tangent)});
+    }
     options.contacts.push_back(rigid_tool(object_.mesh, tool, load));
   });
   options.friction_tolerance = std::min(fem::ContactOptions().friction_tolerance, 100 * options_.residual_tolerance);
@@ -120,22 +137,32 @@ ForwardModel::SolvedAtPtr ForwardModel::solve_contact(Body& body, const Coeffici
 /// The object under its weight alone; nullptr where no weight acts.
 ForwardModel::SolvedAtPtr ForwardModel::lying(std::size_t s, Body& body, const VectorX& unknowns, bool derivatives) {
   if (body.gravity_column < 0) return nullptr;
-  if (body.lying && body.lying->unknowns == unknowns && (body.lying->differentiated() || !derivatives)) return body.lying;
+  const std::size_t in_push = steps_[s].push;
+  const bool of_this_push = body.standing.empty() || body.lying_in == in_push;
+  if (body.lying && of_this_push && body.lying->unknowns == unknowns && (body.lying->differentiated() || !derivatives)) return body.lying;
+  body.lying_in = in_push;
   const Coefficients loaded = coefficients(first_step_of_push(s), body, unknowns);
   Coefficients c;
   c.force = VectorX::Zero(loaded.force.size());
   c.force.segment<3>(body.gravity_column) = loaded.force.segment<3>(body.gravity_column);
   c.motion = VectorX::Zero(loaded.motion.size());
   c.d_force.resize(c.force.size(), 0);
+  c.d_motion.resize(c.motion.size(), 0);
+  for (const auto& [tool, stands] : body.standing) c.motion.segment<2>(stands.column) = loaded.motion.segment<2>(stands.column);
   for (std::size_t k = 0; k < loaded.columns.size(); ++k) {
-    const Vec3 d = loaded.d_force.block<3, 1>(body.gravity_column, static_cast<Index>(k));
-    if (d.norm() == 0) continue;
+    const Index column = static_cast<Index>(k);
+    const Vec3 d = loaded.d_force.block<3, 1>(body.gravity_column, column);
+    VectorX standing = VectorX::Zero(c.motion.size());
+    for (const auto& [tool, stands] : body.standing)
+      standing.segment<2>(stands.column) = loaded.d_motion.block<2, 1>(stands.column, column);
+    if (d.norm() == 0 && standing.isZero(0)) continue;
     c.columns.push_back(loaded.columns[k]);
     c.d_force.conservativeResize(c.force.size(), static_cast<Index>(c.columns.size()));
+    c.d_motion.conservativeResize(c.motion.size(), static_cast<Index>(c.columns.size()));
     c.d_force.rightCols<1>().setZero();
     c.d_force.rightCols<1>().segment<3>(body.gravity_column) = d;
+    c.d_motion.rightCols<1>() = standing;
   }
-  c.d_motion = MatrixX::Zero(c.motion.size(), static_cast<Index>(c.columns.size()));
   body.lying =
       solve_contact(body, c, unknowns, derivatives, path_ ? nullptr : body.lying, nullptr, body.lying, worker_of(s));
   return body.lying;

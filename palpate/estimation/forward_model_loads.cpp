@@ -281,10 +281,11 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
         c.motion(at) -= unknowns(yields) * read_n;
         c.d_motion(at, column(yields)) = -read_n;
       }
-      if (travel_offset_[p] >= 0) {
-        c.motion(at) += unknowns(travel_offset_[p]);
-        const int offset = column(travel_offset_[p]);
-        c.d_motion(at, offset) = 1;
+      for (const int off : {travel_offset_[p], force_error_[s][l]}) {
+        if (off < 0) continue;
+        c.motion(at) += unknowns(off);
+        const int place = column(off);
+        c.d_motion(at, place) = 1;
       }
       continue;
     }
@@ -301,6 +302,24 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
         const int at = column(own_unknown);
         c.d_force.block<3, 1>(first, at) += into_object * force;
       }
+    }
+  }
+  // Where a rigid tool stands is the push's, also in steps in which it does not touch.
+  const auto standing_shift = [&](const std::string& name) -> std::optional<std::pair<int, Vec3>> {
+    for (std::size_t t = first_step_of_push(s); t < steps_.size() && steps_[t].push == p; ++t) {
+      const std::vector<Load>& loads = step(t).loads;
+      for (std::size_t l = 0; l < loads.size(); ++l)
+        if (loads[l].tool == name && contact_shift_[t][l] >= 0) return std::pair(contact_shift_[t][l], loads[l].contact_found_m);
+    }
+    return std::nullopt;
+  };
+  for (const auto& [name, stands] : body.standing) {
+    const std::array<Vec3, 2> across = tangents(stands.direction);
+    const auto shift = standing_shift(name);
+    for (int k = 0; shift && k < 2; ++k) {
+      c.motion(stands.column + k) = unknowns(shift->first + k) - across[static_cast<std::size_t>(k)].dot(shift->second);
+      const int place = column(shift->first + k);
+      c.d_motion(stands.column + k, place) = 1;
     }
   }
   if (body.gravity_column >= 0) {

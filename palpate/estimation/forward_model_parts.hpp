@@ -59,6 +59,12 @@ struct ForwardModel::Body {
   };
   std::map<std::string, Contact> contacts;   // of a load's key
   std::map<std::string, int> motion_column;  // of a platen
+  /// Of a rigid tool whose contact is not exactly known: it stands elsewhere from before the first step on.
+  struct Standing {
+    int column = -1;                // first of two motions
+    Vec3 direction = Vec3::Zero();  // that they are across
+  };
+  std::map<std::string, Standing> standing;
   int gravity_column = -1;
   MatrixX free_motions;
   MatrixX slide, slide_conjugate;  // surface and loads of a slide along them (3v x f, columns x f); empty: none
@@ -67,6 +73,7 @@ struct ForwardModel::Body {
   int node_motions = 0;  // columns of platens whose nodes are moved, and of supports that spread; those of rigid tools come after
   int spreads = 0;       // of them, the last ones
   SolvedAtPtr lying;     // under its weight alone, where it was last asked for
+  std::size_t lying_in = 0;  // the push whose tools stood where they stand then
   std::unique_ptr<fem::Response> response;  // the surface is watched
 };
 

@@ -143,7 +143,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   const MatrixX hessian = optimum.evaluation.information(factor)(moving, moving);
   const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
   answer.nuisances = nuisances_from(objective, optimum, covariance, moving);
-  answer.budget = error_budget(unknowns, hessian, moving);
+  answer.budget = error_budget(unknowns, hessian, moving, object.region_names);
   const FitSummary summary = summary_of(unknowns, optimum, residuals);
   answer.fit.points_used = summary.points_used;
   answer.fit.rms_m = summary.rms_m;

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/load_columns.hpp"
 #include "palpate/fem/boundary.hpp"
 
 namespace palpate::estimation {
@@ -67,7 +69,7 @@ fem::RigidContact rigid_tool(const TetMesh& mesh, const Tool& tool, const Load& 
     contact.seat_m = std::max(1e-6, 1e-4 * diagonal_m);
     return contact;
   }
-  contact.T_base_tool = fem::tool_pose(load.contact_m, direction, tool.axis);
+  contact.T_base_tool = fem::tool_pose(touched_m(load), direction, tool.axis);
   const GapAlong gap(mesh, *contact.shape, contact.T_base_tool);
   if (gap.misses()) throw Error("lies nowhere near the object; check its loads' contact_m", "tools." + tool.name);
   // From twice its size outside, where it touches nothing, inwards.
@@ -86,6 +88,24 @@ fem::RigidContact rigid_tool(const TetMesh& mesh, const Tool& tool, const Load& 
   }
   contact.T_base_tool.translation() += outside * direction;
   return contact;
+}
+
+Vec3 way_along_surface(const TetMesh& mesh, const Tool& tool, const Load& load, const Vec3& tangent) {
+  const Vec3 direction = push_direction(tool, load);
+  const double size_m = tool.radius_m > 0 ? tool.radius_m : rigid_tool(mesh, tool, load).shape->bounding_radius_m();
+  // Surfaces of a mesh are smooth on the scale of the tool only. At an edge there is one side to go to, or none.
+  const double h = size_m / 8;
+  const auto begins_m = [&](double aside_m) -> std::optional<double> {
+    Load there = load;
+    there.contact_m += aside_m * tangent;
+    try {
+      return direction.dot(rigid_tool(mesh, tool, there).T_base_tool.translation());
+    } catch (const Error&) {
+      return std::nullopt;
+    }
+  };
+  const auto ahead = begins_m(h), behind = begins_m(-h);
+  return tangent + (ahead && behind ? (*ahead - *behind) / (2 * h) : 0) * direction;
 }
 
 }  // namespace palpate::estimation

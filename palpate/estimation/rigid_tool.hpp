@@ -11,9 +11,13 @@ namespace palpate::estimation {
 Vec3 push_direction(const Tool& tool, const Load& load);
 
 /// The tool where it just touches the object at rest: a platen at its plane, any other tool with its tip on the line of the
-/// push through Load::contact_m, as far along as nothing of it is inside the object (to a thousandth of its size). `bonded`:
+/// push through touched_m, as far along as nothing of it is inside the object (to a thousandth of its size). `bonded`:
 /// what touches does not slide.
 /// @throws Error for chosen vertices, a shape without its size, or a tool that misses the object
 fem::RigidContact rigid_tool(const TetMesh& mesh, const Tool& tool, const Load& load);
+
+/// How the place where the tool just touches moves as the contact moves along a tangent of the push, to first order: aside by as much, and
+/// along the push as the surface rises or falls.
+Vec3 way_along_surface(const TetMesh& mesh, const Tool& tool, const Load& load, const Vec3& tangent);
 
 }  // namespace palpate::estimation

@@ -290,6 +290,34 @@ void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
   }
 }
 
+/// What is stated of a tool and cannot be heard: in silence it would be taken for part of the interval.
+void judge_unheard(const VerdictInput& in, std::vector<Verdict>& out) {
+  const auto driven = [&](const Tool& tool, const auto& states) {
+    bool any = false, forced = false;
+    for (const auto& push : in.recording.pushes) {
+      for (const auto& step : push.steps) {
+        for (const auto& load : step.loads) {
+          if (load.tool != tool.name) continue;
+          any = any || (load.travel_m && states(load));
+          forced = forced || load.force_n;
+        }
+      }
+    }
+    return any && !forced;
+  };
+  const auto say = [&](const Tool& tool, const std::string& field, const std::string& cure) {
+    out.push_back({"not_in_interval", "`" + field + "` of tool '" + tool.name + "' is not in the interval: its motion is imposed, and " + cure});
+  };
+  for (const Tool& tool : in.recording.tools) {
+    if (tool.radius_std_m > 0 && driven(tool, [](const Load&) { return true; }))
+      say(tool, "radius_std_m",
+          "a tool that touches as a rigid body has exactly the shape that is stated. Estimate again with `radius_m` larger by it: that is what "
+          "it does to E and nu.");
+    if (tool.shape == ToolShape::platen && driven(tool, [](const Load& load) { return load.contact_std_m > 0; }))
+      say(tool, "contact_std_m", "a platen has no contact point. Where its face begins is `travel_offset_std_m` of the push.");
+  }
+}
+
 void judge_equilibrium(const VerdictInput& in, std::vector<Verdict>& out) {
   if (!in.certificate || !in.certificate->second_equilibrium) return;
   out.push_back({"two_equilibria",
@@ -333,6 +361,7 @@ std::vector<Verdict> judge(const VerdictInput& input) {
   judge_equilibrium(input, verdicts);
   judge_parts(input, verdicts);
   judge_steps(input, verdicts);
+  judge_unheard(input, verdicts);
   return verdicts;
 }
 

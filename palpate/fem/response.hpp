@@ -25,7 +25,7 @@ namespace palpate::fem {
 /// Where an answer came from.
 enum class ResponseSource { superposed, branch, solved };
 
-/// A rigid contact whose tip a motion coefficient moves: metres along `direction`.
+/// A rigid contact whose tip a motion coefficient moves: metres along `direction`. Further ones of a contact: where it stands before it moves.
 struct DrivenContact {
   std::size_t contact = 0;
   Vec3 direction = Vec3::Zero();

@@ -16,10 +16,13 @@ class TouchingResponse {
   void forget() { statics_.forget(); }
 
  private:
+  std::optional<ContactEquilibrium> before_touching(const VectorX& motion) const;
+  ContactPathSensitivity before_touching_along(const MatrixX& motion, Index count) const;
   MatrixX reactions_along(const ContactPathSensitivity& d) const;
 
   Index node_motions_, parameters_;
   std::vector<DrivenContact> driven_;
+  std::vector<char> standing_;  ///< one a driven contact: it says where a tool stands, and does not move it
   ContactStatics statics_;
 };
 

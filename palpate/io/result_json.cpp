@@ -146,12 +146,22 @@ HeldOut held_out_from(const json& object) {
 }
 
 json from(const BudgetEntry& one) {
-  return {{"input", one.input},
-          {"young_modulus_percent", number(one.young_modulus_percent)},
-          {"poisson_shift", number(one.poisson_shift)}};
+  json object = {{"input", one.input},
+                 {"young_modulus_percent", number(one.young_modulus_percent)},
+                 {"poisson_shift", number(one.poisson_shift)}};
+  for (const RegionShare& share : one.regions)
+    object["regions"].push_back({{"region", share.region}, {"young_modulus_percent", number(share.young_modulus_percent)}});
+  if (!one.off_by.empty()) object["off_by"] = one.off_by;
+  if (!one.field.empty()) object["field"] = one.field;
+  return object;
 }
 BudgetEntry budget_from(const json& object) {
-  return {object.at("input"), number_at(object, "young_modulus_percent"), number_at(object, "poisson_shift")};
+  BudgetEntry entry{object.at("input"), number_at(object, "young_modulus_percent"), number_at(object, "poisson_shift")};
+  for (const json& share : object.value("regions", json::array()))
+    entry.regions.push_back({share.at("region"), number_at(share, "young_modulus_percent")});
+  entry.off_by = object.value("off_by", "");
+  entry.field = object.value("field", "");
+  return entry;
 }
 
 json from(const StepFit& one) {
@@ -223,6 +233,7 @@ json result_json(const Identification& answer) {
   object["fit"] = from(answer.fit);
   object["prediction"] = from(answer.prediction);
   object["budget"] = array_from(answer.budget);
+  object["budget_if"] = array_from(answer.budget_if);
   object["per_push"] = array_from(answer.per_push);
   object["per_site"] = array_from(answer.per_site);
   object["termination"] = "failed";
@@ -264,6 +275,7 @@ Identification parse_result(const std::string& bytes, const std::string& name) {
     answer.fit = fit_from(part("fit"));
     answer.prediction = held_out_from(part("prediction"));
     answer.budget = all_of(part("budget"), budget_from);
+    if (object.contains("budget_if")) answer.budget_if = all_of(part("budget_if"), budget_from);  // earlier versions did not say
     answer.per_push = all_of(part("per_push"), parameter_from);
     if (object.contains("per_site")) answer.per_site = all_of(part("per_site"), parameter_from);
     for (const auto& [word, value] : termination_names) {

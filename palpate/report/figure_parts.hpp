@@ -38,6 +38,7 @@ using Draw = Sheet (*)(Canvas*, const nlohmann::json&);
 Sheet per_push(Canvas* canvas, const nlohmann::json& page);
 Sheet per_site(Canvas* canvas, const nlohmann::json& page);
 Sheet budget(Canvas* canvas, const nlohmann::json& page);
+Sheet budget_if(Canvas* canvas, const nlohmann::json& page);
 Sheet held_out(Canvas* canvas, const nlohmann::json& page);
 Sheet convergence(Canvas* canvas, const nlohmann::json& page);
 

@@ -183,7 +183,8 @@ struct Row {
 constexpr Row table[] = {
     {"object", object},       {"force_travel", force_travel}, {"posterior", posterior},
     {"residuals", residuals}, {"per_push", per_push},         {"per_site", per_site},
-    {"budget", budget},       {"held_out", held_out},         {"convergence", convergence},
+    {"budget", budget},       {"budget_if", budget_if},       {"held_out", held_out},
+    {"convergence", convergence},
 };
 
 }  // namespace

@@ -55,6 +55,21 @@ Sheet bars(Canvas* canvas, const std::vector<std::tuple<std::string, double, std
   return sheet;
 }
 
+/// A bar an input, and where there are several regions one for each of them.
+Sheet shares(Canvas* canvas, const json& budget, const std::string& label) {
+  std::vector<std::tuple<std::string, double, std::string>> rows;
+  const auto add = [&](const std::string& name, const json& of_young) {
+    const double percent = std::abs(number(of_young));
+    if (std::isfinite(percent)) rows.emplace_back(name, percent, fmt::format("{:.2g} %", percent));
+  };
+  for (const json& b : budget) {
+    if (b["regions"].empty()) add(b["input"], b["young_modulus_percent"]);
+    for (const json& one : b["regions"]) add(b["input"].get<std::string>() + ", " + one["region"].get<std::string>(), one["young_modulus_percent"]);
+  }
+  std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return std::get<1>(a) > std::get<1>(b); });
+  return bars(canvas, rows, label);
+}
+
 }  // namespace
 
 Sheet per_push(Canvas* canvas, const json& page) { return young_of_parts(canvas, page["per_push"], 0); }
@@ -68,14 +83,10 @@ Sheet per_site(Canvas* canvas, const json& page) {
   return std::all_of(sites.begin(), sites.end(), in_pushes) ? Sheet{0, 0} : young_of_parts(canvas, sites, 3);
 }
 
-Sheet budget(Canvas* canvas, const json& page) {
-  std::vector<std::tuple<std::string, double, std::string>> rows;
-  for (const json& b : page["budget"]) {
-    const double percent = std::abs(number(b["young_modulus_percent"]));
-    if (std::isfinite(percent)) rows.emplace_back(b["input"], percent, fmt::format("{:.2g} %", percent));
-  }
-  std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return std::get<1>(a) > std::get<1>(b); });
-  return bars(canvas, rows, "share of Young's modulus (%)");
+Sheet budget(Canvas* canvas, const json& page) { return shares(canvas, page["budget"], "share of Young's modulus (%)"); }
+
+Sheet budget_if(Canvas* canvas, const json& page) {
+  return shares(canvas, page["budget_if"], "Young's modulus, were the input off (%)");
 }
 
 Sheet held_out(Canvas* canvas, const json& page) {

@@ -128,6 +128,18 @@ bool inside(const Box16& box, const Eigen::Ref<const Eigen::RowVector3d>& point)
   return share.allFinite() && share.minCoeff() >= 0 && share.maxCoeff() <= 1;
 }
 
+json budget_of(const std::vector<BudgetEntry>& budget) {
+  json list = json::array();
+  for (const BudgetEntry& entry : budget) {
+    json one = {{"input", entry.input}, {"young_modulus_percent", entry.young_modulus_percent}, {"poisson_shift", entry.poisson_shift},
+                {"off_by", entry.off_by}, {"field", entry.field}, {"regions", json::array()}};
+    for (const RegionShare& share : entry.regions)
+      one["regions"].push_back({{"region", share.region}, {"young_modulus_percent", share.young_modulus_percent}});
+    list.push_back(one);
+  }
+  return list;
+}
+
 json posterior_of(const PosteriorGrid& grid) {
   if (grid.density.size() == 0 || grid.density.rows() != grid.young_modulus_pa.size() ||
       grid.density.cols() != grid.poisson_ratio.size()) {
@@ -338,12 +350,8 @@ json payload(const Identification& identification, const Recording* recording, c
                         {"surface_rms_m", held_out.surface_rms_m},
                         {"baseline_no_deformation_rms_m", held_out.baseline_no_deformation_rms_m},
                         {"baseline_last_step_rms_m", held_out.baseline_last_step_rms_m}};
-  page["budget"] = json::array();
-  for (const BudgetEntry& entry : identification.budget) {
-    page["budget"].push_back({{"input", entry.input},
-                              {"young_modulus_percent", entry.young_modulus_percent},
-                              {"poisson_shift", entry.poisson_shift}});
-  }
+  page["budget"] = budget_of(identification.budget);
+  page["budget_if"] = budget_of(identification.budget_if);
   page["provenance"] = identification.provenance;
   page["timing_s"] = identification.timing_s;
   page["trace"] = json::array();

@@ -118,7 +118,19 @@ std::vector<Scene> scenes() {
     r.pushes = {push_of("ball", {motion_of("ball", 0.002, middle), motion_of("ball", 0.004, middle)})};
     r.pushes[0].travel_offset_std_m = 2e-4;
     r.pushes[0].force_tare_std_n = 0.02;
+    for (auto& step : r.pushes[0].steps) {
+      step.loads[0].contact_std_m = 1e-3;
+      step.observations = {ToolTravel{"ball", *step.loads[0].travel_m, 1e-4}};
+    }
     out.push_back({"ball_by_travel", "neo_hookean", r, 1});
+    // Nothing slides under a tip that is pushed askew; before it touches it stands where it stands.
+    r.environment.gravity_m_s2.setZero();
+    r.supports[0].kind = SupportKind::plane;
+    r.supports[0].contact = ContactLaw::bonded;
+    r.tools[1].contact = ContactLaw::bonded;
+    for (auto& step : r.pushes[0].steps) step.loads[0].direction = Vec3(0.3, -0.1, -1).normalized();
+    r.pushes[0].steps.insert(r.pushes[0].steps.begin(), Step());
+    out.push_back({"sticking_ball_by_travel", "linear", r, 2});
   }
   {
     Recording r = lying_block(table(ContactLaw::frictionless), RestState::stress_free);

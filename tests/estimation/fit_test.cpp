@@ -218,6 +218,33 @@ TEST(Compliance, ItsPriorBecomesTheErrorOfYoungsModulus) {
   EXPECT_NEAR(parameter(open, "young_modulus").std / 2e4, 2e-4 * stiffness_n_m, 0.02 * 2e-4 * stiffness_n_m);
   ASSERT_FALSE(open.budget.empty());
   EXPECT_EQ(open.budget.front().input, "compliance");
+  // Stated as exact it is in no interval, and is said all the same: a tenth of it.
+  const auto said = [&](const std::string& input) {
+    const auto at = std::find_if(exact.budget_if.begin(), exact.budget_if.end(), [&](const BudgetEntry& e) { return e.input == input; });
+    return at == exact.budget_if.end() ? -1 : at->young_modulus_percent;
+  };
+  EXPECT_NEAR(said("compliance"), 100 * 0.1 * compliance_m_per_n * stiffness_n_m, 0.5 * compliance_m_per_n * stiffness_n_m);
+  EXPECT_NEAR(said("force_scale"), 1, 0.01);
+}
+
+// Steps whose travel errs independently: weighed by their travels, var(log E) = sigma^2 / sum of travels squared.
+TEST(ImposedTravel, ItsNoiseBecomesTheErrorOfYoungsModulus) {
+  constexpr double sigma_m = 5e-5;
+  Recording recording = pressed_bar(linear_force_n, 2e4, 0.3);
+  recording.model.poisson_fixed = 0.3;
+  for (auto& step : recording.pushes[0].steps) std::get<Wrench>(step.observations[0]).force_sigma_n = 1e-5;
+  const auto object = simulated(kuhn_block(1, 1, 1, bar_m), "linear");
+  const Identification exact = fit(recording, object, wrenches_of(recording), {});
+  double squares = 0;
+  for (auto& step : recording.pushes[0].steps) {
+    squares += std::pow(*step.loads[0].travel_m, 2);
+    step.observations.push_back(ToolTravel{"", *step.loads[0].travel_m, sigma_m});
+  }
+  const Identification open = fit(recording, object, wrenches_of(recording), {});
+  const Parameter& young = parameter(open, "young_modulus");
+  EXPECT_NEAR(young.value, 2e4, 1);
+  EXPECT_NEAR(young.std / young.value, sigma_m / std::sqrt(squares), 0.02 * sigma_m / std::sqrt(squares));
+  EXPECT_LT(parameter(exact, "young_modulus").std, 0.1 * young.std);
 }
 
 // ---- A pushed block, seen by noisy clouds.

@@ -35,7 +35,8 @@ Identification whole_answer() {
   answer.prediction.what = "push 2";
   answer.prediction.force_error = std::numeric_limits<double>::quiet_NaN();
   answer.prediction.surface_rms_m = 0.0007;
-  answer.budget = {{"force scale", 1.0, 0.001}};
+  answer.budget = {{"force scale", 1.0, 0.001, {{"head", 1.0}, {"body", 0.5}}}};
+  answer.budget_if = {{"contact_shift", 0.7, 0.002, {}, "1 mm across the push", "contact_std_m"}};
   answer.per_push = {{"young_modulus", "push 1", "Pa", 19900, 200, 19500, 20300, true}};
   answer.termination = Termination::no_progress;
   answer.message = "stopped";
@@ -65,7 +66,7 @@ Identification whole_answer() {
 TEST(Result, HoldsTheKeysThatProgramsRelyOn) {
   const nlohmann::json object = result_json(whole_answer());
   for (const char* key : {"format", "material", "parameters", "nuisances", "verdicts", "fit", "prediction", "provenance",
-                          "timing_s", "per_push", "budget", "covariance"}) {
+                          "timing_s", "per_push", "budget", "budget_if", "covariance"}) {
     EXPECT_TRUE(object.contains(key)) << key;
   }
   for (const char* key : {"name", "region", "unit", "value", "std", "lower_95", "upper_95", "determined"}) {
@@ -83,6 +84,12 @@ TEST(Result, ComesBackAsItWasWritten) {
   const Identification back = read_result(folder.path() / "out");
   EXPECT_EQ(result_json(back), result_json(answer));
   EXPECT_EQ(back.covariance, answer.covariance);
+  ASSERT_EQ(back.budget[0].regions.size(), 2u);
+  EXPECT_EQ(back.budget[0].regions[1].region, "body");
+  EXPECT_EQ(back.budget[0].regions[1].young_modulus_percent, 0.5);
+  ASSERT_EQ(back.budget_if.size(), 1u);
+  EXPECT_EQ(back.budget_if[0].off_by, "1 mm across the push");
+  EXPECT_EQ(back.budget_if[0].field, "contact_std_m");
   EXPECT_EQ(back.posterior.density, answer.posterior.density);
   EXPECT_EQ(back.termination, Termination::no_progress);
   EXPECT_TRUE(std::isnan(back.prediction.force_error));

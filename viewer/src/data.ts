@@ -98,7 +98,8 @@ interface Raw {
     baseline_no_deformation_rms_m: Num;
     baseline_last_step_rms_m: Num;
   };
-  budget: { input: string; young_modulus_percent: Num; poisson_shift: Num }[];
+  budget: BudgetEntry[];
+  budget_if: BudgetEntry[]; // what is stated as exact, were it off
   provenance: Record<string, string>;
   timing_s: Record<string, Num>;
   trace: { young_modulus_pa: Num; poisson_ratio: Num; cost: Num; round: number }[];
@@ -119,6 +120,15 @@ interface Raw {
   residual_scale_m: number;
   stress_scale_pa: number;
   mesh: { vertices: number; triangles: string; rest: string };
+}
+
+export interface BudgetEntry {
+  input: string;
+  young_modulus_percent: Num;
+  poisson_shift: Num;
+  regions: { region: string; young_modulus_percent: Num }[]; // empty: one
+  off_by: string; // budget_if: how far, and the field that would state it
+  field: string;
 }
 
 export interface Report extends Omit<Raw, "steps" | "mesh"> {

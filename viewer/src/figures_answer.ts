@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Figures of the answer and of what it rests on: posterior, single pushes, error budget, held-out prediction, nuisances.
 import { category } from "./colours";
-import type { Parameter, Report } from "./data";
+import type { BudgetEntry, Parameter, Report } from "./data";
 import { Plot, range, svg } from "./plot";
 import { along, marginal, outlines, threshold } from "./regions";
 import { digits, known, prefix, quantity } from "./words";
@@ -197,19 +197,29 @@ function bars(width: number, items: { label: string; value: number; text: string
   return plot.node;
 }
 
-export function budget(report: Report, width: number): SVGElement | null {
-  const list = report.budget.filter((b) => known(b.young_modulus_percent));
-  if (list.length === 0) return null;
+/** A bar an input, and where there are several regions one for each of them. */
+function shares(list: BudgetEntry[], width: number, colour: string, label: string, title: string): SVGElement | null {
   const items = list
-    .map((b) => ({
-      label: b.input,
-      value: Math.abs(b.young_modulus_percent!),
-      text: `${digits(Math.abs(b.young_modulus_percent!), 2)} %${known(b.poisson_shift) && b.poisson_shift !== 0 ? `, \u03bd ${digits(Math.abs(b.poisson_shift), 2)}` : ""}`,
-      colour: category(0),
-    }))
+    .flatMap((b) => {
+      const young = b.regions.length > 0 ? b.regions : [{ region: "", young_modulus_percent: b.young_modulus_percent }];
+      const nu = known(b.poisson_shift) && b.poisson_shift !== 0 ? `, \u03bd ${digits(Math.abs(b.poisson_shift), 2)}` : "";
+      const off = b.off_by ? `; off by ${b.off_by}` : "";
+      return young
+        .filter((one) => known(one.young_modulus_percent))
+        .map((one) => {
+          const value = Math.abs(one.young_modulus_percent!);
+          return { label: one.region ? `${b.input}, ${one.region}` : b.input, value, text: `${digits(value, 2)} %${nu}${off}`, colour };
+        });
+    })
     .sort((a, b) => b.value - a.value);
-  return bars(width, items, "share of Young's modulus (%)", "What each input's uncertainty does to the answer");
+  return items.length > 0 ? bars(width, items, label, title) : null;
 }
+
+export const budget = (report: Report, width: number): SVGElement | null =>
+  shares(report.budget, width, category(0), "share of Young's modulus (%)", "What each input's uncertainty does to the answer");
+
+export const budgetIf = (report: Report, width: number): SVGElement | null =>
+  shares(report.budget_if, width, category(4), "change of Young's modulus (%)", "What inputs that are stated as exact would do were they off");
 
 export function heldOut(report: Report, width: number): SVGElement | null {
   const p = report.prediction;

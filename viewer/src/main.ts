@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import "./style.css";
 import { decode, type Report, type Step } from "./data";
-import { budget, heldOut, nuisances, perPush, perSite, posterior, sparkline } from "./figures_answer";
+import { budget, budgetIf, heldOut, nuisances, perPush, perSite, posterior, sparkline } from "./figures_answer";
 import { convergence, forceTravel, histogram, rmsBySteps } from "./figures_fit";
 import { watch } from "./live";
 import { citation, provenance, recordingFacts } from "./provenance";
@@ -132,6 +132,7 @@ class Page {
       Panel.make("Each push on its own", "Young's modulus with 95 % interval from each push (or region) alone; shaded: all together. Intervals that do not overlap speak for an object that is not homogeneous.", (w) => perPush(report, w)),
       Panel.make("Each site on its own", "The same for all pushes at one place together.", (w) => perSite(report, w)),
       Panel.make("Error budget", "How far one standard deviation of each input moves the answer. The longest bar is what to calibrate next.", (w) => budget(report, w)),
+      Panel.make("Stated as exact", "In no interval, since the recording says that these inputs are exactly known: what each would do to the answer were it off by a typical size.", (w) => budgetIf(report, w)),
       Panel.make("Prediction of what was held out", `Fitted without ${p.what || "it"}, then predicted${known(p.force_error) ? `; force off by ${digits(100 * Math.abs(p.force_error), 2)} %` : ""}. Grey: trivial guesses.`, (w) => heldOut(report, w)),
       Panel.make("Nuisances against their priors", "Estimate with 95 % interval in prior standard deviations. Within the shaded band all is as expected; beyond \u00b13 the prior or the model is wrong.", (w) => nuisances(report, w)),
       Panel.make("Convergence", "Young's modulus over the accepted iterations; dashed: the cost on a logarithmic scale of its own. The fit goes in rounds that weigh outliers more and more strictly; each round's cost starts afresh.", (w) => convergence(report, w)),
