@@ -88,6 +88,21 @@ std::string budget_words(const BudgetEntry& entry) {
   return fmt::format("{}   {:.4f} of nu", young, entry.poisson_shift);
 }
 
+void tell(Session& session, const HeldOut& held_out) {
+  if (!held_out.available) return;
+  std::string words;
+  if (std::isfinite(held_out.deformation_explained)) words += fmt::format(" {:.3g} % of the deformation foretold,", 100 * held_out.deformation_explained);
+  if (held_out.surface_rms_m > 0)
+    words += fmt::format(" surface {} rms ({} had nothing moved{}),", report::quantity(held_out.surface_rms_m, "m"),
+                         report::quantity(held_out.baseline_no_deformation_rms_m, "m"),
+                         std::isfinite(held_out.fitted_rms_m)
+                             ? fmt::format("; {} in the fit that has seen it", report::quantity(held_out.fitted_rms_m, "m"))
+                             : std::string());
+  if (std::isfinite(held_out.force_error)) words += fmt::format(" force within {:.2g} %,", 100 * held_out.force_error);
+  words.back() = ' ';
+  session.say(fmt::format("held out           {}:{}", held_out.what, words.substr(0, words.size() - 1)));
+}
+
 void tell(Session& session, const Options& given, const Identification& answer) {
   for (const auto& parameter : answer.parameters) {
     const bool young = parameter.name == "young_modulus" && parameter.region.empty();
@@ -113,6 +128,7 @@ void tell(Session& session, const Options& given, const Identification& answer) 
                                   : std::string("was not estimated and is not in the interval") +
                                         (as_given ? " (--refine auto does both)" : "")));
   }
+  tell(session, answer.prediction);
   if (given.budget) {
     session.say("error budget       what each input's uncertainty does to E and nu:");
     for (const auto& entry : answer.budget) session.say(fmt::format("  {:<24} {}", entry.input, budget_words(entry)));

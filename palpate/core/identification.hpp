@@ -47,13 +47,20 @@ struct FitSummary {
   int load_cases = 0;
 };
 
+/// Loaded steps predicted from a fit without them. Distances are rms of observed points to a surface, noise included.
 struct HeldOut {
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
   bool available = false;
-  std::string what;          ///< "push 3" or "last step"
+  std::string what;          ///< "each push in turn" or "the highest load"
   double force_error = 0;    ///< relative, of the predicted force (NaN = not predicted)
-  double surface_rms_m = 0;  ///< predicted surface against the observed one
+  double surface_rms_m = 0;  ///< to the predicted surface
   double baseline_no_deformation_rms_m = 0;
-  double baseline_last_step_rms_m = 0;
+  double baseline_last_step_rms_m = 0;  ///< to that of the step before
+  double fitted_rms_m = unknown;        ///< to that of the fit that has seen them: hardly more than noise where the model fits
+  /// How much of what that fit explains of the deformation is foretold as well, in squares, at most 1: noise drops out. NaN = the
+  /// deformation is lost in the noise.
+  double deformation_explained = unknown;
 };
 
 struct RegionShare {

@@ -7,18 +7,9 @@
 #include <vector>
 
 #include "palpate/core/identification.hpp"
-#include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/partial_fit.hpp"
 
 namespace palpate::estimation {
-
-/// log E of some steps alone, everything else but nu free under its prior.
-struct PartialYoung {
-  std::string name;
-  double log_young = 0, std = 0;  ///< std: nu known
-  double slope = 0;               ///< d log E / d nu
-  bool usable = false;
-  bool cancelled = false;
-};
 
 struct CrossChecks {
   std::vector<PartialYoung> pushes;             ///< empty where there is one push only

@@ -134,15 +134,20 @@ json from(const HeldOut& one) {
           {"force_error", number(one.force_error)},
           {"surface_rms_m", number(one.surface_rms_m)},
           {"baseline_no_deformation_rms_m", number(one.baseline_no_deformation_rms_m)},
-          {"baseline_last_step_rms_m", number(one.baseline_last_step_rms_m)}};
+          {"baseline_last_step_rms_m", number(one.baseline_last_step_rms_m)},
+          {"fitted_rms_m", number(one.fitted_rms_m)},
+          {"deformation_explained", number(one.deformation_explained)}};
 }
 HeldOut held_out_from(const json& object) {
+  const auto later = [&](const char* key) { return object.contains(key) ? number_at(object, key) : HeldOut::unknown; };
   return {object.at("available"),
           object.at("what"),
           number_at(object, "force_error"),
           number_at(object, "surface_rms_m"),
           number_at(object, "baseline_no_deformation_rms_m"),
-          number_at(object, "baseline_last_step_rms_m")};
+          number_at(object, "baseline_last_step_rms_m"),
+          later("fitted_rms_m"),  // earlier versions did not say
+          later("deformation_explained")};
 }
 
 json from(const BudgetEntry& one) {

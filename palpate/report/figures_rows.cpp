@@ -93,7 +93,8 @@ Sheet held_out(Canvas* canvas, const json& page) {
   const json& p = page["prediction"];
   std::vector<std::tuple<std::string, double, std::string>> rows;
   if (p["available"] != true || !p["surface_rms_m"].is_number()) return {0, 0};
-  for (const auto& [name, key] : {std::pair{"prediction", "surface_rms_m"},
+  for (const auto& [name, key] : {std::pair{"the fit that has seen it", "fitted_rms_m"},
+                                  {"prediction", "surface_rms_m"},
                                   {"as at the last step", "baseline_last_step_rms_m"},
                                   {"no deformation", "baseline_no_deformation_rms_m"}}) {
     if (p[key].is_number()) rows.emplace_back(name, p[key].get<double>() * 1e3, quantity(p[key], "m"));

@@ -349,7 +349,9 @@ json payload(const Identification& identification, const Recording* recording, c
                         {"force_error", held_out.force_error},
                         {"surface_rms_m", held_out.surface_rms_m},
                         {"baseline_no_deformation_rms_m", held_out.baseline_no_deformation_rms_m},
-                        {"baseline_last_step_rms_m", held_out.baseline_last_step_rms_m}};
+                        {"baseline_last_step_rms_m", held_out.baseline_last_step_rms_m},
+                        {"fitted_rms_m", held_out.fitted_rms_m},
+                        {"deformation_explained", held_out.deformation_explained}};
   page["budget"] = budget_of(identification.budget);
   page["budget_if"] = budget_of(identification.budget_if);
   page["provenance"] = identification.provenance;

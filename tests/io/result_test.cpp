@@ -35,6 +35,8 @@ Identification whole_answer() {
   answer.prediction.what = "push 2";
   answer.prediction.force_error = std::numeric_limits<double>::quiet_NaN();
   answer.prediction.surface_rms_m = 0.0007;
+  answer.prediction.fitted_rms_m = 0.0006;
+  answer.prediction.deformation_explained = 0.97;
   answer.budget = {{"force scale", 1.0, 0.001, {{"head", 1.0}, {"body", 0.5}}}};
   answer.budget_if = {{"contact_shift", 0.7, 0.002, {}, "1 mm across the push", "contact_std_m"}};
   answer.per_push = {{"young_modulus", "push 1", "Pa", 19900, 200, 19500, 20300, true}};

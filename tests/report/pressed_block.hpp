@@ -85,7 +85,7 @@ inline palpate::Identification identification(const Size& size = {}) {
       {"force scale", 1.0, 0.001}, {"contact point", 0.6, 0.004}, {"rest surface", 1.7, 0.02}, {"mesh", 0.3, 0.001}};
   id.provenance = {{"options", "--material neo_hookean"}, {"seed", "1"}};
   id.timing_s = {{"object", 0.4}, {"fit", 2.1}};
-  id.prediction = {true, "push 2", 0.021, 0.0011, 0.0062, 0.0029};
+  id.prediction = {true, "push 2", 0.021, 0.0011, 0.0062, 0.0029, 0.001, 0.994};
   id.surface = block(size.cells);
   const auto vertices = id.surface.vertices_m.rows();
   double squares = 0;

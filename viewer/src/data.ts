@@ -97,6 +97,8 @@ interface Raw {
     surface_rms_m: Num;
     baseline_no_deformation_rms_m: Num;
     baseline_last_step_rms_m: Num;
+    fitted_rms_m: Num;
+    deformation_explained: Num;
   };
   budget: BudgetEntry[];
   budget_if: BudgetEntry[]; // what is stated as exact, were it off

@@ -225,6 +225,7 @@ export function heldOut(report: Report, width: number): SVGElement | null {
   const p = report.prediction;
   if (!p.available || !known(p.surface_rms_m)) return null;
   const list = [
+    { label: "fit that has seen it", m: p.fitted_rms_m, colour: "var(--faint)" },
     { label: "palpate's prediction", m: p.surface_rms_m, colour: category(2) },
     { label: "as at the last step", m: p.baseline_last_step_rms_m, colour: "var(--faint)" },
     { label: "no deformation", m: p.baseline_no_deformation_rms_m, colour: "var(--faint)" },

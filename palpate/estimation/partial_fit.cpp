@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/estimation/partial_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::estimation {
+namespace {
+
+constexpr double nearly = 0.1;  // of log E: one step from the joint optimum gets a part's own to a few per mille
+
+OptimiseOptions few_iterations() {
+  OptimiseOptions options;
+  options.max_iterations = 10;
+  options.step_tolerance = 0.02;
+  return options;
+}
+
+}  // namespace
+
+PartialFits::PartialFits(Objective& objective, const Optimum& optimum, const Loss& loss, double factor, const OnProgress& progress)
+    : objective_(objective), optimum_(optimum), loss_(loss), factor_(factor), progress_(progress),
+      joint_rows_(objective.last_rows()), joint_predictions_(objective.last_predictions()) {}
+
+/// One step of Gauss and Newton from the joint optimum needs no solution; where it leads far, the part is fitted for good.
+Optimum PartialFits::refit(const StepFlags& steps, bool hold_poisson) {
+  Loss loss = loss_;
+  loss.steps = steps;
+  const bool was_fixed = objective_.unknowns()[poisson].fixed;
+  hold_poisson = hold_poisson || was_fixed || optimum_.poisson_at_lower || optimum_.poisson_at_upper;
+  objective_.hold_poisson(hold_poisson);
+  const std::vector<int> moving = free_unknowns(objective_.unknowns());
+  Optimum part;
+  part.unknowns = optimum_.unknowns;
+  part.evaluation = objective_.assemble(joint_rows_, optimum_.unknowns, loss);
+  const VectorX move = newton_step(part.evaluation, moving).move;
+  const Unknown& nu = objective_.unknowns()[poisson];
+  for (std::size_t k = 0; k < moving.size(); ++k) part.unknowns(moving[k]) += move(static_cast<Index>(k));
+  const bool inside = part.unknowns(poisson) >= nu.lower && part.unknowns(poisson) <= nu.upper;
+  part.termination = Termination::converged;
+  if (!move.allFinite() || std::abs(move(0)) > nearly || !inside) {
+    const OnProgress keep_going = [&](std::string_view, double share) { return !progress_ || progress_("cross-check", share); };
+    part = optimise(objective_, optimum_.unknowns, loss, few_iterations(), keep_going);
+  }
+  objective_.hold_poisson(was_fixed);
+  cancelled_ = cancelled_ || part.termination == Termination::cancelled;
+  return part;
+}
+
+PartialYoung PartialFits::young_of(const StepFlags& steps, const std::string& name) {
+  PartialYoung out;
+  out.name = name;
+  const Optimum part = refit(steps, true);
+  if (cancelled_ || !part.evaluation.usable || part.termination == Termination::failed) return out;
+  const MatrixX information = part.evaluation.information(factor_);
+  std::vector<int> others;
+  for (int k : free_unknowns(objective_.unknowns())) {
+    if (k != poisson) others.push_back(k);
+  }
+  const Eigen::LDLT<MatrixX> factorised(information(others, others));
+  const VectorX unit = VectorX::Unit(static_cast<Index>(others.size()), 0);
+  const double variance = factorised.solve(unit)(0);
+  out.log_young = part.unknowns(log_young);
+  out.std = std::sqrt(std::max(variance, 0.0));
+  out.slope = -factorised.solve(VectorX(information.col(poisson)(others)))(0);
+  // A part that says nothing about E leaves it where it was: no evidence either way.
+  out.usable = std::isfinite(variance) && variance > 0 && out.std < 0.5;
+  return out;
+}
+
+}  // namespace palpate::estimation
