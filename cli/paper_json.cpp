@@ -9,7 +9,7 @@ nlohmann::json json_of(const MethodAnswer& answer) {
           {"poisson_ratio", answer.poisson_ratio},       {"solves", answer.solves},           {"iterations", answer.iterations},
           {"seconds", answer.seconds},                   {"converged", answer.converged},     {"verdicts", answer.verdicts},
           {"poisson_lower_95", answer.poisson_lower_95}, {"poisson_upper_95", answer.poisson_upper_95},
-          {"load_cases", answer.load_cases}};
+          {"load_cases", answer.load_cases},             {"failed", answer.failed}};
 }
 
 nlohmann::json json_of(const TrialAnswer& trial) {
@@ -17,9 +17,13 @@ nlohmann::json json_of(const TrialAnswer& trial) {
                         {"true_young_modulus_pa", trial.young_modulus_pa},
                         {"true_poisson_ratio", trial.poisson_ratio},
                         {"tetrahedra", trial.tetrahedra},
+                        {"truth_s", trial.truth_s},
+                        {"model_s", trial.model_s},
+                        {"total_s", trial.total_s},
                         {"paper", json_of(trial.paper)},
                         {"paper_linear_tetrahedra", json_of(trial.paper_coarse)},
                         {"palpate", json_of(trial.palpate)}};
+  if (!trial.failed.empty()) out["failed"] = trial.failed;
   if (!trial.other_law.empty()) out["palpate_" + trial.other_law] = json_of(trial.other);
   for (const ForceReading& reading : trial.readings)
     out["readings"].push_back({{"push", reading.push}, {"force_n", reading.force_n}, {"travel_m", reading.travel_m}});
@@ -79,7 +83,8 @@ nlohmann::json json_of(const SceneAnswers& answers) {
 }
 
 nlohmann::json json_of(const StudyAnswer& answer) {
-  nlohmann::json out = {{"study", answer.study->name}, {"seed", answer.seed}, {"rows", nlohmann::json::array()}};
+  nlohmann::json out = {{"study", answer.study->name}, {"seed", answer.seed}, {"seconds", answer.seconds}, {"rows", nlohmann::json::array()}};
+  if (!answer.failed.empty()) out["failed"] = answer.failed;
   for (const StudyRow& row : answer.rows)
     out["rows"].push_back({{"what", row.what},
                            {"true_young_modulus_pa", row.young_modulus_pa},

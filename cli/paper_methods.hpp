@@ -2,6 +2,7 @@
 // Both methods on what was prepared, with what each took.
 #pragma once
 
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,15 @@
 #include "palpate/core/identification.hpp"
 
 namespace palpate::cli {
+
+/// A clock for what takes its time.
+class Watch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
 
 struct MethodAnswer {
   double young_modulus_pa = 0, poisson_ratio = 0;  ///< NaN: it has none
@@ -19,6 +29,7 @@ struct MethodAnswer {
   bool converged = false;
   std::vector<FitIteration> path;
   std::vector<std::string> verdicts;  ///< codes
+  std::string failed;                 ///< the error that it ended with; empty: none
 };
 /// Of a method that was not asked, or found nothing.
 MethodAnswer no_answer();

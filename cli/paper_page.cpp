@@ -2,6 +2,7 @@
 #include "cli/paper_page.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -44,9 +45,10 @@ std::string grid_search(const TrialAnswer& trial) {
 
 std::string section(const SceneAnswers& answers) {
   const lab::PaperScene& scene = *answers.scene;
-  const TrialAnswer& first = answers.trials.front();
+  const TrialAnswer& first = answers.shown();
   std::string html = fmt::format("<h2 id=\"{}\">{}</h2>\n<p><b>The paper</b>{}: {}<br><b>Here</b>: {}</p>\n", scene.name, scene.title,
                                  scene.figures.empty() ? "" : fmt::format(" (fig. {})", scene.figures), scene.paper_says, scene.differs);
+  if (!first.failed.empty() && first.tetrahedra == 0) return html + failed_table(answers.trials);  // no seed came as far as a model
   html += scene.apparent ? fmt::format("<p>Seed {}: ", first.seed)
                          : fmt::format("<p>Seed {}: the true E is {}{}, &nu; {:.3f}. ", first.seed, pascal(first.young_modulus_pa),
                                        first.sites.empty() ? "" : " at " + first.sites.front().site, first.poisson_ratio);
@@ -55,7 +57,7 @@ std::string section(const SceneAnswers& answers) {
   html += "</p>\n<p>Palpate's verdicts: " + listed(first.palpate.verdicts) +
           (first.other_law.empty() ? "" : "; with the " + first.other_law + " law: " + listed(first.other.verdicts)) + ".</p>\n";
   html += site_table(first) + unused_table(scene, first) + sample_table(first, !scene.apparent && first.sites.empty());
-  html += score_table(scene, answers.trials);
+  html += score_table(answers) + failed_table(answers.trials);
   html += grid_search(first);
   html += figure(surface_figure(first), "The paper's error function over (E, &nu;), dark = small, with the paths of both methods.");
   html += figure(error_figure(first), "The paper's error function over E alone, at the &nu; where its method ended.");
@@ -84,7 +86,7 @@ std::string claims(const std::vector<SceneAnswers>& scenes) {
 }  // namespace
 
 std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& command,
-                       int threads) {
+                       const std::set<int>& threads) {
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
       "<title>The paper's evaluation, remade</title><style>body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem "
@@ -97,14 +99,15 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vecto
       "<p>Frank, Schmedding, Stachniss, Teschner and Burgard, <i>Learning the Elasticity Parameters of Deformable Objects with a "
       "Manipulation Robot</i>, IROS 2010. Its experiments, made again by palpate {} on objects of the software lab, whose E is "
       "known (but for the balloon's). The paper's method is its algorithm 1: iterative closest points, squared distance to the nearest "
-      "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, start and {} thread{}; a second row "
+      "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, start and threads ({}); a second row "
       "gives it linear tetrahedra, as the paper had. Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the "
       "object at rest (where a push goes deeper: its depth). Where a scene does not say otherwise, the truth is linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
-      version, threads, threads == 1 ? "" : "s", command);
+      version, fmt::join(threads, ", "), command);
   html += claims(scenes);
   for (const SceneAnswers& scene : scenes) html += section(scene);
   for (const StudyAnswer& answer : studies)
-    html += fmt::format("<h2 id=\"{}\">{}</h2>\n<p>{}</p>\n", answer.study->name, answer.study->title, answer.study->about) + study_table(answer);
+    html += fmt::format("<h2 id=\"{}\">{}</h2>\n<p>{}</p>\n", answer.study->name, answer.study->title, answer.study->about) + study_table(answer) +
+            (answer.failed.empty() ? "" : "<p>It ended with an error: " + escaped(answer.failed) + "</p>\n");
   return html + "</body></html>\n";
 }
 

@@ -50,9 +50,17 @@ Score score_of(const std::vector<Compared>& all) {
 
 }  // namespace
 
+const TrialAnswer& SceneAnswers::shown() const {
+  const auto first = [&](auto wanted) { return std::find_if(trials.begin(), trials.end(), wanted); };
+  auto at = first([](const TrialAnswer& trial) { return !trial.samples.empty() || !trial.pictures.empty(); });
+  if (at == trials.end()) at = first([](const TrialAnswer& trial) { return trial.failed.empty(); });
+  return at == trials.end() ? trials.front() : *at;
+}
+
 SceneScores scores_of(const std::vector<TrialAnswer>& trials) {
   std::vector<Compared> paper, coarse, palpate, other;
   for (const TrialAnswer& trial : trials) {
+    if (!std::isfinite(trial.young_modulus_pa)) continue;  // the lab made no truth: nobody was asked
     coarse.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.paper_coarse});
     if (!trial.other_law.empty()) other.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.other});
     if (trial.sites.empty()) {

@@ -11,7 +11,10 @@ namespace palpate::cli {
 
 struct SceneAnswers {
   const lab::PaperScene* scene = nullptr;
-  std::vector<TrialAnswer> trials;  ///< the first one has samples and error surface
+  std::vector<TrialAnswer> trials;  ///< one of them has samples and error surface, if any
+
+  /// That one; else the first that is whole.
+  const TrialAnswer& shown() const;
 };
 
 /// Of a method over the trials of a scene. Trials without an answer count as such and are in no mean.

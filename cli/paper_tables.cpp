@@ -66,6 +66,12 @@ std::string pascal(double young_modulus_pa) {
   return std::isfinite(young_modulus_pa) ? report::quantity(young_modulus_pa, "Pa") : "none";
 }
 
+std::string escaped(const std::string& words) {
+  std::string out;
+  for (const char letter : words) out += letter == '<' ? "&lt;" : letter == '>' ? "&gt;" : letter == '&' ? "&amp;" : std::string(1, letter);
+  return out;
+}
+
 std::string listed(const std::vector<std::string>& codes) {
   std::vector<std::pair<std::string, int>> counted;
   for (const std::string& code : codes) {
@@ -135,17 +141,34 @@ std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial)
   return html + "</table>\n";
 }
 
-std::string score_table(const lab::PaperScene& scene, const std::vector<TrialAnswer>& trials) {
+std::string failed_table(const std::vector<TrialAnswer>& trials) {
+  std::string rows;
+  const auto row = [&](std::uint64_t seed, const char* what, const std::string& why) {
+    if (!why.empty()) rows += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", seed, what, escaped(why));
+  };
+  for (const TrialAnswer& trial : trials) {
+    row(trial.seed, "the seed", trial.failed);
+    row(trial.seed, "the paper's method", trial.paper.failed);
+    row(trial.seed, "palpate", trial.palpate.failed);
+  }
+  if (rows.empty()) return {};
+  return "<table><tr><th>seed that failed</th><th>what ended</th><th>why</th></tr>\n" + rows + "</table>\n";
+}
+
+std::string score_table(const SceneAnswers& answers) {
+  const lab::PaperScene& scene = *answers.scene;
+  const std::vector<TrialAnswer>& trials = answers.trials;
+  const TrialAnswer& shown = answers.shown();
   if (scene.apparent)
     return "<p class=\"small\">An apparent modulus has no truth: no errors are given, and the claims on top leave this scene out.</p>\n";
-  const bool by_site = !trials.front().sites.empty();
+  const bool by_site = !shown.sites.empty();
   std::string html = "<table><tr><th>method</th><th>bias of E</th><th>rms of E</th><th>E in 95 %</th><th>bias of &nu;</th><th>rms of "
                      "&nu;</th><th>&nu; in 95 %</th><th>no answer</th><th>simulated</th><th>solved</th><th>s</th></tr>\n";
   const SceneScores scores = scores_of(trials);
   if (!by_site && scores.paper_coarse.answers > 0) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
   html += score_row(by_site ? "the paper's method on palpate's mesh, by site" : "the paper's method on palpate's mesh", scores.paper, false);
   html += score_row("palpate", scores.palpate, true);
-  if (!trials.front().other_law.empty()) html += score_row("palpate with the " + trials.front().other_law + " law", scores.other, true);
+  if (!shown.other_law.empty()) html += score_row("palpate with the " + shown.other_law + " law", scores.other, true);
   return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm. Seeds share what was "
                             "solved for where the object is the same: seconds are of what was left to do. Simulated: samples "
                             "at one (E, &nu;) that the method asks for. Solved: load cases that the finite elements had to be solved for, "

@@ -71,7 +71,7 @@ TEST(PaperClaims, LeaveOutWhatHasNoTruth) {
   const SceneAnswers balloon = scene("balloon", {trial(13e3, answer(99e3, 98e3, 100e3, 5000))});
   EXPECT_TRUE(claims_of({balloon}).empty());
   for (const Claim& claim : claims_of({balloon, scene("cube", {trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90))})})) EXPECT_TRUE(claim.holds);
-  const std::string page = paper_page({balloon}, {}, "command", 1);
+  const std::string page = paper_page({balloon}, {}, "command", {1});
   EXPECT_EQ(page.find("true E"), std::string::npos);
   EXPECT_NE(page.find("An apparent modulus has no truth"), std::string::npos);
   const auto json = json_of(balloon);
@@ -82,7 +82,7 @@ TEST(PaperClaims, LeaveOutWhatHasNoTruth) {
 TEST(PaperPage, SaysWhereAStudysIntervalMisses) {
   const Study& study = studies().front();
   const MethodAnswer right = answer(10.4e3, 9.8e3, 11e3, 90), wrong = answer(12e3, 11e3, 13e3, 90);
-  const auto cells = [&](const MethodAnswer& palpate) { return study_table({&study, 1, {{"row", 10e3, 0.3, answer(13e3, nan, nan, 9), palpate}}}); };
+  const auto cells = [&](const MethodAnswer& palpate) { return study_table({&study, 1, {{"row", 10e3, 0.3, answer(13e3, nan, nan, 9), palpate}}, {}, 0}); };
   EXPECT_NE(cells(right).find(">yes<"), std::string::npos);
   EXPECT_EQ(cells(right).find("<b>no</b>"), std::string::npos);
   EXPECT_NE(cells(wrong).find("<b>no</b>"), std::string::npos);
@@ -99,7 +99,7 @@ TEST(PaperPage, NamesAVerdictOnceAndCountsIt) {
 TEST(PaperPage, WithoutAnAnswerItSaysSo) {
   TrialAnswer none = trial(13e3, no_answer());
   none.unused.push_back({2.0, 0.004, {2.2, 1e-4}, {nan, nan}, {nan, nan}, 2e-3});
-  const std::string page = paper_page({scene("cube", {none})}, {}, "command", 1);
+  const std::string page = paper_page({scene("cube", {none})}, {}, "command", {1});
   EXPECT_NE(page.find("palpate found no answer"), std::string::npos);
   EXPECT_NE(page.find("<td>2.20 N (+10 %)</td><td>none</td>"), std::string::npos);
   EXPECT_EQ(page.find("nan"), std::string::npos);
