@@ -58,10 +58,11 @@ nlohmann::json json_of(const TrialAnswer& trial) {
 }
 
 nlohmann::json json_of(const Score& score) {
-  return {{"bias_percent", score.bias_percent}, {"rms_percent", score.rms_percent}, {"poisson_bias", score.poisson_bias},
-          {"poisson_rms", score.poisson_rms},   {"inside_95", score.inside_95},     {"with_interval", score.with_interval},
-          {"poisson_inside_95", score.poisson_inside_95}, {"without_answer", score.without},
-          {"solves", score.solves},             {"seconds", score.seconds},         {"most_load_cases", score.most_load_cases}};
+  return {{"asked", score.asked},                       {"without_answer", score.without},         {"with_interval", score.with_interval},
+          {"bias_percent", score.bias_percent},         {"spread_percent", score.spread_percent},  {"rms_percent", score.rms_percent},
+          {"poisson_bias", score.poisson_bias},         {"poisson_spread", score.poisson_spread},  {"poisson_rms", score.poisson_rms},
+          {"inside_95", score.inside_95},               {"poisson_inside_95", score.poisson_inside_95},
+          {"solves", score.solves},                     {"seconds", score.seconds},                {"most_load_cases", score.most_load_cases}};
 }
 
 }  // namespace
@@ -78,7 +79,9 @@ nlohmann::json json_of(const SceneAnswers& answers) {
   const SceneScores scores = scores_of(answers.trials);
   out["scores"] = {{"paper", json_of(scores.paper)},
                    {"paper_linear_tetrahedra", json_of(scores.paper_coarse)},
-                   {"palpate", json_of(scores.palpate)}};
+                   {"palpate", json_of(scores.palpate)},
+                   {"where_the_papers_method_answers",
+                    {{"paper", json_of(scores.paper_compared)}, {"palpate", json_of(scores.palpate_compared)}, {"left_out", scores.apart}}}};
   return out;
 }
 

@@ -51,4 +51,19 @@ MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& opt
   return out;
 }
 
+MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
+                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole) {
+  const MethodAnswer first = by_palpate(given, options, memory, progress, whole);
+  if (!given.doubt || !given.doubt->effect || !given.doubt->effect->better) return first;
+  given.doubt->effect->better.reset();
+  choice.planar_agrees = true;  // the only alternative that is as likely
+  given = prepare(recording, choice, nullptr, progress, given.doubt);
+  MethodAnswer out = by_palpate(given, options, nullptr, progress, whole);
+  out.solves += first.solves;
+  out.load_cases += first.load_cases;
+  out.iterations += first.iterations;
+  out.seconds += first.seconds;
+  return out;
+}
+
 }  // namespace palpate::cli

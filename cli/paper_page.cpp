@@ -99,8 +99,10 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vecto
       "<p>Frank, Schmedding, Stachniss, Teschner and Burgard, <i>Learning the Elasticity Parameters of Deformable Objects with a "
       "Manipulation Robot</i>, IROS 2010. Its experiments, made again by palpate {} on objects of the software lab, whose E is "
       "known (but for the balloon's). The paper's method is its algorithm 1: iterative closest points, squared distance to the nearest "
-      "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, start and threads ({}); a second row "
-      "gives it linear tetrahedra, as the paper had. Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the "
+      "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, starts (where the first has no equilibrium: a "
+      "quarter and four times of its E) and threads ({}); a second row gives it linear tetrahedra, as the paper had. Palpate also gets what the "
+      "paper's method has no use for: the tool's travel, the unloaded frame, and what is known of the sensors' noise (of depths, forces, "
+      "encoders and the camera's pose). Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the "
       "object at rest (where a push goes deeper: its depth). Where a scene does not say otherwise, the truth is linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
       version, fmt::join(threads, ", "), command);
   html += claims(scenes);

@@ -24,13 +24,13 @@ std::string interval(const MethodAnswer& answer) {
 std::string number(double value, const char* format) { return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "none"; }
 
 std::string score_row(const std::string& method, const Score& score, bool with_intervals) {
-  const auto held = [&](int inside) { return with_intervals ? fmt::format("{} of {}", inside, score.with_interval) : "none"; };
-  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-                     "<td>{}</td></tr>\n",
-                     method, number(score.bias_percent, "{:+.1f} %"), number(score.rms_percent, "{:.1f} %"), held(score.inside_95),
-                     number(score.poisson_bias, "{:+.3f}"), number(score.poisson_rms, "{:.3f}"), held(score.poisson_inside_95),
-                     score.without, number(score.solves, "{:.0f}"), with_intervals ? fmt::format("{}", score.most_load_cases) : "",
-                     number(score.seconds, "{:.1f}"));
+  const auto held = [&](int inside) { return with_intervals ? fmt::format("{} of {}", inside, score.asked) : "none"; };
+  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{} of {}</td><td>{}</td>"
+                     "<td>{}</td><td>{}</td></tr>\n",
+                     method, number(score.bias_percent, "{:+.1f} %"), number(score.spread_percent, "{:.1f} %"),
+                     number(score.rms_percent, "{:.1f} %"), held(score.inside_95), number(score.poisson_bias, "{:+.3f}"),
+                     number(score.poisson_rms, "{:.3f}"), held(score.poisson_inside_95), score.without, score.asked,
+                     number(score.solves, "{:.0f}"), score.most_load_cases, number(score.seconds, "{:.1f}"));
 }
 
 /// Of one method over the samples alone.
@@ -162,19 +162,20 @@ std::string score_table(const SceneAnswers& answers) {
   if (scene.apparent)
     return "<p class=\"small\">An apparent modulus has no truth: no errors are given, and the claims on top leave this scene out.</p>\n";
   const bool by_site = !shown.sites.empty();
-  std::string html = "<table><tr><th>method</th><th>bias of E</th><th>rms of E</th><th>E in 95 %</th><th>bias of &nu;</th><th>rms of "
+  std::string html = "<table><tr><th>method</th><th>bias of E</th><th>spread of E</th><th>rms of E</th><th>E in 95 %</th><th>bias of &nu;</th><th>rms of "
                      "&nu;</th><th>&nu; in 95 %</th><th>no answer</th><th>simulated</th><th>solved</th><th>s</th></tr>\n";
   const SceneScores scores = scores_of(trials);
   if (!by_site && scores.paper_coarse.answers > 0) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
   html += score_row(by_site ? "the paper's method on palpate's mesh, by site" : "the paper's method on palpate's mesh", scores.paper, false);
   html += score_row("palpate", scores.palpate, true);
   if (!shown.other_law.empty()) html += score_row("palpate with the " + shown.other_law + " law", scores.other, true);
-  return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm. Seeds share what was "
-                            "solved for where the object is the same: seconds are of what was left to do. Simulated: samples "
-                            "at one (E, &nu;) that the method asks for. Solved: load cases that the finite elements had to be solved for, "
-                            "at most in a seed. In small strains palpate makes every sample up of unit loads solved at a few &nu;, those of "
-                            "its finer mesh included. The paper's method runs a simulation each time; its seconds here are with palpate's "
-                            "unit loads all the same, so that the machine is not what tells them apart.</p>\n",
+  return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm, spread: their standard deviation. "
+                            "Without an interval nothing is inside. Seeds share what was solved for where the object is the same: seconds are "
+                            "of what was left to do. Simulated: samples at one (E, &nu;) that the method asks for, of a seed that it answers, "
+                            "all sites together. Solved: load cases that the finite elements had to be solved for, at most in a seed. In small "
+                            "strains both methods make every sample up of unit loads solved at a few &nu;, so that the machine is not what tells "
+                            "them apart (the paper ran a simulation each time); palpate's are with those of its finer mesh and of the other "
+                            "shapes that it asks about.</p>\n",
                             trials.size(), trials.size() == 1 ? "" : "s");
 }
 

@@ -133,11 +133,12 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
 
   ModelChoice choice = choice_of(scene);
   const Watch model;
-  const Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
+  Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
   out.model_s = model.seconds();
   out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
   Identification ours;
-  out.palpate = asked([&] { return by_palpate(given, fit, &shared->fine.palpate, progress, &ours); });
+  out.palpate = asked(
+      [&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, &shared->fine.palpate, progress, &ours); });
   const Prepared one = as_one(given);
   out.paper = asked([&] { return by_paper(one, fit, &shared->fine.paper, progress); });
   if (!dear(given)) {

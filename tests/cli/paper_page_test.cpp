@@ -67,6 +67,52 @@ TEST(PaperClaims, FailOneByOneAndNameTheScene) {
   EXPECT_NEAR(scores_of({none, good}).palpate.bias_percent, 100 * std::log(1.04), 1e-9);
 }
 
+// Two answers as made-up as they are: 13 and 7.7 kPa of 10 have errors of +-0.26 in the logarithm.
+TEST(PaperScores, AreMeanSpreadAndRootMeanSquare) {
+  const TrialAnswer high = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90)), low = trial(10e3 / 1.3, answer(10.4e3, nan, nan, 80));
+  const SceneScores scores = scores_of({high, low});
+  EXPECT_NEAR(scores.paper.bias_percent, 0, 1e-9);
+  EXPECT_NEAR(scores.paper.rms_percent, 100 * std::log(1.3), 1e-9);
+  EXPECT_NEAR(scores.paper.spread_percent, 100 * std::sqrt(2) * std::log(1.3), 1e-9);
+  EXPECT_NEAR(scores.palpate.spread_percent, 0, 1e-5);
+  EXPECT_EQ(scores.palpate.most_load_cases, 90);
+  EXPECT_EQ(scores.paper.most_load_cases, 500);
+  EXPECT_TRUE(std::isnan(scores_of({high}).paper.spread_percent)) << "one has no spread";
+}
+
+TEST(PaperClaims, SeedsWithoutAnAnswerOfThePapersMethodDecideNothing) {
+  const TrialAnswer good = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90)), worse = trial(10.1e3, answer(10.4e3, 9.8e3, 11e3, 90));
+  TrialAnswer unanswered = trial(nan, answer(10e3, 9.8e3, 11e3, 90));
+  const auto only = claims_of({scene("cube", {unanswered})});
+  EXPECT_FALSE(only.at(0).holds) << "nothing was compared";
+  EXPECT_FALSE(only.at(1).holds);
+  EXPECT_TRUE(only.at(2).holds) << "intervals can be judged";
+  const auto beside = claims_of({scene("cube", {good}), scene("foam9cm", {unanswered, unanswered})});
+  EXPECT_TRUE(beside.at(0).holds);
+  EXPECT_NE(beside.at(0).found.find("2 of 2 in foam9cm"), std::string::npos) << beside.at(0).found;
+  EXPECT_FALSE(claims_of({scene("cube", {worse, unanswered})}).at(0).holds) << "a win by default must not make up for a loss";
+}
+
+TEST(PaperClaims, WithoutAnIntervalATruthIsNotInside) {
+  const TrialAnswer good = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90)), bare = trial(13e3, answer(10.4e3, nan, nan, 90));
+  EXPECT_TRUE(claims_of({scene("cube", {good, good})}).at(2).holds);
+  EXPECT_FALSE(claims_of({scene("cube", {good, bare})}).at(2).holds);
+  EXPECT_FALSE(claims_of({scene("cube", {good, trial(13e3, no_answer())})}).at(2).holds);
+  EXPECT_NE(score_table(scene("cube", {good, bare})).find("<td>1 of 2</td>"), std::string::npos);
+}
+
+// On an object with regions palpate solves once for all sites, the paper's method for each.
+TEST(PaperClaims, SolvesOfAllSitesAreOneSeeds) {
+  TrialAnswer bear = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 250));
+  for (const char* site : {"head", "belly", "back"})
+    bear.sites.push_back({site, 10e3, answer(13e3, nan, nan, 450), answer(10.4e3, 9.8e3, 11e3, 250)});
+  const SceneScores scores = scores_of({bear});
+  EXPECT_EQ(scores.paper.solves, 1350);
+  EXPECT_EQ(scores.palpate.solves, 250);
+  EXPECT_EQ(scores.paper.asked, 3);
+  EXPECT_TRUE(claims_of({scene("teddy", {bear})}).at(3).holds);
+}
+
 TEST(PaperClaims, LeaveOutWhatHasNoTruth) {
   const SceneAnswers balloon = scene("balloon", {trial(13e3, answer(99e3, 98e3, 100e3, 5000))});
   EXPECT_TRUE(claims_of({balloon}).empty());
