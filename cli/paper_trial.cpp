@@ -118,7 +118,10 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   const lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress);
   out.truth_s = truth.seconds();
   SharedModels of_this_seed;
-  if (shared == nullptr) shared = &of_this_seed;
+  const bool same_mesh = trial.recording.rest.views.empty();  // in all seeds
+  if (shared == nullptr || !same_mesh) shared = &of_this_seed;
+  // What is of no use to another seed need not be solved for over all of nu's range.
+  estimation::FitMemory *const mine = same_mesh ? &shared->fine.palpate : nullptr, *const others = same_mesh ? &shared->other.palpate : nullptr;
   out.seed = seed;
   if (!scene.apparent) {
     out.young_modulus_pa = trial.young_modulus_pa;
@@ -135,15 +138,13 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   const Watch model;
   Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
   out.model_s = model.seconds();
-  out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
   Identification ours;
-  out.palpate = asked(
-      [&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, &shared->fine.palpate, progress, &ours); });
+  out.palpate = asked([&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, mine, progress, &ours); });
+  out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
   const Prepared one = as_one(given);
   out.paper = asked([&] { return by_paper(one, fit, &shared->fine.paper, progress); });
-  if (!dear(given)) {
+  if (!dear(given) && given.object.region_names.empty()) {  // sites are compared one by one, and not on those
     Recording coarse = trial.recording;
-    coarse.regions.clear();
     choice.linear = true;
     out.paper_coarse =
         asked([&] { return by_paper(prepare(std::move(coarse), choice, &shared->linear, progress), fit, &shared->linear.paper, progress); });
@@ -152,7 +153,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   if (!scene.other_law.empty()) {
     other = with_law(given, scene.other_law);
     out.other_law = scene.other_law;
-    out.other = asked([&] { return by_palpate(*other, fit, &shared->other.palpate, progress); });
+    out.other = asked([&] { return by_palpate(*other, fit, others, progress); });
   }
 
   std::vector<double> by_region;
@@ -168,16 +169,16 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   if (options.pictures) {
     estimation::FitOptions checked = fit;
     checked.cross_checks = true;
-    const auto judged = [&](const Prepared& what, MethodAnswer& answer, estimation::FitMemory& memory) {
+    const auto judged = [&](const Prepared& what, MethodAnswer& answer, estimation::FitMemory* memory) {
       if (!answer.converged) return;
       estimation::FitOptions from_there = checked;
       from_there.young_start_pa = answer.young_modulus_pa;
       from_there.poisson_start = answer.poisson_ratio;
       from_there.start_is_answer = true;
-      answer.verdicts = by_palpate(what, from_there, &memory, progress).verdicts;
+      answer.verdicts = by_palpate(what, from_there, memory, progress).verdicts;
     };
-    judged(given, out.palpate, shared->fine.palpate);
-    if (other) judged(*other, out.other, shared->other.palpate);
+    judged(given, out.palpate, mine);
+    if (other) judged(*other, out.other, others);
     if (!by_region.empty()) out.as_one_verdicts = by_palpate(one, checked, nullptr, progress).verdicts;
   }
   if (options.surface_points > 1 && by_region.empty() && std::isfinite(out.paper.young_modulus_pa))
