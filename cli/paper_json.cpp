@@ -52,8 +52,12 @@ nlohmann::json json_of(const TrialAnswer& trial) {
                               {"travel_m", sample.travel_m},
                               {"paper", json_of(sample.paper)},
                               {"palpate", json_of(sample.palpate)}});
-  if (trial.surface.error_m2.size() > 0)
-    out["grid_search"] = {{"smallest_m2", trial.surface.smallest_m2()}, {"at_found_m2", trial.surface.at_found_m2}};
+  if (trial.surface.error_m2.size() > 0) {
+    Eigen::Index row = 0, column = 0;
+    out["grid_search"] = {{"smallest_m2", trial.surface.error_m2.minCoeff(&row, &column)}, {"at_found_m2", trial.surface.at_found_m2}};
+    out["grid_search"]["smallest_at"] = {{"young_modulus_pa", trial.surface.young_modulus_pa(row)},
+                                         {"poisson_ratio", trial.surface.poisson_ratio(column)}};
+  }
   return out;
 }
 

@@ -7,9 +7,12 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "cli/paper_json.hpp"
+#include "cli/paper_overview.hpp"
 #include "cli/paper_tables.hpp"
+#include "cli/paper_words.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -140,6 +143,51 @@ TEST(PaperPage, SaysWhereAStudysIntervalMisses) {
 TEST(PaperPage, NamesAVerdictOnceAndCountsIt) {
   EXPECT_EQ(listed({}), "none");
   EXPECT_EQ(listed({"b", "a", "b", "c", "b"}), "b (3 times), a, c");
+}
+
+TEST(PaperPage, HasARowForEverySceneAndForEverySeed) {
+  const TrialAnswer first = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90)), second = trial(7e3, answer(9.6e3, 9e3, 9.9e3, 90));
+  const std::string overview = overview_table({scene("cube", {first, second}), scene("balloon", {first})});
+  EXPECT_NE(overview.find(">cube</a> (fig. 5, 6)"), std::string::npos);
+  EXPECT_NE(overview.find("Force over travel is nearly straight"), std::string::npos);
+  EXPECT_NE(overview.find("<td>1 of 2</td>"), std::string::npos) << "of two truths one is inside";
+  EXPECT_NE(overview.find("13.0 kPa, apparent"), std::string::npos) << overview;
+  const std::string seeds = seed_table(scene("cube", {first, second}));
+  EXPECT_NE(seeds.find("13.0 kPa (+30 %)"), std::string::npos) << seeds;
+  EXPECT_NE(seeds.find("7.00 kPa (-30 %)"), std::string::npos) << seeds;
+  EXPECT_EQ(seed_table(scene("balloon", {first})).find("true E"), std::string::npos);
+}
+
+// 10 and 12 kPa at one site, 20 and 22 at the other: 1.41 within each, means of 11 and 21, 7.07 apart as standard deviation.
+TEST(PaperPage, TellsSpreadWithinSitesFromSpreadBetween) {
+  TrialAnswer bear = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90));
+  for (const char* site : {"head", "back"}) bear.sites.push_back({site, 10e3, answer(13e3, nan, nan, 450), answer(10.4e3, 9.8e3, 11e3, 250)});
+  for (const auto& [push, young_pa] : {std::pair{"push 1", 10e3}, {"push 1", 12e3}, {"push 2", 20e3}, {"push 2", 22e3}})
+    bear.samples.push_back({push, 1, 0.001, answer(young_pa, nan, nan, 9), answer(15e3, nan, nan, 9)});
+  const std::string table = site_table(bear);
+  EXPECT_NE(table.find("<td>head</td><td>2</td><td>11.0 kPa &plusmn; 12.9 %</td><td>15.0 kPa &plusmn; 0.0 %</td>"), std::string::npos) << table;
+  EXPECT_NE(table.find("within a site, root mean square</td><td></td><td>8.8 %</td><td>0.0 %</td>"), std::string::npos) << table;
+  EXPECT_NE(table.find("between the means of the sites</td><td></td><td>44.2 %</td><td>0.0 %</td>"), std::string::npos) << table;
+}
+
+TEST(PaperPage, NamesAndMarksTheLowestPointOfTheGrid) {
+  TrialAnswer one = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90));
+  one.surface.young_modulus_pa = VectorX::LinSpaced(3, 8e3, 16e3);
+  one.surface.poisson_ratio = VectorX::LinSpaced(2, 0.1, 0.4);
+  one.surface.error_m2 = MatrixX::Constant(3, 2, 4e-6);
+  one.surface.error_m2(1, 1) = 1e-6;
+  one.surface.at_found_m2 = 2e-6;
+  const std::string page = paper_page({scene("cube", {one})}, {}, "command", {1});
+  EXPECT_NE(page.find("at E = 12.0 kPa and &nu; = 0.400"), std::string::npos);
+  EXPECT_NE(page.find("lowest of the grid"), std::string::npos);
+  EXPECT_EQ(json_of(scene("cube", {one})).at("trials").at(0).at("grid_search").at("smallest_at").at("young_modulus_pa"), 12e3);
+}
+
+TEST(PaperPage, OfAnApparentModulusAllThreeFitsAreThere) {
+  const TrialAnswer one = trial(13e3, answer(99e3, 98e3, 100e3, 70));
+  const std::string table = score_table(scene("balloon", {one, one}));
+  EXPECT_NE(table.find("linear tetrahedra</td><td>13.0 kPa &plusmn; 0.0 %</td>"), std::string::npos) << table;
+  EXPECT_NE(table.find("Seeds share what was solved for"), std::string::npos);
 }
 
 TEST(PaperPage, WithoutAnAnswerItSaysSo) {
