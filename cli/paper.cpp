@@ -8,13 +8,11 @@
 
 #include "cli/lab_setup.hpp"
 #include "cli/number_checks.hpp"
-#include "cli/paper_json.hpp"
-#include "cli/paper_page.hpp"
+#include "cli/paper_run.hpp"
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/file.hpp"
-#include "palpate/report/words.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -25,103 +23,80 @@ struct PaperArguments {
   std::string output;
   bool quick = false;
   int seeds = 0;  // 0 = by mode
-  std::vector<std::string> scenes;
+  std::uint64_t details_of = 1;
+  std::vector<std::string> scenes, from;
   std::string object;  // a mesh file; empty: the lab's animal
   MeshFileArguments file;
 };
 
-std::string line_of(const lab::PaperScene& scene, const TrialAnswer& trial) {
-  std::string line = fmt::format("{} seed {}: ", scene.name, trial.seed);
-  if (!scene.apparent) line += fmt::format("truth {}, {:.3f}; ", report::quantity(trial.young_modulus_pa, "Pa"), trial.poisson_ratio);
-  return line + fmt::format("paper's method {}, {:.3f} ({} simulations); palpate {} ({}), {:.3f} ({} solved)",
-                            report::quantity(trial.paper.young_modulus_pa, "Pa"), trial.paper.poisson_ratio, trial.paper.solves,
-                            report::quantity(trial.palpate.young_modulus_pa, "Pa"),
-                            report::interval(trial.palpate.lower_95_pa, trial.palpate.upper_95_pa, "Pa"), trial.palpate.poisson_ratio,
-                            trial.palpate.load_cases);
+int done(Session& session, const PaperRuns& runs, const std::string& output) {
+  if (runs.scenes.empty() && runs.studies.empty()) return exit_numbers;  // stopped before anything was done
+  const nlohmann::json told = write_page(runs, output);
+  session.say(fmt::format("written            {}", (fs::path(output) / "paper.html").string()));
+  session.result(told);
+  return Session::interrupted() ? exit_numbers : exit_done;
+}
+
+int join(Session& session, const PaperArguments& arguments) {
+  must_take_files(arguments.output);
+  const SeedFolder folder(arguments.output);
+  for (const std::string& from : arguments.from)
+    if (!fs::exists(arguments.output) || !fs::exists(from) || !fs::equivalent(from, arguments.output)) folder.take_from(from);
+  return done(session, folder.collect(), arguments.output);
+}
+
+/// What each stands for is in the tables; without names: all.
+void choose(const PaperArguments& arguments, std::uint64_t seed, PaperPlan& plan) {
+  plan.study_seed = seed;
+  for (const std::string& name : arguments.scenes) {
+    if (const Study* study = study_of(name)) {
+      plan.studies.push_back(study);
+    } else {
+      plan.scenes.push_back(&lab::paper_scene(name));
+    }
+  }
+  if (!arguments.scenes.empty()) return;
+  for (const lab::PaperScene& scene : lab::paper_scenes()) plan.scenes.push_back(&scene);
+  // Once, and not in every piece of a run.
+  if (plan.details_of < seed || plan.details_of - seed >= static_cast<std::uint64_t>(plan.seeds)) return;
+  plan.study_seed = plan.details_of;
+  for (const Study& study : studies()) plan.studies.push_back(&study);
 }
 
 int remake(Session& session, const PaperArguments& arguments) {
-  std::vector<const lab::PaperScene*> scenes;
+  if (!arguments.from.empty()) return join(session, arguments);
+  PaperPlan plan;
+  plan.first_seed = session.seed;
+  plan.seeds = arguments.seeds > 0 ? arguments.seeds : arguments.quick ? 1 : 100;
+  plan.details_of = arguments.details_of;
+  plan.quick = arguments.quick;
+  plan.threads = session.thread_count();
+  choose(arguments, session.seed, plan);
   TriMesh surface;
-  lab::PaperScene own = lab::paper_scene("cow");
-  const std::string own_name = fs::path(arguments.object).filename().string();
+  lab::PaperScene own;
   if (!arguments.object.empty()) {
     surface = read_object(arguments.object, arguments.file);
-    own.object = own_name;
-    own.title = "Simulated test on a mesh of the user's";
-    own.differs = "The object is the mesh file that was given, glued at its foot and pressed at its top; the pad is soft, the paper "
-                  "pushed at a point.";
-    own.surface = &surface;
-    own.unused.reset();  // at the same place, with other forces
-  }
-  std::vector<const Study*> chosen_studies;
-  for (const std::string& name : arguments.scenes) {
-    if (const Study* study = study_of(name)) {
-      chosen_studies.push_back(study);
-    } else {
-      scenes.push_back(&lab::paper_scene(name));
-    }
-  }
-  if (arguments.scenes.empty()) {
-    for (const lab::PaperScene& scene : lab::paper_scenes()) scenes.push_back(&scene);
-    for (const Study& study : studies()) chosen_studies.push_back(&study);
-  }
-  if (own.surface != nullptr) {
-    for (const lab::PaperScene*& scene : scenes)
-      if (scene->name == own.name) scene = &own;
-    if (std::find(scenes.begin(), scenes.end(), &own) == scenes.end())
+    plan.object = {fs::path(arguments.object).filename().string(), io::sha256_hex(io::read_file(arguments.object)), arguments.file.up,
+                   arguments.file.size_m};
+    own = in_the_cows_place(plan.object.name, &surface);
+    const auto cow = std::find_if(plan.scenes.begin(), plan.scenes.end(), [&](const auto* scene) { return scene->name == own.name; });
+    if (cow == plan.scenes.end())
       throw Error("takes the place of the cow, which is not among the scenes: add --scene cow", "--object " + arguments.object);
+    *cow = &own;
   }
-  const int seeds = arguments.seeds > 0 ? arguments.seeds : arguments.quick ? 1 : 100;
   must_take_files(arguments.output);
-  fs::create_directories(arguments.output);
-  std::string command = fmt::format("palpate paper -o OUT{} --seeds {} --seed {}", arguments.quick ? " --quick" : "", seeds, session.seed);
-  for (const std::string& name : arguments.scenes) command += " --scene " + name;
-  if (own.surface != nullptr) command += " --object " + own_name;
-
-  std::vector<SceneAnswers> answers;
-  std::vector<StudyAnswer> study_answers;
-  nlohmann::json told = {{"command", command},
-                         {"threads", session.thread_count()},
-                         {"scenes", nlohmann::json::array()},
-                         {"studies", nlohmann::json::array()}};
-  // After every seed: a run that is stopped leaves what it has.
-  const auto keep = [&] {
-    told["scenes"] = nlohmann::json::array();
-    for (const SceneAnswers& each : answers) told["scenes"].push_back(json_of(each));
-    io::write_file(fs::path(arguments.output) / "paper.json", told.dump(2) + "\n");
-    io::write_file(fs::path(arguments.output) / "paper.html", paper_page(answers, study_answers, command, session.thread_count()));
+  PaperWork work;
+  work.trial = [&](const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels& shared, TrialAnswer& out) {
+    run_trial(scene, seed, options, &shared, session.progress(), out);
   };
-  for (const lab::PaperScene* scene : scenes) {
-    if (Session::interrupted()) break;
-    SharedModels shared;
-    for (int k = 0; k < seeds && !Session::interrupted(); ++k) {
-      TrialOptions options;
-      options.threads = session.thread_count();
-      const bool dear = scene->law != "linear";
-      options.every_sample = k > 0 ? 0 : !arguments.quick ? 1 : dear ? 4 : 2;
-      options.pictures = k == 0;
-      options.surface_points = k > 0 ? 0 : !arguments.quick ? 25 : dear ? 5 : 9;
-      const TrialAnswer trial = run_trial(*scene, session.seed + static_cast<std::uint64_t>(k), options, &shared, session.progress());
-      if (Session::interrupted()) break;
-      session.say(line_of(*scene, trial));
-      if (k == 0) answers.push_back({scene, {}});
-      answers.back().trials.push_back(trial);
-      keep();
-    }
-  }
-  for (const Study* study : chosen_studies) {
-    if (Session::interrupted()) break;
-    StudyAnswer answer{study, session.seed, study->run({session.seed, session.thread_count()}, session.progress())};
-    if (Session::interrupted()) break;
-    told["studies"].push_back(json_of(answer));
-    study_answers.push_back(std::move(answer));
-    keep();
-  }
-  if (answers.empty() && study_answers.empty()) return exit_numbers;  // stopped before anything was done
-  session.say(fmt::format("written            {}", (fs::path(arguments.output) / "paper.html").string()));
-  session.result(told);
-  return Session::interrupted() ? exit_numbers : exit_done;
+  work.study = [&](const Study& study, const StudyOptions& options, StudyAnswer& out) {
+    const Watch watch;
+    out.rows = study.run(options, session.progress());
+    out.seconds = watch.seconds();
+  };
+  work.stopped = [] { return Session::interrupted(); };
+  work.say = [&](const std::string& line) { session.say(line); };
+  return done(session, run_plan(plan, work, arguments.output), arguments.output);
 }
 
 }  // namespace
@@ -131,9 +106,17 @@ Run verbs::paper(CLI::App& app) {
   std::string scenes;
   for (const lab::PaperScene& scene : lab::paper_scenes()) scenes += fmt::format("\n{}: {}", scene.name, scene.title);
   for (const Study& study : studies()) scenes += fmt::format("\n{}: {}", study.name, study.title);
-  app.add_option("-o,--output", arguments->output, "folder for paper.html and paper.json")->required();
+  app.add_option("-o,--output", arguments->output, "folder for paper.html, paper.json and seeds/, a file a seed; a run that was stopped goes on from these")->required();
   app.add_flag("--quick", arguments->quick, "one seed a scene and a coarse error surface: minutes a scene in place of many hours");
   app.add_option("--seeds", arguments->seeds, "seeds a scene, from --seed on (default: 100, with --quick 1)")->check(positive_number());
+  app.add_option("--details-of", arguments->details_of,
+                 "the seed of each scene that also gets pictures, samples alone, the grid search and cross-checks (0: none)")
+      ->capture_default_str();
+  app.add_option("--from", arguments->from,
+                 "folders that were written with -o, by runs of other --seed or --scene say: nothing is run, their seeds are put together in "
+                 "OUTPUT and the page made of all")
+      ->excludes("--seeds")
+      ->excludes("--quick");
   app.add_option("--scene", arguments->scenes, "only this one; may be given several times" + scenes);
   app.add_option("--object", arguments->object, "a closed mesh file that takes the place of the cow (fig. 3, 4)")->check(CLI::ExistingFile);
   add_mesh_file_options(app, arguments->file);

@@ -18,12 +18,14 @@ using report::Range;
 using report::Spot;
 
 constexpr double width_pt = 420, height_pt = 260;
-const report::Colour truth_colour{22, 32, 44}, paper_colour = report::category(1), own_colour = report::category(0);
+const report::Colour truth_colour{22, 32, 44}, paper_colour = report::category(1), own_colour = report::category(0),
+                     lowest_colour = report::category(2);
 
 bool truth_known(const TrialAnswer& trial) { return std::isfinite(trial.young_modulus_pa); }
 
-void legend(report::Canvas& canvas, const TrialAnswer& trial, const char* palpate) {
+void legend(report::Canvas& canvas, const TrialAnswer& trial, const char* palpate, bool with_lowest = false) {
   std::vector<std::pair<const char*, report::Colour>> entries{{"paper's method", paper_colour}, {palpate, own_colour}};
+  if (with_lowest) entries.push_back({"lowest of the grid", lowest_colour});
   if (truth_known(trial)) entries.insert(entries.begin(), {"truth", truth_colour});
   double x = 60, wide = 0;
   for (const auto& [words, colour] : entries) wide += 16 + 5.4 * static_cast<double>(std::string_view(words).size());
@@ -76,10 +78,14 @@ std::string surface_figure(const TrialAnswer& trial) {
     if (spots.size() > 1) axes.line(spots, colour, 1.4);
     axes.dot(std::log10(method.young_modulus_pa), method.poisson_ratio, 4, colour);
   };
+  Eigen::Index lowest_row = 0, lowest_column = 0;
+  surface.error_m2.minCoeff(&lowest_row, &lowest_column);
+  axes.dot(x_at(static_cast<double>(lowest_row)), y_at(static_cast<double>(lowest_column)), 7, {255, 255, 255});
+  axes.dot(x_at(static_cast<double>(lowest_row)), y_at(static_cast<double>(lowest_column)), 5.5, lowest_colour);
   path(trial.paper, paper_colour);
   path(trial.palpate, own_colour);
   if (truth_known(trial)) axes.dot(std::log10(trial.young_modulus_pa), trial.poisson_ratio, 3, truth_colour);
-  legend(*canvas, trial, "palpate");
+  legend(*canvas, trial, "palpate", true);
   return canvas->bytes();
 }
 
@@ -102,6 +108,8 @@ std::string error_figure(const TrialAnswer& trial) {
   Axes axes(*canvas, width_pt, height_pt, "E (kPa)", {spots.front().x, spots.back().x}, "root of the error function (mm)", range);
   axes.line(spots, paper_colour, 1.4);
   for (const Spot& spot : spots) axes.dot(spot.x, spot.y, 2.2, paper_colour);
+  const Spot& lowest = *std::min_element(spots.begin(), spots.end(), [](const Spot& a, const Spot& b) { return a.y < b.y; });
+  axes.dot(lowest.x, lowest.y, 4.5, lowest_colour);
   const auto upright = [&](double young_pa, report::Colour colour, bool dashed) {
     const double x = young_pa / 1000;
     if (x >= spots.front().x && x <= spots.back().x) axes.line(std::vector<Spot>{{x, range.from}, {x, range.to}}, colour, 1, dashed);
@@ -109,7 +117,7 @@ std::string error_figure(const TrialAnswer& trial) {
   if (truth_known(trial)) upright(trial.young_modulus_pa, truth_colour, true);
   upright(trial.paper.young_modulus_pa, paper_colour, false);
   upright(trial.palpate.young_modulus_pa, own_colour, false);
-  legend(*canvas, trial, "palpate");
+  legend(*canvas, trial, "palpate", true);
   return canvas->bytes();
 }
 

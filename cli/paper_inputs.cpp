@@ -88,7 +88,8 @@ ModelChoice choice_of(const lab::PaperScene& scene) {
   return choice;
 }
 
-Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress) {
+Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress,
+                 std::shared_ptr<estimation::ShapeDoubt> doubt) {
   Prepared out;
   out.inputs = observe(recording);
   const bool keep = shared != nullptr && recording.rest.views.empty();
@@ -104,13 +105,16 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
     const Recording as_given = recording;
     if (choice.linear) recording.model.element = "tet4";
     if (choice.linear) recording.model.refine = "none";
-    const auto completion = choice.planar_back ? reconstruction::Completion::planar : reconstruction::Completion::mirrored;
+    const bool planar = choice.planar_back || choice.planar_agrees;
+    const auto completion = planar ? reconstruction::Completion::planar : reconstruction::Completion::mirrored;
     if (choice.tetrahedra > 0) fill(recording, choice, completion, seen, progress);
     out.object = build_simulated_object(recording, progress, completion, choice.tetrahedra > 0 ? nullptr : &seen);
     if (choice.point_load) press_at_nodes(recording, out.object.mesh);
     const double unseen = drop_unseen_side(recording, seen, out.inputs);
-    if (unseen > 0 && !choice.planar_back)
-      out.doubt = std::make_shared<estimation::ShapeDoubt>(other_shapes(as_given, unseen));
+    if (unseen > 0 && !choice.planar_back) {
+      out.doubt = doubt ? std::move(doubt) : std::make_shared<estimation::ShapeDoubt>(other_shapes(as_given, unseen));
+      out.doubt->side = unseen_side(as_given, recording, seen);
+    }
     if (auto finer = estimation::finer_model(recording, out.object))
       out.finer = std::make_shared<estimation::FinerModel>(std::move(*finer));
     if (keep) shared->built = Prepared{recording, out.object, {}, out.finer, nullptr};

@@ -36,6 +36,7 @@ struct ModelChoice {
   double edge_m = 0;          ///< where these are given: of those under the pad; 0: like all others
   bool linear = false;        ///< linear elements, not quadratic ones
   bool planar_back = false;   ///< an unseen side is completed as in the paper, and taken for true
+  bool planar_agrees = false; ///< it is completed like that because the pushes agree better with it
   bool point_load = false;    ///< forces act on the node that is nearest to their contact
 };
 ModelChoice choice_of(const lab::PaperScene& scene);
@@ -46,7 +47,9 @@ RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest, double
 double near_of(const Recording& recording);
 
 /// @param shared  used and filled where the recording gives the shape; nullptr: nothing is kept
-Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress);
+/// @param doubt   what a fit of another completion has found of the other shapes; nullptr: nothing yet
+Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress,
+                 std::shared_ptr<estimation::ShapeDoubt> doubt = nullptr);
 
 /// Some steps of it: keep(push, step) says which.
 Prepared part_of(const Prepared& all, const std::function<bool(std::size_t push, std::size_t step)>& keep);

@@ -9,7 +9,7 @@ nlohmann::json json_of(const MethodAnswer& answer) {
           {"poisson_ratio", answer.poisson_ratio},       {"solves", answer.solves},           {"iterations", answer.iterations},
           {"seconds", answer.seconds},                   {"converged", answer.converged},     {"verdicts", answer.verdicts},
           {"poisson_lower_95", answer.poisson_lower_95}, {"poisson_upper_95", answer.poisson_upper_95},
-          {"load_cases", answer.load_cases}};
+          {"load_cases", answer.load_cases},             {"failed", answer.failed}};
 }
 
 nlohmann::json json_of(const TrialAnswer& trial) {
@@ -17,9 +17,13 @@ nlohmann::json json_of(const TrialAnswer& trial) {
                         {"true_young_modulus_pa", trial.young_modulus_pa},
                         {"true_poisson_ratio", trial.poisson_ratio},
                         {"tetrahedra", trial.tetrahedra},
+                        {"truth_s", trial.truth_s},
+                        {"model_s", trial.model_s},
+                        {"total_s", trial.total_s},
                         {"paper", json_of(trial.paper)},
                         {"paper_linear_tetrahedra", json_of(trial.paper_coarse)},
                         {"palpate", json_of(trial.palpate)}};
+  if (!trial.failed.empty()) out["failed"] = trial.failed;
   if (!trial.other_law.empty()) out["palpate_" + trial.other_law] = json_of(trial.other);
   for (const ForceReading& reading : trial.readings)
     out["readings"].push_back({{"push", reading.push}, {"force_n", reading.force_n}, {"travel_m", reading.travel_m}});
@@ -48,16 +52,21 @@ nlohmann::json json_of(const TrialAnswer& trial) {
                               {"travel_m", sample.travel_m},
                               {"paper", json_of(sample.paper)},
                               {"palpate", json_of(sample.palpate)}});
-  if (trial.surface.error_m2.size() > 0)
-    out["grid_search"] = {{"smallest_m2", trial.surface.smallest_m2()}, {"at_found_m2", trial.surface.at_found_m2}};
+  if (trial.surface.error_m2.size() > 0) {
+    Eigen::Index row = 0, column = 0;
+    out["grid_search"] = {{"smallest_m2", trial.surface.error_m2.minCoeff(&row, &column)}, {"at_found_m2", trial.surface.at_found_m2}};
+    out["grid_search"]["smallest_at"] = {{"young_modulus_pa", trial.surface.young_modulus_pa(row)},
+                                         {"poisson_ratio", trial.surface.poisson_ratio(column)}};
+  }
   return out;
 }
 
 nlohmann::json json_of(const Score& score) {
-  return {{"bias_percent", score.bias_percent}, {"rms_percent", score.rms_percent}, {"poisson_bias", score.poisson_bias},
-          {"poisson_rms", score.poisson_rms},   {"inside_95", score.inside_95},     {"with_interval", score.with_interval},
-          {"poisson_inside_95", score.poisson_inside_95}, {"without_answer", score.without},
-          {"solves", score.solves},             {"seconds", score.seconds},         {"most_load_cases", score.most_load_cases}};
+  return {{"asked", score.asked},                       {"without_answer", score.without},         {"with_interval", score.with_interval},
+          {"bias_percent", score.bias_percent},         {"spread_percent", score.spread_percent},  {"rms_percent", score.rms_percent},
+          {"poisson_bias", score.poisson_bias},         {"poisson_spread", score.poisson_spread},  {"poisson_rms", score.poisson_rms},
+          {"inside_95", score.inside_95},               {"poisson_inside_95", score.poisson_inside_95},
+          {"solves", score.solves},                     {"seconds", score.seconds},                {"most_load_cases", score.most_load_cases}};
 }
 
 }  // namespace
@@ -74,12 +83,15 @@ nlohmann::json json_of(const SceneAnswers& answers) {
   const SceneScores scores = scores_of(answers.trials);
   out["scores"] = {{"paper", json_of(scores.paper)},
                    {"paper_linear_tetrahedra", json_of(scores.paper_coarse)},
-                   {"palpate", json_of(scores.palpate)}};
+                   {"palpate", json_of(scores.palpate)},
+                   {"where_the_papers_method_answers",
+                    {{"paper", json_of(scores.paper_compared)}, {"palpate", json_of(scores.palpate_compared)}, {"left_out", scores.apart}}}};
   return out;
 }
 
 nlohmann::json json_of(const StudyAnswer& answer) {
-  nlohmann::json out = {{"study", answer.study->name}, {"seed", answer.seed}, {"rows", nlohmann::json::array()}};
+  nlohmann::json out = {{"study", answer.study->name}, {"seed", answer.seed}, {"seconds", answer.seconds}, {"rows", nlohmann::json::array()}};
+  if (!answer.failed.empty()) out["failed"] = answer.failed;
   for (const StudyRow& row : answer.rows)
     out["rows"].push_back({{"what", row.what},
                            {"true_young_modulus_pa", row.young_modulus_pa},

@@ -1,20 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_methods.hpp"
 
-#include <chrono>
 #include <limits>
 
 #include "palpate/estimation/paper_method.hpp"
 
 namespace palpate::cli {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-}  // namespace
-
 MethodAnswer no_answer() {
   MethodAnswer out;
   out.young_modulus_pa = out.poisson_ratio = out.lower_95_pa = out.upper_95_pa = out.poisson_lower_95 = out.poisson_upper_95 =
@@ -45,18 +36,33 @@ MethodAnswer summary(const Identification& answer, double seconds) {
 
 MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
                       const OnProgress& progress) {
-  const auto start = Clock::now();
+  const Watch watch;
   const Identification answer = estimation::fit_as_in_paper(given.recording, given.object, given.inputs, options, progress, memory);
-  return summary(answer, seconds_since(start));
+  return summary(answer, watch.seconds());
 }
 
 MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
                         const OnProgress& progress, Identification* whole) {
-  const auto start = Clock::now();
+  const Watch watch;
   Identification answer = estimation::fit(given.recording, given.object, given.inputs, options, progress, given.finer.get(), memory,
                                           given.doubt.get());
-  const MethodAnswer out = summary(answer, seconds_since(start));
+  const MethodAnswer out = summary(answer, watch.seconds());
   if (whole != nullptr) *whole = std::move(answer);
+  return out;
+}
+
+MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
+                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole) {
+  const MethodAnswer first = by_palpate(given, options, memory, progress, whole);
+  if (!given.doubt || !given.doubt->effect || !given.doubt->effect->better) return first;
+  given.doubt->effect->better.reset();
+  choice.planar_agrees = true;  // the only alternative that is as likely
+  given = prepare(recording, choice, nullptr, progress, given.doubt);
+  MethodAnswer out = by_palpate(given, options, nullptr, progress, whole);
+  out.solves += first.solves;
+  out.load_cases += first.load_cases;
+  out.iterations += first.iterations;
+  out.seconds += first.seconds;
   return out;
 }
 

@@ -2,6 +2,7 @@
 // Both methods on what was prepared, with what each took.
 #pragma once
 
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,15 @@
 #include "palpate/core/identification.hpp"
 
 namespace palpate::cli {
+
+/// A clock for what takes its time.
+class Watch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
 
 struct MethodAnswer {
   double young_modulus_pa = 0, poisson_ratio = 0;  ///< NaN: it has none
@@ -19,6 +29,7 @@ struct MethodAnswer {
   bool converged = false;
   std::vector<FitIteration> path;
   std::vector<std::string> verdicts;  ///< codes
+  std::string failed;                 ///< the error that it ended with; empty: none
 };
 /// Of a method that was not asked, or found nothing.
 MethodAnswer no_answer();
@@ -29,5 +40,10 @@ MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& optio
 /// @param whole  if given: all that was found
 MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
                         const OnProgress& progress, Identification* whole = nullptr);
+/// The same of an object that was seen from one side, as `identify` does it: where a planar back side agrees better with the pushes
+/// than the one that was fitted, it takes its place, and the answer is of that one. What both fits took is counted.
+/// @param given  of `recording` and `choice`; both are changed to what was fitted at last
+MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
+                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole = nullptr);
 
 }  // namespace palpate::cli

@@ -2,12 +2,15 @@
 #include "cli/paper_page.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "cli/paper_figures.hpp"
+#include "cli/paper_overview.hpp"
 #include "cli/paper_tables.hpp"
+#include "cli/paper_words.hpp"
 #include "palpate/core/version.hpp"
 #include "palpate/report/words.hpp"
 
@@ -34,9 +37,12 @@ std::string grid_search(const TrialAnswer& trial) {
   const std::string points = surface.error_m2.cols() > 1
                                  ? fmt::format("{} x {} points", surface.error_m2.rows(), surface.error_m2.cols())
                                  : fmt::format("{} values of E at its &nu;", surface.error_m2.rows());
-  return fmt::format("<p class=\"small\">Grid search: the smallest value of the paper's error function on {} is {:.4g} mm&sup2;; where "
-                     "the paper's method ended it is {:.4g} mm&sup2;, {}.</p>\n",
-                     points, 1e6 * surface.smallest_m2(), 1e6 * surface.at_found_m2,
+  Eigen::Index row = 0, column = 0;
+  surface.error_m2.minCoeff(&row, &column);
+  return fmt::format("<p class=\"small\">Grid search: the smallest value of the paper's error function on {} is {:.4g} mm&sup2;, at E = {} and "
+                     "&nu; = {:.3f}; where the paper's method ended it is {:.4g} mm&sup2;, {}.</p>\n",
+                     points, 1e6 * surface.smallest_m2(), pascal(surface.young_modulus_pa(row)), surface.poisson_ratio(column),
+                     1e6 * surface.at_found_m2,
                      surface.at_found_m2 <= surface.smallest_m2() * 1.001
                          ? "and no point of the grid is lower by a thousandth: it reached the minimum of its own objective"
                          : "so it did not reach the minimum of its own objective");
@@ -44,9 +50,10 @@ std::string grid_search(const TrialAnswer& trial) {
 
 std::string section(const SceneAnswers& answers) {
   const lab::PaperScene& scene = *answers.scene;
-  const TrialAnswer& first = answers.trials.front();
+  const TrialAnswer& first = answers.shown();
   std::string html = fmt::format("<h2 id=\"{}\">{}</h2>\n<p><b>The paper</b>{}: {}<br><b>Here</b>: {}</p>\n", scene.name, scene.title,
                                  scene.figures.empty() ? "" : fmt::format(" (fig. {})", scene.figures), scene.paper_says, scene.differs);
+  if (!first.failed.empty() && first.tetrahedra == 0) return html + failed_table(answers.trials);  // no seed came as far as a model
   html += scene.apparent ? fmt::format("<p>Seed {}: ", first.seed)
                          : fmt::format("<p>Seed {}: the true E is {}{}, &nu; {:.3f}. ", first.seed, pascal(first.young_modulus_pa),
                                        first.sites.empty() ? "" : " at " + first.sites.front().site, first.poisson_ratio);
@@ -55,9 +62,9 @@ std::string section(const SceneAnswers& answers) {
   html += "</p>\n<p>Palpate's verdicts: " + listed(first.palpate.verdicts) +
           (first.other_law.empty() ? "" : "; with the " + first.other_law + " law: " + listed(first.other.verdicts)) + ".</p>\n";
   html += site_table(first) + unused_table(scene, first) + sample_table(first, !scene.apparent && first.sites.empty());
-  html += score_table(scene, answers.trials);
+  html += score_table(answers) + failed_table(answers.trials) + seed_table(answers);
   html += grid_search(first);
-  html += figure(surface_figure(first), "The paper's error function over (E, &nu;), dark = small, with the paths of both methods.");
+  html += figure(surface_figure(first), "The paper's error function over (E, &nu;), dark = small, with the paths of both methods; the large dot is the lowest point of the grid.");
   html += figure(error_figure(first), "The paper's error function over E alone, at the &nu; where its method ended.");
   html += figure(registration_figure(first),
                  std::string("What the camera saw of the hardest push, registered with the surface that each E gives; the last is ") +
@@ -84,27 +91,31 @@ std::string claims(const std::vector<SceneAnswers>& scenes) {
 }  // namespace
 
 std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& command,
-                       int threads) {
+                       const std::set<int>& threads) {
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
       "<title>The paper's evaluation, remade</title><style>body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem "
       "auto;padding:0 1rem;color:#16202c;background:#fff}table{border-collapse:collapse;display:block;overflow-x:auto}td,th{padding:.25rem "
       ".7rem;border-bottom:1px solid #dfe3e8;text-align:right;white-space:nowrap}th{white-space:normal;vertical-align:bottom}"
       "td:first-child,th:first-child{text-align:left}td:last-child,td:first-child{white-space:normal;min-width:5rem}figure{margin:1rem 0}svg{max-width:100%;height:auto}"
-      ".small,figcaption{color:#55606e;font-size:.9rem}code{font-size:.9rem}</style>"
+      ".words{min-width:16rem;max-width:24rem;text-align:left;white-space:normal}.small,figcaption{color:#55606e;font-size:.9rem}code{font-size:.9rem}</style>"
       "</head><body>\n<h1>The paper's evaluation, remade</h1>\n";
   html += fmt::format(
       "<p>Frank, Schmedding, Stachniss, Teschner and Burgard, <i>Learning the Elasticity Parameters of Deformable Objects with a "
       "Manipulation Robot</i>, IROS 2010. Its experiments, made again by palpate {} on objects of the software lab, whose E is "
       "known (but for the balloon's). The paper's method is its algorithm 1: iterative closest points, squared distance to the nearest "
-      "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, start and {} thread{}; a second row "
-      "gives it linear tetrahedra, as the paper had. Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the "
+      "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, starts (where the first has no equilibrium: a "
+      "quarter and four times of its E) and threads ({}); a second row gives it linear tetrahedra, as the paper had. Palpate also gets what the "
+      "paper's method has no use for: the tool's travel, the unloaded frame, and what is known of the sensors' noise (of depths, forces, "
+      "encoders and the camera's pose). Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the "
       "object at rest (where a push goes deeper: its depth). Where a scene does not say otherwise, the truth is linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
-      version, threads, threads == 1 ? "" : "s", command);
+      version, fmt::join(threads, ", "), command);
   html += claims(scenes);
+  if (!scenes.empty()) html += overview_table(scenes);
   for (const SceneAnswers& scene : scenes) html += section(scene);
   for (const StudyAnswer& answer : studies)
-    html += fmt::format("<h2 id=\"{}\">{}</h2>\n<p>{}</p>\n", answer.study->name, answer.study->title, answer.study->about) + study_table(answer);
+    html += fmt::format("<h2 id=\"{}\">{}</h2>\n<p>{}</p>\n", answer.study->name, answer.study->title, answer.study->about) + study_table(answer) +
+            (answer.failed.empty() ? "" : "<p>It ended with an error: " + escaped(answer.failed) + "</p>\n");
   return html + "</body></html>\n";
 }
 

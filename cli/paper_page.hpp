@@ -2,6 +2,7 @@
 // The page of `palpate paper`: the paper's figures remade, and a table paper / its method here / palpate.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,6 @@ namespace palpate::cli {
 
 /// One offline HTML file.
 std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& command,
-                       int threads);
+                       const std::set<int>& threads);
 
 }  // namespace palpate::cli

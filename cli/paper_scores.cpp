@@ -10,91 +10,176 @@
 namespace palpate::cli {
 namespace {
 
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
 /// One E with its truth: of the whole object, or of a site of one with regions.
 struct Compared {
   double young_modulus_pa = 0, poisson_ratio = 0;
   const MethodAnswer* answer = nullptr;
 };
 
-Score score_of(const std::vector<Compared>& all) {
+/// What a seed took.
+struct Effort {
+  int solves = 0, load_cases = 0;
+  double seconds = 0;
+  void add(const MethodAnswer& answer) { solves += answer.solves, load_cases += answer.load_cases, seconds += answer.seconds; }
+};
+
+bool answered(const MethodAnswer& answer) { return std::isfinite(answer.young_modulus_pa); }
+
+/// Mean, spread about it and root mean square.
+struct Moments {
+  double sum = 0, squares = 0;
+  int count = 0;
+  void add(double x) { sum += x, squares += x * x, ++count; }
+  double mean() const { return count > 0 ? sum / count : nan; }
+  double rms() const { return count > 0 ? std::sqrt(squares / count) : nan; }
+  double spread() const { return count > 1 ? std::sqrt(std::max(0.0, squares - sum * sum / count) / (count - 1)) : nan; }
+};
+
+Score score_of(const std::vector<Compared>& all, const std::vector<Effort>& efforts) {
   Score score;
+  Moments young, poisson, solves, seconds;
   for (const Compared& one : all) {
     const MethodAnswer& answer = *one.answer;
-    if (!std::isfinite(answer.young_modulus_pa)) {
+    ++score.asked;
+    if (!answered(answer)) {
       ++score.without;
       continue;
     }
-    const double error = std::log(answer.young_modulus_pa / one.young_modulus_pa), shift = answer.poisson_ratio - one.poisson_ratio;
     ++score.answers;
-    score.bias_percent += 100 * error;
-    score.rms_percent += 1e4 * error * error;
-    score.poisson_bias += shift;
-    score.poisson_rms += shift * shift;
-    score.solves += answer.solves;
-    score.seconds += answer.seconds;
-    score.most_load_cases = std::max(score.most_load_cases, answer.load_cases);
+    young.add(100 * std::log(answer.young_modulus_pa / one.young_modulus_pa));
+    poisson.add(answer.poisson_ratio - one.poisson_ratio);
     if (!std::isfinite(answer.lower_95_pa)) continue;
     ++score.with_interval;
     score.inside_95 += answer.lower_95_pa <= one.young_modulus_pa && one.young_modulus_pa <= answer.upper_95_pa;
     score.poisson_inside_95 += answer.poisson_lower_95 <= one.poisson_ratio && one.poisson_ratio <= answer.poisson_upper_95;
   }
-  const double count = score.answers > 0 ? score.answers : std::numeric_limits<double>::quiet_NaN();
-  score.bias_percent /= count;
-  score.rms_percent = std::sqrt(score.rms_percent / count);
-  score.poisson_bias /= count;
-  score.poisson_rms = std::sqrt(score.poisson_rms / count);
-  score.solves /= count;
-  score.seconds /= count;
+  for (const Effort& effort : efforts) {
+    solves.add(effort.solves);
+    seconds.add(effort.seconds);
+    score.most_load_cases = std::max(score.most_load_cases, effort.load_cases);
+  }
+  score.bias_percent = young.mean(), score.spread_percent = young.spread(), score.rms_percent = young.rms();
+  score.poisson_bias = poisson.mean(), score.poisson_spread = poisson.spread(), score.poisson_rms = poisson.rms();
+  score.solves = solves.mean(), score.seconds = seconds.mean();
   return score;
+}
+
+/// Of one method over the trials.
+struct Answers {
+  std::vector<Compared> compared;
+  std::vector<Effort> efforts;
+  void add(const TrialAnswer& trial, const MethodAnswer& answer) {
+    compared.push_back({trial.young_modulus_pa, trial.poisson_ratio, &answer});
+    efforts.emplace_back().add(answer);
+    if (!answered(answer)) efforts.pop_back();
+  }
+  Score score() const { return score_of(compared, efforts); }
+};
+
+/// Both methods on an object with regions: ours answers for all sites at once, the paper's for each by itself.
+void add_sites(const TrialAnswer& trial, Answers& paper, Answers& palpate, Answers& paper_compared, Answers& palpate_compared, int& apart) {
+  Effort by_paper, by_palpate;
+  by_palpate.add(trial.palpate);
+  bool all = true;
+  for (const SiteAnswer& site : trial.sites) {
+    const Compared theirs{site.young_modulus_pa, trial.poisson_ratio, &site.paper}, ours{site.young_modulus_pa, trial.poisson_ratio, &site.palpate};
+    by_paper.add(site.paper);
+    paper.compared.push_back(theirs);
+    palpate.compared.push_back(ours);
+    if (answered(site.paper)) {
+      paper_compared.compared.push_back(theirs);
+      palpate_compared.compared.push_back(ours);
+    } else {
+      ++apart;
+      all = false;
+    }
+  }
+  if (all) paper.efforts.push_back(by_paper), paper_compared.efforts.push_back(by_paper);
+  if (answered(trial.palpate)) palpate.efforts.push_back(by_palpate);
+  if (all && answered(trial.palpate)) palpate_compared.efforts.push_back(by_palpate);
+}
+
+std::string also(const std::string& names, const std::string& one) { return names + (names.empty() ? "" : ", ") + one; }
+
+double median(std::vector<double> values) {
+  if (values.empty()) return nan;
+  std::sort(values.begin(), values.end());
+  return 0.5 * (values[values.size() / 2] + values[(values.size() - 1) / 2]);
 }
 
 }  // namespace
 
+const TrialAnswer& SceneAnswers::shown() const {
+  const auto first = [&](auto wanted) { return std::find_if(trials.begin(), trials.end(), wanted); };
+  auto at = first([](const TrialAnswer& trial) { return !trial.samples.empty() || !trial.pictures.empty(); });
+  if (at == trials.end()) at = first([](const TrialAnswer& trial) { return trial.failed.empty(); });
+  return at == trials.end() ? trials.front() : *at;
+}
+
 SceneScores scores_of(const std::vector<TrialAnswer>& trials) {
-  std::vector<Compared> paper, coarse, palpate, other;
+  Answers paper, coarse, palpate, other, paper_compared, palpate_compared;
+  SceneScores out;
   for (const TrialAnswer& trial : trials) {
-    coarse.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.paper_coarse});
-    if (!trial.other_law.empty()) other.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.other});
-    if (trial.sites.empty()) {
-      paper.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.paper});
-      palpate.push_back({trial.young_modulus_pa, trial.poisson_ratio, &trial.palpate});
+    if (!std::isfinite(trial.young_modulus_pa)) continue;  // the lab made no truth: nobody was asked
+    coarse.add(trial, trial.paper_coarse);
+    if (!trial.other_law.empty()) other.add(trial, trial.other);
+    if (!trial.sites.empty()) {
+      add_sites(trial, paper, palpate, paper_compared, palpate_compared, out.apart);
+      continue;
     }
-    for (const SiteAnswer& site : trial.sites) {
-      paper.push_back({site.young_modulus_pa, trial.poisson_ratio, &site.paper});
-      palpate.push_back({site.young_modulus_pa, trial.poisson_ratio, &site.palpate});
+    paper.add(trial, trial.paper);
+    palpate.add(trial, trial.palpate);
+    if (!answered(trial.paper)) {
+      ++out.apart;
+      continue;
     }
+    paper_compared.add(trial, trial.paper);
+    palpate_compared.add(trial, trial.palpate);
   }
-  return {score_of(paper), score_of(coarse), score_of(palpate), score_of(other)};
+  out.paper = paper.score(), out.paper_coarse = coarse.score(), out.palpate = palpate.score(), out.other = other.score();
+  out.paper_compared = paper_compared.score(), out.palpate_compared = palpate_compared.score();
+  return out;
 }
 
 std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
-  std::vector<double> shares;
-  std::string worse, dear;
-  int inside = 0, intervals = 0;
+  std::vector<double> shares, simulated, solved;
+  std::string worse, dear, apart;
+  int inside = 0, asked = 0;
   for (const SceneAnswers& scene : scenes) {
     if (scene.scene->apparent) continue;
     const SceneScores scores = scores_of(scene.trials);
-    const double share = scores.palpate.rms_percent / scores.paper.rms_percent;
-    // Without an answer of ours it is worse, without one of theirs it is not.
-    shares.push_back(scores.palpate.without > 0 || std::isnan(scores.palpate.rms_percent) ? std::numeric_limits<double>::infinity()
-                     : std::isnan(share)                                                  ? 0
-                                                                                          : share);
-    const std::string name(scene.scene->name);
-    if (!(shares.back() < 1)) worse += (worse.empty() ? "" : ", ") + name;
-    // The method after the paper asks a simulator at every (E, nu); what it would solve for with unit responses is not its own.
-    if (!(scores.palpate.most_load_cases <= 0.2 * scores.paper.solves)) dear += (dear.empty() ? "" : ", ") + name;
     inside += scores.palpate.inside_95;
-    intervals += scores.palpate.with_interval;
+    asked += scores.palpate.asked;
+    const std::string name(scene.scene->name);
+    if (scores.apart > 0) apart = also(apart, fmt::format("{} of {} in {}", scores.apart, scores.paper.asked, name));
+    // Where the paper's method has no answer nothing is compared: that decides for neither.
+    const Score &paper = scores.paper_compared, &palpate = scores.palpate_compared;
+    if (paper.answers == 0) continue;
+    shares.push_back(palpate.without > 0 ? std::numeric_limits<double>::infinity() : palpate.rms_percent / paper.rms_percent);
+    if (!(shares.back() < 1)) worse = also(worse, name);
+    // The method after the paper asks a simulator at every (E, nu); what it would solve for with unit responses is not its own.
+    if (!(palpate.most_load_cases <= 0.2 * paper.solves)) dear = also(dear, name);
+    if (std::isfinite(palpate.solves)) simulated.push_back(palpate.solves / paper.solves);
+    if (paper.most_load_cases > 0) solved.push_back(static_cast<double>(palpate.most_load_cases) / paper.most_load_cases);
   }
-  if (shares.empty()) return {};
-  std::sort(shares.begin(), shares.end());
-  const double median = 0.5 * (shares[shares.size() / 2] + shares[(shares.size() - 1) / 2]);
-  const double in = intervals > 0 ? 100.0 * inside / intervals : 0;
-  return {{"palpate's rms error of E is smaller in every scene", worse.empty(), worse.empty() ? "in all" : "not in: " + worse},
-          {"in the median scene it is at most half", median <= 0.5, fmt::format("{:.2f} of the paper's method's", median)},
-          {"at least 88 % of the truths lie in palpate's 95 % intervals", in >= 88, fmt::format("{:.0f} % of {}", in, intervals)},
-          {"the finite elements are solved for at most a fifth of the load cases that the paper's method simulates", dear.empty(),
-           dear.empty() ? "in all" : "not in: " + dear}};
+  if (asked == 0) return {};
+  const std::string left_out = apart.empty() ? "" : "; left out, for the paper's method has no answer: " + apart;
+  const double middle = median(shares), in = 100.0 * inside / asked;
+  const bool any = !shares.empty();
+  const auto scenes_named = [&](const std::string& names) { return !any ? "nothing to compare" : names.empty() ? std::string("in all") : "not in: " + names; };
+  return {{"palpate's rms error of E is smaller in every scene", any && worse.empty(), scenes_named(worse) + left_out},
+          {"in the median scene it is at most half", middle <= 0.5,
+           (any ? fmt::format("{:.2f} of the paper's method's", middle) : "nothing to compare") + left_out},
+          {"at least 88 % of the truths lie in palpate's 95 % intervals (no interval: not inside)", in >= 88,
+           fmt::format("{:.0f} % of {}", in, asked)},
+          {"palpate's finite elements are solved for at most a fifth as many load cases as the paper's method asks for simulations, "
+           "each of which would be one without unit loads",
+           any && dear.empty(),
+           scenes_named(dear) + fmt::format("; like with like, in the median scene: {:.2f} of the simulations asked for, {:.2f} of the "
+                                            "load cases solved here, where both have unit loads",
+                                            median(simulated), median(solved))}};
 }
 
 }  // namespace palpate::cli

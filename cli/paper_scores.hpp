@@ -11,19 +11,26 @@ namespace palpate::cli {
 
 struct SceneAnswers {
   const lab::PaperScene* scene = nullptr;
-  std::vector<TrialAnswer> trials;  ///< the first one has samples and error surface
+  std::vector<TrialAnswer> trials;  ///< one of them has samples and error surface, if any
+
+  /// That one; else the first that is whole.
+  const TrialAnswer& shown() const;
 };
 
 /// Of a method over the trials of a scene. Trials without an answer count as such and are in no mean.
 struct Score {
-  int answers = 0, without = 0, with_interval = 0, inside_95 = 0, poisson_inside_95 = 0;
-  double bias_percent = 0, rms_percent = 0;  ///< of log E; NaN: no answer at all
-  double poisson_bias = 0, poisson_rms = 0;
-  double solves = 0, seconds = 0;            ///< means
-  int most_load_cases = 0;
+  int asked = 0, answers = 0, without = 0;
+  int with_interval = 0, inside_95 = 0, poisson_inside_95 = 0;  ///< of those asked: without an interval nothing is inside
+  double bias_percent = 0, spread_percent = 0, rms_percent = 0;  ///< of log E; NaN: no answer at all
+  double poisson_bias = 0, poisson_spread = 0, poisson_rms = 0;
+  double solves = 0, seconds = 0;  ///< means over seeds that were answered, all sites together
+  int most_load_cases = 0;         ///< in a seed: later ones take over what does not change
 };
 struct SceneScores {
   Score paper, paper_coarse, palpate, other;
+  /// The two where the paper's method has an answer: what is compared. `apart` are those where it has none.
+  Score paper_compared, palpate_compared;
+  int apart = 0;
 };
 /// Of an object with regions, every site's E counts.
 SceneScores scores_of(const std::vector<TrialAnswer>& trials);

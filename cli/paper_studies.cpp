@@ -76,11 +76,13 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
       if (!wanted(progress, what)) return rows;
       scene.shape = shape;
       const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress);
-      const Prepared given = prepare(trial.recording, choice_of(scene), nullptr, progress);
+      ModelChoice choice = choice_of(scene);
+      Prepared given = prepare(trial.recording, choice, nullptr, progress);
       // Palpate does not take a planar back side for true.
       const bool planar = shape == lab::PaperShape::planar_back;
-      rows.push_back({what, trial.young_modulus_pa, trial.poisson_ratio, by_paper(given, options_of(study), nullptr, progress),
-                      planar ? no_answer() : by_palpate(given, options_of(study), nullptr, progress)});
+      const MethodAnswer ours =
+          planar ? no_answer() : by_palpate_on_better_shape(trial.recording, choice, given, options_of(study), nullptr, progress);
+      rows.push_back({what, trial.young_modulus_pa, trial.poisson_ratio, by_paper(given, options_of(study), nullptr, progress), ours});
     }
   }
   return rows;

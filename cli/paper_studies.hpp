@@ -31,6 +31,8 @@ struct StudyAnswer {
   const Study* study = nullptr;
   std::uint64_t seed = 0;
   std::vector<StudyRow> rows;
+  std::string failed;  ///< the error that it ended with; empty: none
+  double seconds = 0;
 };
 
 /// The table that --help, the page and the tests loop over.

@@ -6,81 +6,65 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
 
-#include "palpate/report/words.hpp"
+#include "cli/paper_words.hpp"
 
 namespace palpate::cli {
 namespace {
 
-std::string of_truth(double found, double truth) {
-  return std::isfinite(found) ? fmt::format("{} ({:+.0f} %)", pascal(found), 100 * (found / truth - 1)) : "none";
-}
-
-std::string interval(const MethodAnswer& answer) {
-  return std::isfinite(answer.lower_95_pa) ? report::interval(answer.lower_95_pa, answer.upper_95_pa, "Pa") : "none";
-}
-
-std::string number(double value, const char* format) { return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "none"; }
-
 std::string score_row(const std::string& method, const Score& score, bool with_intervals) {
-  const auto held = [&](int inside) { return with_intervals ? fmt::format("{} of {}", inside, score.with_interval) : "none"; };
-  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-                     "<td>{}</td></tr>\n",
-                     method, number(score.bias_percent, "{:+.1f} %"), number(score.rms_percent, "{:.1f} %"), held(score.inside_95),
-                     number(score.poisson_bias, "{:+.3f}"), number(score.poisson_rms, "{:.3f}"), held(score.poisson_inside_95),
-                     score.without, number(score.solves, "{:.0f}"), with_intervals ? fmt::format("{}", score.most_load_cases) : "",
-                     number(score.seconds, "{:.1f}"));
+  const auto held = [&](int inside) { return with_intervals ? fmt::format("{} of {}", inside, score.asked) : "none"; };
+  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{} of {}</td><td>{}</td>"
+                     "<td>{}</td><td>{}</td></tr>\n",
+                     method, number(score.bias_percent, "{:+.1f} %"), number(score.spread_percent, "{:.1f} %"),
+                     number(score.rms_percent, "{:.1f} %"), held(score.inside_95), number(score.poisson_bias, "{:+.3f}"),
+                     number(score.poisson_rms, "{:.3f}"), held(score.poisson_inside_95), score.without, score.asked,
+                     number(score.solves, "{:.0f}"), score.most_load_cases, number(score.seconds, "{:.1f}"));
 }
 
-/// Of one method over the samples alone.
-struct Spread {
-  int answers = 0;
-  double mean_pa = 0, std_pa = 0, iterations = 0, solves = 0, seconds = 0;
-};
-Spread spread_of(const TrialAnswer& trial, MethodAnswer SampleAnswer::* method) {
-  Spread spread;
-  double square = 0;
-  for (const SampleAnswer& sample : trial.samples) {
-    const MethodAnswer& answer = sample.*method;
-    if (!std::isfinite(answer.young_modulus_pa)) continue;
-    ++spread.answers;
-    spread.mean_pa += answer.young_modulus_pa;
-    square += answer.young_modulus_pa * answer.young_modulus_pa;
-    spread.iterations += answer.iterations;
-    spread.solves += answer.solves;
-    spread.seconds += answer.seconds;
+/// E of every sample alone at each site, and how far the sites' means lie apart: what the paper showed of its bear.
+std::string spread_by_site(const TrialAnswer& trial) {
+  std::vector<std::string> pushes;
+  for (const SampleAnswer& sample : trial.samples)
+    if (std::find(pushes.begin(), pushes.end(), sample.push) == pushes.end()) pushes.push_back(sample.push);
+  if (pushes.size() < 2) return {};
+  std::string html = "<table><tr><th>samples alone, at</th><th>samples</th><th>the paper's method: mean &plusmn; standard deviation</th>"
+                     "<th>palpate</th></tr>\n";
+  std::vector<MethodAnswer> paper_means, palpate_means;
+  double paper_within = 0, palpate_within = 0;
+  const auto keep = [](std::vector<MethodAnswer>& means, double& within, const Spread& spread) {
+    means.push_back(no_answer());
+    means.back().young_modulus_pa = spread.mean_pa;
+    within += std::isfinite(spread.std_pa) ? spread.std_pa * spread.std_pa : 0;
+  };
+  for (std::size_t p = 0; p < pushes.size(); ++p) {
+    std::vector<const MethodAnswer*> paper, palpate;
+    for (const SampleAnswer& sample : trial.samples)
+      if (sample.push == pushes[p]) paper.push_back(&sample.paper), palpate.push_back(&sample.palpate);
+    const Spread theirs = spread_of(paper), ours = spread_of(palpate);
+    keep(paper_means, paper_within, theirs);
+    keep(palpate_means, palpate_within, ours);
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                        trial.sites.size() == pushes.size() ? trial.sites[p].site : pushes[p], paper.size(), mean_and_std(theirs),
+                        mean_and_std(ours));
   }
-  const double count = spread.answers;
-  spread.mean_pa /= count;
-  spread.std_pa = std::sqrt(std::max(0.0, square / count - spread.mean_pa * spread.mean_pa));
-  spread.iterations /= count;
-  spread.solves /= count;
-  spread.seconds /= count;
-  return spread;
+  const auto between = [](const std::vector<MethodAnswer>& means) {
+    std::vector<const MethodAnswer*> all;
+    for (const MethodAnswer& one : means) all.push_back(&one);
+    return spread_of(all);
+  };
+  const auto within = [&](double squares, const Spread& of_means) {
+    return number(100 * std::sqrt(squares / static_cast<double>(pushes.size())) / of_means.mean_pa, "{:.1f} %");
+  };
+  const Spread theirs = between(paper_means), ours = between(palpate_means);
+  html += fmt::format("<tr><td>within a site, root mean square</td><td></td><td>{}</td><td>{}</td></tr>\n", within(paper_within, theirs),
+                      within(palpate_within, ours));
+  html += fmt::format("<tr><td>between the means of the sites</td><td></td><td>{}</td><td>{}</td></tr></table>\n",
+                      number(100 * theirs.std_pa / theirs.mean_pa, "{:.1f} %"), number(100 * ours.std_pa / ours.mean_pa, "{:.1f} %"));
+  return html;
 }
 
 }  // namespace
-
-std::string pascal(double young_modulus_pa) {
-  return std::isfinite(young_modulus_pa) ? report::quantity(young_modulus_pa, "Pa") : "none";
-}
-
-std::string listed(const std::vector<std::string>& codes) {
-  std::vector<std::pair<std::string, int>> counted;
-  for (const std::string& code : codes) {
-    const auto known = std::find_if(counted.begin(), counted.end(), [&](const auto& one) { return one.first == code; });
-    if (known == counted.end()) {
-      counted.emplace_back(code, 1);
-    } else {
-      ++known->second;
-    }
-  }
-  std::string all;
-  for (const auto& [code, count] : counted)
-    all += (all.empty() ? "" : ", ") + code + (count > 1 ? fmt::format(" ({} times)", count) : "");
-  return all.empty() ? "none" : all;
-}
 
 std::string site_table(const TrialAnswer& trial) {
   if (trial.sites.empty()) return {};
@@ -90,7 +74,10 @@ std::string site_table(const TrialAnswer& trial) {
     html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", site.site, pascal(site.young_modulus_pa),
                         of_truth(site.paper.young_modulus_pa, site.young_modulus_pa),
                         of_truth(site.palpate.young_modulus_pa, site.young_modulus_pa), interval(site.palpate));
-  return html + "</table>\n<p class=\"small\">Told of no regions, palpate's verdicts are: " + listed(trial.as_one_verdicts) + ".</p>\n";
+  html += "</table>\n";
+  if (!trial.samples.empty())
+    html += "<p class=\"small\">Told of no regions, palpate's verdicts are: " + listed(trial.as_one_verdicts) + ".</p>\n";
+  return html + spread_by_site(trial);
 }
 
 std::string sample_table(const TrialAnswer& trial, bool truth_known) {
@@ -99,12 +86,14 @@ std::string sample_table(const TrialAnswer& trial, bool truth_known) {
                      "<th>simulated</th><th>s</th></tr>\n";
   const auto line = [&](const char* name, const Spread& spread) {
     if (spread.answers == 0) return fmt::format("<tr><td>{}</td><td>0</td></tr>\n", name);
-    return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.1f} %</td><td>{:.1f}</td><td>{:.0f}</td><td>{:.1f}</td></tr>\n", name,
+    return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.1f}</td><td>{:.0f}</td><td>{:.1f}</td></tr>\n", name,
                        spread.answers, truth_known ? of_truth(spread.mean_pa, trial.young_modulus_pa) : pascal(spread.mean_pa),
-                       100 * spread.std_pa / spread.mean_pa, spread.iterations, spread.solves, spread.seconds);
+                       number(100 * spread.std_pa / spread.mean_pa, "{:.1f} %"), spread.iterations, spread.solves, spread.seconds);
   };
-  html += line("the paper's method, this machine", spread_of(trial, &SampleAnswer::paper));
-  html += line("palpate, this machine", spread_of(trial, &SampleAnswer::palpate));
+  std::vector<const MethodAnswer*> paper, palpate;
+  for (const SampleAnswer& sample : trial.samples) paper.push_back(&sample.paper), palpate.push_back(&sample.palpate);
+  html += line("the paper's method, this machine", spread_of(paper));
+  html += line("palpate, this machine", spread_of(palpate));
   return html + "<tr><td>the paper (2010), its balloon</td><td>7</td><td></td><td></td><td>7</td><td></td><td>192.5</td></tr></table>\n";
 }
 
@@ -135,24 +124,68 @@ std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial)
   return html + "</table>\n";
 }
 
-std::string score_table(const lab::PaperScene& scene, const std::vector<TrialAnswer>& trials) {
-  if (scene.apparent)
-    return "<p class=\"small\">An apparent modulus has no truth: no errors are given, and the claims on top leave this scene out.</p>\n";
-  const bool by_site = !trials.front().sites.empty();
-  std::string html = "<table><tr><th>method</th><th>bias of E</th><th>rms of E</th><th>E in 95 %</th><th>bias of &nu;</th><th>rms of "
+std::string failed_table(const std::vector<TrialAnswer>& trials) {
+  std::string rows;
+  const auto row = [&](std::uint64_t seed, const char* what, const std::string& why) {
+    if (!why.empty()) rows += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", seed, what, escaped(why));
+  };
+  for (const TrialAnswer& trial : trials) {
+    row(trial.seed, "the seed", trial.failed);
+    row(trial.seed, "the paper's method", trial.paper.failed);
+    row(trial.seed, "palpate", trial.palpate.failed);
+  }
+  if (rows.empty()) return {};
+  return "<table><tr><th>seed that failed</th><th>what ended</th><th>why</th></tr>\n" + rows + "</table>\n";
+}
+
+namespace {
+
+/// What is to be known of "simulated", "solved" and seconds.
+std::string about_effort() {
+  return "Seeds share what was solved for where the object is the same: seconds are of what was left to do. Simulated: samples at one (E, "
+         "&nu;) that the method asks for, of a seed that it answers, all sites together. Solved: load cases that the finite elements had to be "
+         "solved for, at most in a seed. In small strains both methods make every sample up of unit loads solved at a few &nu;, so that the "
+         "machine is not what tells them apart (the paper ran a simulation each time); palpate's are with those of its finer mesh and of the "
+         "other shapes that it asks about.";
+}
+
+/// Of an object that has no E to compare with.
+std::string apparent_table(const std::vector<TrialAnswer>& trials) {
+  std::string html = "<table><tr><th>method</th><th>E: mean &plusmn; standard deviation over seeds</th><th>mean &nu;</th><th>no answer</th>"
+                     "<th>simulated</th><th>solved</th><th>s</th></tr>\n";
+  const auto row = [&](const char* name, MethodAnswer TrialAnswer::* method) {
+    std::vector<const MethodAnswer*> all;
+    for (const TrialAnswer& trial : trials) all.push_back(&(trial.*method));
+    const Spread spread = spread_of(all);
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{} of {}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", name, mean_and_std(spread),
+                        number(spread.poisson, "{:.3f}"), spread.without, all.size(), number(spread.solves, "{:.0f}"), spread.most_load_cases,
+                        number(spread.seconds, "{:.1f}"));
+  };
+  row("the paper's method, linear tetrahedra", &TrialAnswer::paper_coarse);
+  row("the paper's method on palpate's mesh", &TrialAnswer::paper);
+  row("palpate", &TrialAnswer::palpate);
+  return html + fmt::format("</table>\n<p class=\"small\">An apparent modulus has no truth: no errors are given, and the claims on top leave "
+                            "this scene out. {} seed{}. {}</p>\n",
+                            trials.size(), trials.size() == 1 ? "" : "s", about_effort());
+}
+
+}  // namespace
+
+std::string score_table(const SceneAnswers& answers) {
+  const std::vector<TrialAnswer>& trials = answers.trials;
+  const TrialAnswer& shown = answers.shown();
+  if (answers.scene->apparent) return apparent_table(trials);
+  const bool by_site = !shown.sites.empty();
+  std::string html = "<table><tr><th>method</th><th>bias of E</th><th>spread of E</th><th>rms of E</th><th>E in 95 %</th><th>bias of &nu;</th><th>rms of "
                      "&nu;</th><th>&nu; in 95 %</th><th>no answer</th><th>simulated</th><th>solved</th><th>s</th></tr>\n";
   const SceneScores scores = scores_of(trials);
   if (!by_site && scores.paper_coarse.answers > 0) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
   html += score_row(by_site ? "the paper's method on palpate's mesh, by site" : "the paper's method on palpate's mesh", scores.paper, false);
   html += score_row("palpate", scores.palpate, true);
-  if (!trials.front().other_law.empty()) html += score_row("palpate with the " + trials.front().other_law + " law", scores.other, true);
-  return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm. Seeds share what was "
-                            "solved for where the object is the same: seconds are of what was left to do. Simulated: samples "
-                            "at one (E, &nu;) that the method asks for. Solved: load cases that the finite elements had to be solved for, "
-                            "at most in a seed. In small strains palpate makes every sample up of unit loads solved at a few &nu;, those of "
-                            "its finer mesh included. The paper's method runs a simulation each time; its seconds here are with palpate's "
-                            "unit loads all the same, so that the machine is not what tells them apart.</p>\n",
-                            trials.size(), trials.size() == 1 ? "" : "s");
+  if (!shown.other_law.empty()) html += score_row("palpate with the " + shown.other_law + " law", scores.other, true);
+  return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm, spread: their standard "
+                            "deviation. Without an interval nothing is inside. {}</p>\n",
+                            trials.size(), trials.size() == 1 ? "" : "s", about_effort());
 }
 
 std::string study_table(const StudyAnswer& answer) {

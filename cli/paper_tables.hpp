@@ -9,16 +9,15 @@
 
 namespace palpate::cli {
 
-/// "none" where there is none.
-std::string pascal(double young_modulus_pa);
-/// "a, b (3 times)", or "none".
-std::string listed(const std::vector<std::string>& codes);
-
+/// E by site, and where there are samples alone: how they spread within the sites and between them.
 std::string site_table(const TrialAnswer& trial);
 /// E of the samples alone: mean and spread, and what one took.
 std::string sample_table(const TrialAnswer& trial, bool truth_known);
 std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial);
-std::string score_table(const lab::PaperScene& scene, const std::vector<TrialAnswer>& trials);
+/// Of an apparent modulus: no errors.
+std::string score_table(const SceneAnswers& answers);
+/// Seeds that ended with an error, and why.
+std::string failed_table(const std::vector<TrialAnswer>& trials);
 std::string study_table(const StudyAnswer& answer);
 
 }  // namespace palpate::cli

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "cli/paper_predictions.hpp"
+#include "palpate/core/error.hpp"
 #include "palpate/estimation/paper_method.hpp"
 
 namespace palpate::cli {
@@ -13,6 +14,30 @@ namespace {
 
 /// Every (E, nu) takes as many searches for equilibrium as there are samples.
 bool dear(const Prepared& given) { return given.object.material != "linear"; }
+
+/// Says what its life took, also where an error ends it.
+class Takes {
+ public:
+  explicit Takes(double& seconds) : seconds_(seconds) {}
+  ~Takes() { seconds_ = watch_.seconds(); }
+  Takes(const Takes&) = delete;
+  Takes& operator=(const Takes&) = delete;
+
+ private:
+  Watch watch_;
+  double& seconds_;
+};
+
+template <class Ask>
+MethodAnswer asked(Ask ask) {
+  try {
+    return ask();
+  } catch (const Error& error) {
+    MethodAnswer none = no_answer();
+    none.failed = error.what();
+    return none;
+  }
+}
 
 ErrorSurface error_surface(const Prepared& given, const MethodAnswer& found, double other_young_pa, int side,
                            const estimation::FitOptions& options, const OnProgress& progress) {
@@ -49,9 +74,10 @@ void answer_samples(const Prepared& given, int every, const estimation::FitOptio
       sample.force_n = load.force_n->dot(load.direction.normalized());
       sample.travel_m = travel_of(push.steps[s]);
       // Ours may use the unloaded frame of the push as well; the paper's method has no use for it.
-      sample.paper = by_paper(part_of(given, [&](std::size_t q, std::size_t t) { return q == p && t == s; }), alone, nullptr, {});
-      sample.palpate = by_palpate(
-          part_of(given, [&](std::size_t q, std::size_t t) { return q == p && (t == s || !loaded(push.steps[t])); }), alone, nullptr, {});
+      const Prepared loaded_alone = part_of(given, [&](std::size_t q, std::size_t t) { return q == p && t == s; }),
+                     with_unloaded = part_of(given, [&](std::size_t q, std::size_t t) { return q == p && (t == s || !loaded(push.steps[t])); });
+      sample.paper = asked([&] { return by_paper(loaded_alone, alone, nullptr, {}); });
+      sample.palpate = asked([&] { return by_palpate(with_unloaded, alone, nullptr, {}); });
       out.samples.push_back(std::move(sample));
     }
   }
@@ -70,7 +96,7 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
     SiteAnswer site;
     site.site = given.recording.pushes[p].site;
     site.young_modulus_pa = trial.site_young_pa[p];
-    site.paper = by_paper(part_of(one, [&](std::size_t q, std::size_t) { return q == p; }), options, nullptr, progress);
+    site.paper = asked([&] { return by_paper(part_of(one, [&](std::size_t q, std::size_t) { return q == p; }), options, nullptr, progress); });
     site.palpate = out.palpate;
     for (const Parameter& young : ours.parameters) {
       if (young.name != "young_modulus" || young.region != site.site) continue;
@@ -85,15 +111,22 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
 
 }  // namespace
 
-TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
-                      const OnProgress& progress) {
+void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
+               const OnProgress& progress, TrialAnswer& out) {
+  const Takes all(out.total_s);
+  const Watch truth;
   const lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress);
+  out.truth_s = truth.seconds();
   SharedModels of_this_seed;
-  if (shared == nullptr) shared = &of_this_seed;
-  TrialAnswer out;
+  const bool same_mesh = trial.recording.rest.views.empty();  // in all seeds
+  if (shared == nullptr || !same_mesh) shared = &of_this_seed;
+  // What is of no use to another seed need not be solved for over all of nu's range.
+  estimation::FitMemory *const mine = same_mesh ? &shared->fine.palpate : nullptr, *const others = same_mesh ? &shared->other.palpate : nullptr;
   out.seed = seed;
-  out.young_modulus_pa = scene.apparent ? std::numeric_limits<double>::quiet_NaN() : trial.young_modulus_pa;
-  out.poisson_ratio = scene.apparent ? std::numeric_limits<double>::quiet_NaN() : trial.poisson_ratio;
+  if (!scene.apparent) {
+    out.young_modulus_pa = trial.young_modulus_pa;
+    out.poisson_ratio = trial.poisson_ratio;
+  }
   for (const Push& push : trial.recording.pushes)
     for (const Step& step : push.steps)
       if (loaded(step)) out.readings.push_back({push.name, step.loads[0].force_n->norm(), travel_of(step)});
@@ -102,24 +135,25 @@ TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const Tr
   fit.cross_checks = fit.stresses = false;  // the paper's method has none: neither side's solves count them
 
   ModelChoice choice = choice_of(scene);
-  const Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
-  out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
+  const Watch model;
+  Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
+  out.model_s = model.seconds();
   Identification ours;
-  out.palpate = by_palpate(given, fit, &shared->fine.palpate, progress, &ours);
+  out.palpate = asked([&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, mine, progress, &ours); });
+  out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
   const Prepared one = as_one(given);
-  out.paper = by_paper(one, fit, &shared->fine.paper, progress);
-  out.paper_coarse = no_answer();
-  if (!dear(given)) {
+  out.paper = asked([&] { return by_paper(one, fit, &shared->fine.paper, progress); });
+  if (!dear(given) && given.object.region_names.empty()) {  // sites are compared one by one, and not on those
     Recording coarse = trial.recording;
-    coarse.regions.clear();
     choice.linear = true;
-    out.paper_coarse = by_paper(prepare(std::move(coarse), choice, &shared->linear, progress), fit, &shared->linear.paper, progress);
+    out.paper_coarse =
+        asked([&] { return by_paper(prepare(std::move(coarse), choice, &shared->linear, progress), fit, &shared->linear.paper, progress); });
   }
   std::optional<Prepared> other;
   if (!scene.other_law.empty()) {
     other = with_law(given, scene.other_law);
     out.other_law = scene.other_law;
-    out.other = by_palpate(*other, fit, &shared->other.palpate, progress);
+    out.other = asked([&] { return by_palpate(*other, fit, others, progress); });
   }
 
   std::vector<double> by_region;
@@ -135,21 +169,20 @@ TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const Tr
   if (options.pictures) {
     estimation::FitOptions checked = fit;
     checked.cross_checks = true;
-    const auto judged = [&](const Prepared& what, MethodAnswer& answer, estimation::FitMemory& memory) {
+    const auto judged = [&](const Prepared& what, MethodAnswer& answer, estimation::FitMemory* memory) {
       if (!answer.converged) return;
       estimation::FitOptions from_there = checked;
       from_there.young_start_pa = answer.young_modulus_pa;
       from_there.poisson_start = answer.poisson_ratio;
       from_there.start_is_answer = true;
-      answer.verdicts = by_palpate(what, from_there, &memory, progress).verdicts;
+      answer.verdicts = by_palpate(what, from_there, memory, progress).verdicts;
     };
-    judged(given, out.palpate, shared->fine.palpate);
-    if (other) judged(*other, out.other, shared->other.palpate);
+    judged(given, out.palpate, mine);
+    if (other) judged(*other, out.other, others);
     if (!by_region.empty()) out.as_one_verdicts = by_palpate(one, checked, nullptr, progress).verdicts;
   }
   if (options.surface_points > 1 && by_region.empty() && std::isfinite(out.paper.young_modulus_pa))
     out.surface = error_surface(given, out.paper, scene.apparent ? out.palpate.young_modulus_pa : out.young_modulus_pa, options.surface_points, fit, progress);
-  return out;
 }
 
 }  // namespace palpate::cli

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "palpate/lab/paper_scenes.hpp"
 
 namespace palpate::cli {
+
+inline constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 struct SampleAnswer {
   std::string push;
@@ -61,12 +64,14 @@ struct ErrorSurface {
 
 struct TrialAnswer {
   std::uint64_t seed = 0;
-  double young_modulus_pa = 0, poisson_ratio = 0;  ///< the truth; NaN: there is none
+  std::string failed;                         ///< why it is not whole; empty: it is. What was answered before stays
+  double young_modulus_pa = no_value, poisson_ratio = no_value;  ///< the truth; NaN: there is none
   Index tetrahedra = 0;
-  MethodAnswer paper, palpate;
-  MethodAnswer paper_coarse;                  ///< the paper's method on linear tetrahedra of the same mesh; may be left out
+  double truth_s = 0, model_s = 0, total_s = 0;  ///< by the clock: the lab's pushes, the object's model, and all
+  MethodAnswer paper = no_answer(), palpate = no_answer();
+  MethodAnswer paper_coarse = no_answer();    ///< the paper's method on linear tetrahedra of the same mesh; may be left out
   std::string other_law;                      ///< that palpate fitted as well; empty: none
-  MethodAnswer other;
+  MethodAnswer other = no_answer();
   std::vector<ForceReading> readings;
   std::vector<SiteAnswer> sites;              ///< only of an object with regions
   std::vector<std::string> as_one_verdicts;   ///< of ours when it takes such an object for homogeneous; only where asked for
@@ -88,8 +93,11 @@ struct SharedModels {
   SharedModel fine, linear, other;
 };
 
+/// A method that ends with an error has no answer, and the other one answers all the same.
 /// @param shared  used and filled; nullptr: nothing is kept
-TrialAnswer run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
-                      const OnProgress& progress);
+/// @param out     filled as far as it comes
+/// @throws Error when there is no truth or no model of the object.
+void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
+               const OnProgress& progress, TrialAnswer& out);
 
 }  // namespace palpate::cli

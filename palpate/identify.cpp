@@ -324,9 +324,6 @@ estimation::FillAnew fill_anew(const Recording& given, const Recording& built) {
   };
 }
 
-namespace {
-
-/// What a view of it did not show, of an object as build_simulated_object left it.
 std::optional<estimation::UnseenSide> unseen_side(const Recording& given, const Recording& built, const std::vector<char>& seen) {
   const TriMesh& surface = *built.rest.surface;
   estimation::UnseenSide side;
@@ -347,8 +344,6 @@ std::optional<estimation::UnseenSide> unseen_side(const Recording& given, const 
   if (kept.empty()) return std::nullopt;
   return side;
 }
-
-}  // namespace
 
 estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share) {
   estimation::ShapeDoubt doubt;

@@ -75,6 +75,11 @@ double drop_unseen_side(const Recording& built, const std::vector<char>& seen, e
 /// @param built  as build_simulated_object left it
 estimation::FillAnew fill_anew(const Recording& given, const Recording& built);
 
+/// What a view of it did not show; nothing where it showed nothing of it.
+/// @param given  the recording before its object was built
+/// @param built  as build_simulated_object left it, with `seen`
+std::optional<estimation::UnseenSide> unseen_side(const Recording& given, const Recording& built, const std::vector<char>& seen);
+
 /// What else may stand where nobody looked: all that was hidden, and less than what is fitted.
 /// @param given  the recording before its object was built
 estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share);

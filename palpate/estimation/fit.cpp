@@ -20,6 +20,7 @@
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
 #include "palpate/estimation/shape_error.hpp"
+#include "palpate/estimation/solve_count.hpp"
 #include "palpate/estimation/step_fits.hpp"
 #include "palpate/estimation/verdicts.hpp"
 
@@ -241,7 +242,10 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     residuals = objective.summarise(loss);
     return true;
   };
+  SolveCount elsewhere;  // by other models than the fit's own
   const auto as_far_as_known = [&] {
+    answer.fit.solves = model.solves() + elsewhere.solves;
+    answer.fit.load_cases = model.load_cases() + elsewhere.load_cases;
     if (optimum.evaluation.usable) answer.parameters = parameters_so_far(optimum.unknowns);
     return answer;
   };
@@ -277,17 +281,19 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
 
   // Before any finer mesh, so that all shapes have meshes alike.
   if (doubt != nullptr && !doubt->shapes.empty() && !doubt->effect && optimum.termination == Termination::converged) {
-    doubt->effect = shape_effect(*doubt, recording, inputs, objective, optimum, loss, options, optimiser, progress);
+    doubt->effect = shape_effect(*doubt, recording, inputs, objective, optimum, loss, options, optimiser, progress, &elsewhere);
     if (doubt->effect && doubt->effect->better) return as_far_as_known();
   }
-  if (doubt != nullptr && doubt->foot && !doubt->foot->effect && optimum.termination == Termination::converged)
+  if (doubt != nullptr && doubt->foot && !doubt->foot->effect && optimum.termination == Termination::converged) {
     doubt->foot->effect = foot_effect(*doubt->foot, recording, object, objective, optimum, loss, options, progress);
+    if (doubt->foot->effect)
+      for (const AnswerShift& shift : *doubt->foot->effect) elsewhere.load_cases += shift.load_cases;
+  }
 
   // What the mesh does to the answer, and finer ones until that is little.
   const FinerModel* meshed = nullptr;  // the mesh that corrects the model; nullptr: its own
   std::unique_ptr<MeshCorrection> correction;
   std::optional<AnswerShift> mesh;
-  int load_cases_of_meshes = 0;
   // No mesh need be finer than what else is known of E.
   const auto young_stds_known = [&] {
     std::vector<double> out = young_stds(unknowns, covariance, moving);
@@ -300,7 +306,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     const auto shown_by = [&](const FinerModel& by, std::shared_ptr<ForwardModel::Solved>* solved) {
       auto shift = mesh_shift(meshed ? meshed->recording : recording, meshed ? meshed->object : object, objective, optimum, loss,
                               by, options, progress, solved);
-      if (shift) load_cases_of_meshes += shift->load_cases;
+      if (shift) elsewhere.load_cases += shift->load_cases;
       return shift;
     };
     mesh = shown_by(*finer, memory != nullptr ? &memory->finer : nullptr);
@@ -313,7 +319,8 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     if (corrected) {
       auto next = std::make_unique<MeshCorrection>(*better->mesh, inputs, options, optimum.unknowns(poisson));
       corrected = next->correct(objective, optimum.unknowns, loss, progress) && optimise_again() && weigh_neighbours();
-      load_cases_of_meshes += next->model().load_cases();
+      if (correction) elsewhere.solves += correction->model().solves();
+      elsewhere.load_cases += next->model().load_cases();
       correction = std::move(next);
     }
     if (!corrected) return as_far_as_known();
@@ -400,8 +407,8 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
       answer.per_site = young_of_parts(checks.sites);
     }
   }
-  answer.fit.solves = model.solves() + (correction ? correction->model().solves() : 0);
-  answer.fit.load_cases = model.load_cases() + load_cases_of_meshes;
+  answer.fit.solves = model.solves() + elsewhere.solves + (correction ? correction->model().solves() : 0);
+  answer.fit.load_cases = model.load_cases() + elsewhere.load_cases;
   for (Verdict& verdict : judge({recording, objective, optimum, residuals, answer, checks, doubts, certificate}))
     answer.verdicts.push_back(std::move(verdict));
   if (doubt != nullptr && !doubt->shapes.empty()) answer.verdicts.push_back(partly_seen(*doubt));

@@ -5,21 +5,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <string>
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/optimise.hpp"
-#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/estimation/solve_count.hpp"
+#include "palpate/geometry/vertex_tree.hpp"
 
 namespace palpate::estimation {
 namespace {
-
-/// Vertices as degenerate triangles: the closest point of such a surface is the nearest vertex.
-TriMesh vertices_only(const Points& vertices_m) {
-  TriMesh mesh{vertices_m, Triangles(vertices_m.rows(), 3)};
-  for (Index v = 0; v < vertices_m.rows(); ++v) mesh.triangles.row(v).setConstant(v);
-  return mesh;
-}
 
 Points points_of(const std::vector<TermInput>& inputs) {
   std::vector<Vec3> all;
@@ -37,15 +33,15 @@ Points points_of(const std::vector<TermInput>& inputs) {
 }
 
 /// Besl and McKay's point-to-point ICP; returns the sum of squared distances to the nearest vertices at its end (eq. 6).
-double aligned_squared_distance(const geometry::TriangleTree& vertices, Points points, std::vector<Index>& nearest) {
+double aligned_squared_distance(const geometry::VertexTree& tree, const Points& vertices_m, Points points, std::vector<Index>& nearest) {
   double last = std::numeric_limits<double>::infinity();
   for (int iteration = 0; iteration < 30; ++iteration) {
     Points targets(points.rows(), 3);
     double sum = 0;
     for (Index i = 0; i < points.rows(); ++i) {
-      const auto hit = vertices.closest(points.row(i), nearest[static_cast<std::size_t>(i)]);
-      nearest[static_cast<std::size_t>(i)] = hit.triangle;
-      targets.row(i) = hit.point_m;
+      const auto hit = tree.nearest(points.row(i), nearest[static_cast<std::size_t>(i)]);
+      nearest[static_cast<std::size_t>(i)] = hit.vertex;
+      targets.row(i) = vertices_m.row(hit.vertex);
       sum += hit.squared_distance_m2;
     }
     if (sum > last * (1 - 1e-6)) return sum;
@@ -75,7 +71,8 @@ struct PaperError::Impl {
   std::vector<std::size_t> steps;
   std::vector<Points> points;
   std::vector<std::vector<Index>> nearest;
-  std::unique_ptr<geometry::TriangleTree> tree;
+  std::unique_ptr<geometry::VertexTree> tree;
+  SolveCount for_start;
   std::size_t count = 0;
   double start_pa = 0;
 };
@@ -92,6 +89,7 @@ PaperError::PaperError(const Recording& recording, const SimulatedObject& object
     Unknowns list;
     ForwardModel model(recording, object, list, statics, memory->model);
     memory->model = model.solved();
+    const CountsAtEnd counts(model, impl_->for_start);
     Objective objective(model, inputs, list);
     impl_->start_pa = std::exp(find_start(objective, recording.model.poisson_fixed.value_or(options.poisson_start))(log_young));
   }
@@ -112,16 +110,16 @@ PaperError::PaperError(const Recording& recording, const SimulatedObject& object
     impl_->nearest.emplace_back(static_cast<std::size_t>(impl_->points.back().rows()), -1);
     impl_->count += static_cast<std::size_t>(impl_->points.back().rows());
   }
-  impl_->tree = std::make_unique<geometry::TriangleTree>(vertices_only(object.surface.rest().vertices_m));
+  impl_->tree = std::make_unique<geometry::VertexTree>(object.surface.rest().vertices_m);
 }
 
 PaperError::~PaperError() = default;
 double PaperError::start_young_modulus_pa() const { return impl_->start_pa; }
 std::size_t PaperError::samples() const { return impl_->steps.size(); }
 std::size_t PaperError::points() const { return impl_->count; }
-int PaperError::solves() const { return impl_->model->solves(); }
+int PaperError::solves() const { return impl_->for_start.solves + impl_->model->solves(); }
 
-int PaperError::load_cases() const { return impl_->model->load_cases(); }
+int PaperError::load_cases() const { return impl_->for_start.load_cases + impl_->model->load_cases(); }
 
 double PaperError::operator()(double young_modulus_pa, double poisson_ratio) {
   VectorX at = impl_->unknowns.prior_mean();
@@ -132,64 +130,64 @@ double PaperError::operator()(double young_modulus_pa, double poisson_ratio) {
     const StepPrediction predicted = impl_->model->predict(impl_->steps[k], at, false);
     if (!predicted.converged) return std::numeric_limits<double>::infinity();
     impl_->tree->refit(predicted.surface_m);
-    sum += aligned_squared_distance(*impl_->tree, impl_->points[k], impl_->nearest[k]);
+    sum += aligned_squared_distance(*impl_->tree, predicted.surface_m, impl_->points[k], impl_->nearest[k]);
   }
   return sum / static_cast<double>(impl_->count);
 }
 
-Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
-                               const FitOptions& options, const OnProgress& progress, FitMemory* memory) {
-  check(options);
-  PaperError error(recording, object, inputs, options, memory);
-  const double nu_start = recording.model.poisson_fixed.value_or(options.poisson_start);
-  const double nu_low = std::min(recording.model.poisson_lower, recording.model.poisson_fixed.value_or(1)),
-               nu_high = std::max(recording.model.poisson_upper, recording.model.poisson_fixed.value_or(-1));
-  const bool nu_moves = !recording.model.poisson_fixed;
+namespace {
+
+/// Where a descent ended, in (log E, nu).
+struct Descent {
+  Eigen::Vector2d x;
+  double error_m2 = std::numeric_limits<double>::infinity();  ///< there; infinity: no equilibrium at its start
+  Termination termination = Termination::max_iterations;
+  std::string message = "stopped after the largest number of iterations";
+  int iterations = 0;
+};
+
+struct Bounds {
+  double nu_low = 0, nu_high = 0;
+  bool nu_moves = true;
+  Eigen::Vector2d inside(Eigen::Vector2d at) const {
+    at(1) = std::clamp(at(1), nu_low, nu_high);
+    return at;
+  }
+};
+
+/// Algorithm 1: gradient step, re-simulation, acceptance if the error falls.
+/// @param at  called with every iteration's place and error; false: the user has had enough
+Descent descend(PaperError& error, Eigen::Vector2d start, const Bounds& bounds, int max_iterations,
+                const std::function<bool(const Eigen::Vector2d&, double, int)>& at) {
   // Of log E and nu in the numerical derivatives. Points that change their nearest vertex make the error rough: where a narrow
   // difference shows no way down, a wider one may.
   constexpr std::array<double, 3> differences{1e-3, 1e-2, 1e-1};
   std::size_t width = 0;
-
-  // Algorithm 1, in (log E, nu): gradient step, re-simulation, acceptance if the error falls.
-  Eigen::Vector2d x(std::log(error.start_young_modulus_pa()),
-                    std::clamp(nu_start, nu_low, nu_high));
-  const auto inside = [&](Eigen::Vector2d at) {
-    at(1) = std::clamp(at(1), nu_low, nu_high);
-    return at;
-  };
-  const auto value = [&](const Eigen::Vector2d& at) { return error(std::exp(at(0)), at(1)); };
-  const auto found = [&]() -> std::vector<Parameter> {
-    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    return {{"young_modulus", "", "Pa", std::exp(x(0)), nan, nan, nan, true},
-            {"poisson_ratio", "", "1", x(1), nan, nan, nan, true}};
-  };
-  Identification answer;
-  answer.material = object.material;
-  answer.surface = object.surface.rest();
-  double here = value(x);
+  Descent out;
+  Eigen::Vector2d& x = out.x = start;
+  double& here = out.error_m2;
+  const auto value = [&](const Eigen::Vector2d& place) { return error(std::exp(place(0)), place(1)); };
+  here = value(x);
+  if (!std::isfinite(here)) {
+    out.termination = Termination::failed;
+    out.message = "the simulation found no equilibrium at the start, nor at a quarter or four times of its E";
+    return out;
+  }
   double rate = -1;
-  answer.termination = Termination::max_iterations;
-  answer.message = "stopped after the largest number of iterations";
   Eigen::Vector2d last_x = x, last_gradient = Eigen::Vector2d::Zero();
-  int iteration = 0;
-  for (; iteration < options.max_iterations && std::isfinite(here); ++iteration) {
-    if (progress && !progress("paper's method", static_cast<double>(iteration) / options.max_iterations)) {
-      answer.termination = Termination::cancelled;
-      answer.message = "stopped by the caller";
+  for (; out.iterations < max_iterations; ++out.iterations) {
+    if (!at(x, here, out.iterations)) {
+      out.termination = Termination::cancelled;
+      out.message = "stopped by the caller";
       break;
     }
-    answer.trace.push_back({std::exp(x(0)), x(1), here});
-    if (options.on_estimate) {
-      answer.parameters = found();
-      options.on_estimate(answer);
-    }
     Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
-    for (int k = 0; k < (nu_moves ? 2 : 1); ++k) {
+    for (int k = 0; k < (bounds.nu_moves ? 2 : 1); ++k) {
       Eigen::Vector2d ahead = x, behind = x;
       ahead(k) += differences[width];
       behind(k) -= differences[width];
-      ahead = inside(ahead);
-      behind = inside(behind);
+      ahead = bounds.inside(ahead);
+      behind = bounds.inside(behind);
       gradient(k) = slope({behind(k), value(behind)}, {x(k), here}, {ahead(k), value(ahead)});
     }
     // First step: a tenth in log E; afterwards Barzilai and Borwein's length, still along the gradient.
@@ -207,7 +205,7 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
       Eigen::Vector2d move = -rate * gradient;
       if (move.norm() > 1) move *= 1 / move.norm();
       if (move.norm() < 1e-4) break;  // a hundredth of a per cent of E
-      const Eigen::Vector2d next = inside(x + move);
+      const Eigen::Vector2d next = bounds.inside(x + move);
       const double there = value(next);
       if (there < here) {
         improved = true;
@@ -224,25 +222,59 @@ Identification fit_as_in_paper(const Recording& recording, const SimulatedObject
       continue;
     }
     if (!improved) {
-      answer.termination = Termination::converged;
-      answer.message = "converged";
+      out.termination = Termination::converged;
+      out.message = "converged";
       break;
     }
   }
-  if (!std::isfinite(here)) {
-    answer.termination = Termination::failed;
-    answer.message = "the simulation found no equilibrium at the start";
+  return out;
+}
+
+}  // namespace
+
+Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
+                               const FitOptions& options, const OnProgress& progress, FitMemory* memory) {
+  check(options);
+  PaperError error(recording, object, inputs, options, memory);
+  const double nu_start = recording.model.poisson_fixed.value_or(options.poisson_start);
+  const Bounds bounds{std::min(recording.model.poisson_lower, recording.model.poisson_fixed.value_or(1)),
+                      std::max(recording.model.poisson_upper, recording.model.poisson_fixed.value_or(-1)), !recording.model.poisson_fixed};
+  const auto parameters = [](const Eigen::Vector2d& x) -> std::vector<Parameter> {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    return {{"young_modulus", "", "Pa", std::exp(x(0)), nan, nan, nan, true},
+            {"poisson_ratio", "", "1", x(1), nan, nan, nan, true}};
+  };
+  Identification answer;
+  answer.material = object.material;
+  answer.surface = object.surface.rest();
+  const auto watched = [&](const Eigen::Vector2d& x, double here, int iteration) {
+    if (progress && !progress("paper's method", static_cast<double>(iteration) / options.max_iterations)) return false;
+    answer.trace.push_back({std::exp(x(0)), x(1), here});
+    if (options.on_estimate) {
+      answer.parameters = parameters(x);
+      options.on_estimate(answer);
+    }
+    return true;
+  };
+  const Eigen::Vector2d start = bounds.inside({std::log(error.start_young_modulus_pa()), nu_start});
+  Descent found = descend(error, start, bounds, options.max_iterations, watched);
+  // The other method looks there too where its start has no equilibrium (optimise_from_several).
+  for (const double factor : {0.25, 4.0}) {
+    if (std::isfinite(found.error_m2)) break;
+    found = descend(error, start + Eigen::Vector2d(std::log(factor), 0), bounds, options.max_iterations, watched);
   }
-  answer.fit.iterations = iteration;
+  answer.termination = found.termination;
+  answer.message = found.message;
+  answer.fit.iterations = found.iterations;
   answer.fit.solves = error.solves();
   answer.fit.load_cases = error.load_cases();
-  answer.fit.rms_m = std::sqrt(here);
+  answer.fit.rms_m = std::sqrt(found.error_m2);
   answer.fit.points_used = error.points();
   answer.fit.steps = error.samples();
   answer.fit.pushes = recording.pushes.size();
-  answer.parameters = found();
+  answer.parameters = parameters(found.x);
   answer.verdicts.push_back({"no_uncertainty", "The paper's method gives no interval: use the default method for one."});
-  if (nu_moves && (x(1) <= nu_low || x(1) >= nu_high)) {
+  if (bounds.nu_moves && (found.x(1) <= bounds.nu_low || found.x(1) >= bounds.nu_high)) {
     answer.verdicts.push_back({"nu_at_bound", "The Poisson ratio ended at the end of its range."});
   }
   return answer;

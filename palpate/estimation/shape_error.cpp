@@ -64,7 +64,8 @@ bool about_instruments(const std::string& name) {
 /// back gives way by the cube of its thickness): it is looked for again where the first step led.
 std::optional<Answer> answer_of(const Recording& recording, SimulatedObject object, const std::optional<UnseenSide>& side,
                                 const Inputs& inputs, const Objective& objective, const Optimum& optimum, const Loss& loss,
-                                const FitOptions& options, const OptimiseOptions& optimiser, double most_cost, const OnProgress& progress) {
+                                const FitOptions& options, const OptimiseOptions& optimiser, double most_cost, SolveCount& solved,
+                                const OnProgress& progress) {
   constexpr int most_rounds = 2;
   constexpr double settled = 0.3;  // standard deviations of a mode
   OptimiseOptions quiet = optimiser;
@@ -83,6 +84,7 @@ std::optional<Answer> answer_of(const Recording& recording, SimulatedObject obje
       if (answer) return answer;
       throw;
     }
+    const CountsAtEnd counts(*model, solved);
     Objective other(*model, inputs, unknowns);
     for (int k : {log_young, poisson}) unknowns[k] = known[k];
     // the rest surface's error has modes of its own on each shape
@@ -102,7 +104,7 @@ std::optional<Answer> answer_of(const Recording& recording, SimulatedObject obje
     if (side) {
       other.set_reuse(0);
       found.evaluation = other.evaluate(found.unknowns, loss);
-      if (const auto modes = unseen_modes(*side, amounts, recording, object, other, found, loss, tukey_information_factor(loss.tukey), options)) {
+      if (const auto modes = unseen_modes(*side, amounts, recording, object, other, found, loss, tukey_information_factor(loss.tukey), options, &solved)) {
         at += modes->change;
         cost -= modes->gain;
         widening = modes->widening;
@@ -129,20 +131,22 @@ std::optional<Answer> answer_of(const Recording& recording, SimulatedObject obje
 
 std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording& recording, const Inputs& inputs, const Objective& objective, const Optimum& optimum,
                                         const Loss& loss, const FitOptions& options, const OptimiseOptions& optimiser,
-                                        const OnProgress& progress) {
+                                        const OnProgress& progress, SolveCount* solved) {
+  SolveCount nobody_asks;
+  SolveCount& count = solved != nullptr ? *solved : nobody_asks;
   double share = 1;
   const Inputs few = thinned(inputs, share);
   Loss weighed = loss;  // fewer neighbours, less that they share
   weighed.rays.clear();
   weighed.surface_weight = std::min(1.0, loss.surface_weight / share / (loss.noise ? loss.noise->of_wide : 1));
   weighed.noise = nullptr;
-  const auto fitted = answer_of(recording, objective.model().object(), doubt.side, few, objective, optimum, weighed, options, optimiser, std::numeric_limits<double>::infinity(), progress);
+  const auto fitted = answer_of(recording, objective.model().object(), doubt.side, few, objective, optimum, weighed, options, optimiser, std::numeric_limits<double>::infinity(), count, progress);
   if (!fitted) return std::nullopt;
   std::vector<std::optional<Answer>> alternatives(doubt.shapes.size());
   for (std::size_t s = 0; s < doubt.shapes.size(); ++s) {
     if (progress && !progress("unseen side", static_cast<double>(s) / static_cast<double>(doubt.shapes.size()))) return std::nullopt;
     try {
-      alternatives[s] = answer_of(doubt.shapes[s].recording, doubt.shapes[s].object, doubt.shapes[s].side, few, objective, optimum, weighed, options, optimiser, (1 + worse) * fitted->cost, {});
+      alternatives[s] = answer_of(doubt.shapes[s].recording, doubt.shapes[s].object, doubt.shapes[s].side, few, objective, optimum, weighed, options, optimiser, (1 + worse) * fitted->cost, count, {});
     } catch (const Error&) {  // it is not held, or a tool does not reach it: no such shape was pushed
     }
   }

@@ -43,9 +43,11 @@ struct ShapeDoubt {
 /// push to be off by more than three of their standard deviations is ruled out, unless the best one wants it too; so is one with a tenth more
 /// of chi-square. The answer is the mean over the others, its covariance theirs and what is between them. Alternatives whose fit does not end
 /// are left out.
+/// @param solved  if given: what was solved for is added
 /// @returns nothing where none ended, or the caller asked to stop.
 std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording& recording, const Inputs& inputs,
                                         const Objective& objective, const Optimum& optimum, const Loss& loss, const FitOptions& options,
-                                        const OptimiseOptions& optimiser, const OnProgress& progress);
+                                        const OptimiseOptions& optimiser, const OnProgress& progress,
+                                        SolveCount* solved = nullptr);
 
 }  // namespace palpate::estimation

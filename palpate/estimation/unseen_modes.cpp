@@ -104,17 +104,19 @@ TetMesh with_unseen_moved(const TetMesh& mesh, const UnseenSide& side, VectorX& 
 
 std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& amounts, const Recording& recording, const SimulatedObject& object,
                                         const Objective& objective, const Optimum& optimum, const Loss& loss, double factor,
-                                        const FitOptions& options) {
+                                        const FitOptions& options, SolveCount* solved) {
   constexpr double little = 0.2;  // of a standard deviation: far enough to be told from rounding, near enough to be linear
   Recording copy = recording;
   copy.model.poisson_fixed = copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
   copy.supports = held_both_ways(std::move(copy.supports));
+  SolveCount nobody_asks;
   const auto predicted = [&](const TetMesh& mesh) {
     SimulatedObject body = object;
     body.mesh = mesh;
     body.material = "linear";
     Unknowns unknowns;
     ForwardModel model(copy, std::move(body), unknowns, statics_options(copy, object, options), nullptr, 1e-3);
+    const CountsAtEnd counts(model, solved != nullptr ? *solved : nobody_asks);
     std::vector<StepPrediction> out(model.step_count());
     for (std::size_t s = 0; s < out.size(); ++s) {
       if (objective.sees(s)) out[s] = model.predict(s, optimum.unknowns);

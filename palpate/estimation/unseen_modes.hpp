@@ -7,6 +7,7 @@
 
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/solve_count.hpp"
 
 namespace palpate::estimation {
 
@@ -44,9 +45,10 @@ struct UnseenModes {
 /// every step's.
 /// @param amounts  of the modes, that `object` was moved by: their prior is about zero
 /// @param factor   as in Evaluation::information
+/// @param solved   if given: what was solved for is added
 /// @returns nothing where a moved body cannot be solved for
 std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& amounts, const Recording& recording, const SimulatedObject& object,
                                         const Objective& objective, const Optimum& optimum, const Loss& loss, double factor,
-                                        const FitOptions& options);
+                                        const FitOptions& options, SolveCount* solved = nullptr);
 
 }  // namespace palpate::estimation

@@ -11,12 +11,14 @@
 
 namespace palpate::lab {
 
-// Equilibria at rising forces, solved when they are first needed; between two of them everything is interpolated.
+// Equilibria at rising forces, solved when they are first needed; between two of them everything is interpolated. What moves in
+// proportion to the force is solved for once, and everything is a multiple of that.
 class ForceCurve {
  public:
   /// @param first_n  the first step of force; later ones follow the object's own stiffness, for about `step_m` of travel each
-  ForceCurve(std::unique_ptr<Pressed> object, double first_n, double step_m)
-      : object_(std::move(object)), step_n_(first_n), step_m_(step_m) {
+  /// @param proportional  small strains, held: what is true of one force is true of all
+  ForceCurve(std::unique_ptr<Pressed> object, double first_n, double step_m, bool proportional = false)
+      : object_(std::move(object)), step_n_(first_n), step_m_(step_m), proportional_(proportional) {
     forces_.push_back(0);
     travels_.push_back(0);
     surfaces_.push_back(object_->surface());
@@ -24,10 +26,10 @@ class ForceCurve {
 
   struct Place {
     std::size_t below = 0;
-    double share = 0;
+    double share = 0;  // above 1 only beyond what was solved for, where that is a multiple
   };
   Place at(double travel_m) {
-    while (travels_.back() < travel_m) {
+    while (travels_.back() < travel_m && !(proportional_ && travels_.size() > 1)) {
       object_->press(forces_.back() + step_n_);
       forces_.push_back(object_->force_n());
       travels_.push_back(object_->travel_m());
@@ -38,7 +40,7 @@ class ForceCurve {
     }
     if (travel_m <= 0) return {};
     std::size_t k = 1;
-    while (travels_[k] < travel_m) ++k;
+    while (k + 1 < travels_.size() && travels_[k] < travel_m) ++k;
     return {k - 1, (travel_m - travels_[k - 1]) / (travels_[k] - travels_[k - 1])};
   }
   double force_n(const Place& p) const {
@@ -53,6 +55,7 @@ class ForceCurve {
  private:
   std::unique_ptr<Pressed> object_;
   double step_n_, step_m_;
+  bool proportional_;
   std::vector<double> forces_, travels_;
   std::vector<TriMesh> surfaces_;
 };

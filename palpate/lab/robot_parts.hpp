@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
+#include "palpate/fem/materials.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/lab/arm.hpp"
 #include "palpate/lab/force_curve.hpp"
@@ -25,6 +26,13 @@ inline ArmOptions arm_with_pad(const Pose& T_base_arm, double pad_radius_m) {
   options.T_base_arm = T_base_arm;
   options.pad_radius_m = pad_radius_m;
   return options;
+}
+
+// Small strains of what is held all the time, or by pads alone: nothing lifts off, and no contact grows.
+inline bool moves_in_proportion(const LabObject& object) {
+  const auto pushes_only = [](const Support& one) { return one.kind == SupportKind::table || one.kind == SupportKind::wall; };
+  return fem::material_law(object.material).is_linear() && !object.punch &&
+         std::none_of(object.supports.begin(), object.supports.end(), pushes_only);
 }
 
 struct LabRobot::Impl {
@@ -142,7 +150,8 @@ struct LabRobot::Impl {
     if (!curves[active]) {
       const double a = object.pad_radius_m;
       curves[active] =
-          std::make_unique<ForceCurve>(object.press(site()), 0.06 * object.young_modulus_pa * a * a * M_PI / 2, 0.06 * a);
+          std::make_unique<ForceCurve>(object.press(site()), 0.06 * object.young_modulus_pa * a * a * M_PI / 2, 0.06 * a,
+                                       moves_in_proportion(object));
     }
     return *curves[active];
   }

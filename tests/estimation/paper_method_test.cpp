@@ -53,6 +53,44 @@ TEST(PaperMethod, TakesTheSlopeOfTheSideThatHasAnEquilibrium) {
   EXPECT_DOUBLE_EQ(slope({0.9, none}, {1, 3}, {1.1, none}), 0);
 }
 
+// Where the start has no equilibrium the other method looks at a quarter and at four times of its E; so does this one.
+TEST(PaperMethod, LooksElsewhereWhereItsStartHasNoEquilibrium) {
+  PushedBlock truth;
+  truth.points = 60;
+  const Recording recording = pushed_block_recording();
+  const SimulatedObject object = coarse_block();
+  const Inputs inputs = clouds_of(truth);
+  PaperError error(recording, object, inputs, {});
+  double soft_pa = truth.young_pa / 1024;
+  while (soft_pa > 0.1 && std::isfinite(error(soft_pa, 0.3))) soft_pa /= 4;
+  ASSERT_GT(soft_pa, 0.1) << "this body bears everything";
+  ASSERT_TRUE(std::isfinite(error(4 * soft_pa, 0.3)));
+  FitOptions from_there;
+  from_there.max_iterations = 1;
+  from_there.young_start_pa = soft_pa;
+  const Identification answer = fit_as_in_paper(recording, object, inputs, from_there);
+  EXPECT_NE(answer.termination, Termination::failed) << answer.message;
+  EXPECT_GT(parameter(answer, "young_modulus").value, soft_pa);
+  EXPECT_TRUE(std::isfinite(answer.fit.rms_m));
+  from_there.young_start_pa = soft_pa / 16;  // nor is there one at four times of this
+  EXPECT_EQ(fit_as_in_paper(recording, object, inputs, from_there).termination, Termination::failed);
+}
+
+// The search for the start that both methods share is counted with either.
+TEST(PaperMethod, CountsWhatItsStartTook) {
+  PushedBlock truth;
+  truth.points = 60;
+  const Recording recording = pushed_block_recording();
+  const SimulatedObject object = coarse_block();
+  const Inputs inputs = clouds_of(truth);
+  FitOptions given;
+  given.young_start_pa = truth.young_pa;
+  EXPECT_EQ(PaperError(recording, object, inputs, given).solves(), 0);
+  const PaperError searched(recording, object, inputs, {});
+  EXPECT_GT(searched.solves(), 0);
+  EXPECT_GT(searched.load_cases(), 0);
+}
+
 TEST(PaperMethod, WithoutASurfaceIsAnError) {
   Inputs inputs(2);
   inputs[0].push_back(ToolTravel{"finger", 0.001, 1e-4});

@@ -98,6 +98,17 @@ TEST(ShapeError, ThePushesChooseBetweenShapesThatWereAsLikely) {
   }
 }
 
+TEST(ShapeError, WhatOtherShapesTookIsInTheFitsCount) {
+  const Seen data = seen();
+  ShapeDoubt none, one = doubt_of(data, 0.01, false), same = one;
+  same.shapes.push_back(same.shapes.front());
+  const FitSummary alone = fit_beside(none, data, 0).fit, with_one = fit_beside(one, data, 0).fit, with_two = fit_beside(same, data, 0).fit;
+  // The fitted shape and the other one were solved for anew, all on meshes of one kind: a third costs half of what these did.
+  EXPECT_GT(with_one.solves, alone.solves);
+  EXPECT_GT(with_one.load_cases, alone.load_cases);
+  EXPECT_EQ(2 * (with_two.load_cases - with_one.load_cases), with_one.load_cases - alone.load_cases);
+}
+
 TEST(ShapeError, AShapeThatIsLessLikelyBeforehandCountsLess) {
   const Seen data = seen();
   ShapeDoubt doubt = doubt_of(data, 0, false);

@@ -1,0 +1,67 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// The lab's force over travel, against presses to the same force from rest; of small strains with one solution alone.
+#include "palpate/lab/force_curve.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "palpate/lab/pressed_block.hpp"
+
+namespace palpate::lab {
+namespace {
+
+PressedBlockOptions block_of(const char* law) {
+  PressedBlockOptions block;
+  block.cells_in_radius = 2;
+  block.cell_share = 2;
+  block.material = law;
+  return block;
+}
+
+/// Counts what is asked of a block.
+class Counted : public Pressed {
+ public:
+  Counted(const PressedBlockOptions& block, int& presses) : block_(block), presses_(presses) {}
+  void press(double force_n) override { ++presses_, block_.press(force_n); }
+  double force_n() const override { return block_.force_n(); }
+  double travel_m() const override { return block_.travel_m(); }
+  TriMesh surface() const override { return block_.surface(); }
+  Index nodes() const override { return block_.nodes(); }
+
+ private:
+  PressedBlock block_;
+  int& presses_;
+};
+
+TEST(ForceCurve, SmallStrainsAreSolvedForOnceAndEndWhereAPressEnds) {
+  const PressedBlockOptions block = block_of("linear");
+  int presses = 0;
+  ForceCurve curve(std::make_unique<Counted>(block, presses), 0.5, 0.0015, true);
+  for (const double travel_m : {0.001, 0.012, 0.0004}) {
+    const auto place = curve.at(travel_m);
+    PressedBlock afresh(block);
+    afresh.press(curve.force_n(place));
+    EXPECT_NEAR(afresh.travel_m(), travel_m, 1e-6 * travel_m);
+    EXPECT_LT((afresh.surface().vertices_m - curve.surface(place).vertices_m).cwiseAbs().maxCoeff(), 1e-6 * travel_m);
+  }
+  EXPECT_EQ(presses, 1);
+  EXPECT_EQ(curve.force_n(curve.at(-0.01)), 0);
+  EXPECT_EQ(presses, 1);
+}
+
+TEST(ForceCurve, WhatIsNotInProportionIsSolvedForOnItsWay) {
+  const PressedBlockOptions block = block_of("neo_hookean");
+  int presses = 0;
+  ForceCurve curve(std::make_unique<Counted>(block, presses), 2, 0.003);
+  const double deep_n = curve.force_n(curve.at(0.012)), shallow_n = curve.force_n(curve.at(0.001));
+  EXPECT_GT(presses, 3);
+  EXPECT_GT(std::abs(deep_n / (12 * shallow_n) - 1), 0.01) << "such a law is not taken for proportional";
+  PressedBlock afresh(block);
+  afresh.press(deep_n);
+  EXPECT_NEAR(afresh.travel_m(), 0.012, 1e-4);
+}
+
+}  // namespace
+}  // namespace palpate::lab
