@@ -28,6 +28,7 @@ class LaterRobot : public acquisition::Robot {
   void wait(double duration_s) override { robot_.wait(duration_s); }
   double travel_sigma_m() const override { return robot_.travel_sigma_m(); }
   acquisition::RobotLimits limits() const override { return robot_.limits(); }
+  void on_the_way(bool is) override { robot_.on_the_way(is); }
   std::optional<DepthFrame> look(int view, int views) override {
     std::optional<DepthFrame> frame = robot_.look(view, views);
     if (frame) *frame = later(std::move(*frame));

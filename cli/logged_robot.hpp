@@ -24,6 +24,7 @@ class LoggedRobot : public acquisition::Robot {
   void wait(double duration_s) override { robot_.wait(duration_s); }
   double travel_sigma_m() const override { return robot_.travel_sigma_m(); }
   acquisition::RobotLimits limits() const override { return robot_.limits(); }
+  void on_the_way(bool is) override { robot_.on_the_way(is); }
   std::optional<DepthFrame> look(int view, int views) override { return robot_.look(view, views); }
 
   /// True when every image so far said which of its pixels show the robot.

@@ -37,6 +37,13 @@ void add_push_thresholds(CLI::App& app, acquisition::PushOptions& push) {
       positive_number());
   add(motion, "--search-distance", push.search_distance_m, "beyond the expected contact, m: how far to look for it", number_from_zero());
   add(motion, "--increment", push.increment_m, "of the tip between two looks at the force, m (at most 0.01)", positive_number());
+  add(motion, "--clearance", push.clearance_m,
+      "of the tip around the object's box on its way between pushes, m: more than the tool's radius", positive_number());
+  add(motion, "--tool-length", push.tool_length_m, "behind the tip, m: so much of the tool keeps out of that box, too", number_from_zero());
+  add(motion, "--look-every", push.look_every_m, "of the tip between two looks at the force, on its way between pushes, m (at most 0.05)",
+      positive_number());
+  add(motion, "--blind-retreat", push.blind_retreat_m,
+      "back along the tool, before and after the way to a push, where nobody knows how large the object is, m", positive_number());
   add(motion, "--approach-speed", push.approach_speed_m_s, "up to contact and away from the object, m/s", positive_number());
   add(motion, "--push-speed", push.push_speed_m_s, "in contact, m/s", positive_number());
   add(motion, "--sample-period", push.sample_period_s, "between two readings of the sensors, s", positive_number());

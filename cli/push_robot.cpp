@@ -96,6 +96,7 @@ class FromDriver : public PushRobot {
                   "--driver");
     scene_ = io::read_recording_unchecked(arguments.scene);
     scene_.pushes.clear();
+    around_ = acquisition::keep_out(scene_);
     if (scene_.tools.empty()) throw Error("names no tool; add `tools:`", arguments.scene.string());
     tool_ = arguments.tool.empty() ? scene_.tools.front().name : arguments.tool;
     bool known = false;
@@ -120,6 +121,7 @@ class FromDriver : public PushRobot {
     plan.contact_m = contact_m;
     plan.direction = direction;
     plan.R_base_tip = acquisition::tip_along(direction);
+    plan.around = around_;
     return plan;
   }
   bool reaches(const Vec3& contact_m, const Vec3& direction, double start_distance_m) const override {
@@ -144,6 +146,7 @@ class FromDriver : public PushRobot {
 
   DriverLibrary library_;
   Recording scene_;
+  std::optional<acquisition::KeepOut> around_;
   std::string tool_;
   std::vector<Place> places_;
 };

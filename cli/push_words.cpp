@@ -33,6 +33,10 @@ std::string stop_words(const acquisition::PushPlan& plan, const acquisition::Pus
 
 std::vector<std::string> push_warnings(const std::string& name, const acquisition::PushReport& report) {
   std::vector<std::string> out;
+  if (report.blind_retreat_m)
+    out.push_back(fmt::format("{}: how large the object is nobody said, so the arm went back {:.0f} mm along the tool and from there "
+                              "straight past it; give the scene a shape (a box will do), or look at `--blind-retreat`",
+                              name, 1000 * *report.blind_retreat_m));
   if (report.drift && report.steps > 0 && report.drift_n > 0.05 * report.highest_force_n)
     out.push_back(fmt::format("{}: the zero of the force moved by {:.3g} N during the push ({:.1f} N at most); taken off evenly over "
                               "its time. Let the sensor warm up, and keep cables from pulling",

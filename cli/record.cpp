@@ -155,6 +155,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
     made.told.push_back(json_of(plan, report));
     made.steps += report.steps;
     made.fine = made.fine && ended_well(report.stop);
+    if (report.stop == acquisition::StopReason::obstacle) break;  // a person looks first; --resume goes on
   }
   const bool nothing = made.steps == 0 && recorded.empty();
   session.say(nothing ? fmt::format("{}: nothing was recorded", arguments.output)

@@ -56,7 +56,10 @@ class Loop {
       }
       push(next, is_known(ranking.so_far, next.plan.region));
       if (next.report.stop == acquisition::StopReason::user) return end("stopped on request");
+      const bool hit = next.report.stop == acquisition::StopReason::obstacle;  // a person looks first
+      const std::string what = next.report.message;
       if (!pressed()) {
+        if (hit) return end(what);
         ++out_.fruitless;
         forget(next.plan.candidate);
         continue;
@@ -64,6 +67,7 @@ class Loop {
       estimate(false);
       if (out_.identified.answer.termination == Termination::cancelled) return end("stopped on request");
       take_in(std::move(next));
+      if (hit) return end(what);
     }
     return end(out_.message);
   }
@@ -113,12 +117,7 @@ class Loop {
     double deep_m = 0;
     if (!earlier_.empty() && is_pressed(earlier_.back()))
       deep_m = std::clamp((tip.translation() - last_load(earlier_.back()).contact_m).dot(along), 0.0, borne_.travel_limit_m);
-    for (const double share : {1.0, 0.5, 0.25, 0.125}) {  // as far as the robot does
-      if (hooks_.keep_going && !hooks_.keep_going()) return;
-      Pose back = tip;
-      back.translation() -= share * (deep_m + borne_.start_distance_m) * along;
-      if (robot_.move(back, borne_.approach_speed_m_s) == acquisition::Motion::done) return;
-    }
+    acquisition::step_back(robot_, deep_m, borne_, hooks_.keep_going);
   }
 
   static bool is_pressed(const Push& push) {
@@ -226,6 +225,7 @@ class Loop {
   void push(ExploredPush& next, bool stiffness_known) {
     acquisition::PushPlan plan = hooks_.plan(next.plan.candidate);
     plan.name = next.name = "push " + std::to_string(++number_);
+    if (!plan.around) plan.around = acquisition::keep_out(out_.scene.simulated.surface.rest().vertices_m, out_.scene.object.environment.planes);
     acquisition::PushOptions protocol = options_.push;
     protocol.travel_limit_m = std::min(protocol.travel_limit_m, next.plan.travel_m);
     if (stiffness_known) {
@@ -233,7 +233,10 @@ class Loop {
       protocol.force_limit_n = std::min(protocol.force_limit_n, 1.1 * next.plan.force_n);
       protocol.force_step_n = next.plan.force_n / options_.levels;
     } else {
-      protocol.force_step_n = first_step_n(plan, protocol);  // of which travel_limit_m is the whole push's
+      next.report = touch(plan, protocol);
+      using enum acquisition::StopReason;
+      if (next.report.stop == user || next.report.stop == obstacle) return;
+      protocol.force_step_n = first_step_n(next.report, protocol);  // of which travel_limit_m is the whole push's
     }
     bool begun = false;
     const auto on_step = [&](const Push& made, const Step& step) {
@@ -253,14 +256,16 @@ class Loop {
   }
 
   /// A short touch says how stiff it is there; nothing of it is recorded.
-  double first_step_n(const acquisition::PushPlan& plan, acquisition::PushOptions protocol) {
-    const double whole_m = std::min(protocol.travel_limit_m, borne_.travel_limit_m);
+  acquisition::PushReport touch(const acquisition::PushPlan& plan, acquisition::PushOptions protocol) {
     protocol.travel_limit_m = std::min(options_.touch_travel_m, protocol.travel_limit_m);
     protocol.force_step_n = protocol.force_limit_n;
     protocol.unloading_steps = 0;
-    const auto report = acquisition::run_push(robot_, plan, protocol, {}, hooks_.keep_going);
-    if (!(report.highest_force_n > 0) || !(report.deepest_m > 0)) return options_.push.force_step_n;
-    const double whole_n = report.highest_force_n / report.deepest_m * whole_m;
+    return acquisition::run_push(robot_, plan, protocol, {}, hooks_.keep_going);
+  }
+  double first_step_n(const acquisition::PushReport& touched, const acquisition::PushOptions& protocol) const {
+    if (!(touched.highest_force_n > 0) || !(touched.deepest_m > 0)) return options_.push.force_step_n;
+    const double whole_m = std::min(protocol.travel_limit_m, borne_.travel_limit_m);
+    const double whole_n = touched.highest_force_n / touched.deepest_m * whole_m;
     return std::max(1e-3, std::min(whole_n, borne_.force_limit_n) / options_.levels);
   }
 

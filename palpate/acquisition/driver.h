@@ -74,7 +74,8 @@ struct PalpateRobot {
   int (*read)(void* self, struct PalpateRobotState* state);
   int (*move)(void* self, const struct PalpatePose* T_base_tip, double speed_m_s); /**< on a straight line; returns when the
                                                                                         tip stands */
-  int (*stop)(void* self); /**< brings the arm to rest where it is */
+  int (*stop)(void* self); /**< brings the arm to rest where it is; comes between two motions, never during one: long ones come in
+                                pieces (of 10 mm, where the user says nothing else), so that no stop has to wait */
   int (*take_depth_image)(void* self, struct PalpateDepthImage* image);
   int (*wait)(void* self, double duration_s);
   double (*travel_sigma_m)(void* self); /**< standard deviation of the encoders' tip position along a push */

@@ -21,6 +21,10 @@ void check(const PushOptions& o) {
   need(o.start_distance_m > 0, "start_distance_m", "must be positive");
   need(o.search_distance_m >= 0, "search_distance_m", "must not be negative");
   need(o.increment_m > 0 && o.increment_m <= 0.01, "increment_m", "must be positive and at most 10 mm");
+  need(o.clearance_m > 0, "clearance_m", "must be positive");
+  need(o.tool_length_m >= 0, "tool_length_m", "must not be negative");
+  need(o.look_every_m > 0 && o.look_every_m <= 0.05, "look_every_m", "must be positive and at most 50 mm");
+  need(o.blind_retreat_m > 0, "blind_retreat_m", "must be positive");
   need(o.approach_speed_m_s > 0, "approach_speed_m_s", "must be positive");
   need(o.push_speed_m_s > 0, "push_speed_m_s", "must be positive");
   need(o.sample_period_s > 0, "sample_period_s", "must be positive");
@@ -65,6 +69,8 @@ const char* to_words(StopReason reason) {
       return "no contact";
     case StopReason::robot_limit:
       return "limit of the robot";
+    case StopReason::obstacle:
+      return "hit something on the way";
     case StopReason::moved:
       return "moved since the part that is recorded";
     case StopReason::user:

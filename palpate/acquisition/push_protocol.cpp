@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "palpate/acquisition/guarded_motion.hpp"
 #include "palpate/acquisition/push_run.hpp"
 #include "palpate/core/error.hpp"
 
@@ -24,6 +25,22 @@ PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& optio
   if (std::abs(plan.direction.norm() - 1) > 1e-6) throw Error("must have unit length", "PushPlan.direction");
   if (plan.tool.empty()) throw Error("must name a tool of the recording", "PushPlan.tool");
   return PushRun(robot, plan, options, on_step, keep_going, so_far).run();
+}
+
+void step_back(Robot& robot, double deep_m, const PushOptions& options, const std::function<bool()>& keep_going) {
+  const OnTheWay on_the_way(robot);
+  try {
+    GuardedMotion motion(robot, options, [&] {
+      if (keep_going && !keep_going()) throw Stopped{StopReason::user, ""};
+    });
+    Pose back = motion.here();
+    back.translation() -= (deep_m + options.start_distance_m) * back.linear().col(2);
+    constexpr double felt_m = 0.02;  // what was pressed has come back by then
+    motion.go(back, {deep_m + felt_m, deep_m > 0});
+  } catch (const Stopped& stop) {
+    robot.stop();
+    if (stop.reason == StopReason::obstacle) throw Error(stop.message, "robot");
+  }
 }
 
 Push whole_push(Robot& robot, const PushPlan& plan, const PushOptions& options) {

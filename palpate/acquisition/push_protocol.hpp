@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "palpate/acquisition/keep_out.hpp"
 #include "palpate/acquisition/robot.hpp"
 #include "palpate/core/force_drift.hpp"
 #include "palpate/core/recording.hpp"
@@ -21,6 +22,8 @@ struct PushPlan {
   Vec3 contact_m = Vec3::Zero();       ///< where the surface is expected
   Vec3 direction = -Vec3::UnitZ();     ///< unit vector, into the object
   Mat3 R_base_tip = Mat3::Identity();  ///< orientation of the tip throughout
+  /// What the tip goes around on its way here. Nothing: it is not known how large the object is (PushOptions::blind_retreat_m).
+  std::optional<KeepOut> around;
 };
 
 /// A tip's orientation for a push: z along it, x as near to the base's forward as that allows (a round tip's roll is free).
@@ -35,6 +38,10 @@ struct PushOptions {
   double search_distance_m = 0.03;  ///< beyond it: how far to look for contact
   /// Of the tip between two looks at the force; less where the object is so stiff that it would pass a force step or the limit.
   double increment_m = 0.0005;
+  double clearance_m = 0.04;         ///< of the tip's middle around the object's box, on its way between pushes; more than the tool's radius
+  double tool_length_m = 0.25;       ///< behind the tip: what keeps out of that box, too
+  double look_every_m = 0.01;        ///< of the tip between two looks at the force, on its way
+  double blind_retreat_m = 0.15;     ///< along the tool, before and after a straight way past an object whose size nobody knows
   double approach_speed_m_s = 0.02;
   double push_speed_m_s = 0.005;
   double sample_period_s = 0.02;
@@ -67,6 +74,7 @@ enum class StopReason {
   contact_lost,
   no_contact,
   robot_limit,  ///< the robot refused a motion
+  obstacle,     ///< something was felt on the way between pushes
   moved,        ///< a push that goes on finds contact elsewhere than the part that is recorded
   user
 };
@@ -82,6 +90,8 @@ struct PushReport {
   /// Of the highest force above the limit, where noise does not explain it; more than a tenth of the limit means that the object
   /// was stiffer than a motion foresaw (at the first touch up to stiffness times increment_m).
   double overshoot_n = 0;
+  /// Nobody knows how large the object is: the way there went straight past it, after this much back along the tool.
+  std::optional<double> blind_retreat_m;
   int steps = 0;               ///< recorded now, resumed ones not counted
   std::vector<int> unsettled;  ///< indices (in the push) of steps whose force still crept
   Vec3 tare_n = Vec3::Zero();  ///< taken off every force
@@ -98,7 +108,8 @@ struct PushReport {
 /// flight.
 using OnStep = std::function<void(const Push& push, const Step& step)>;
 
-/// Runs one push, within the robot's own limits.
+/// Runs one push, within the robot's own limits. The tip comes from wherever it stands: back along its tool, around the object and
+/// in along the push's own line, in short pieces with a look at the force after each (StopReason::obstacle).
 /// @param keep_going  asked before every motion and while it waits; false stops the robot where it is (StopReason::user)
 /// @param so_far  steps of the same push that an earlier run has recorded: they are not recorded again, and the force rises
 ///                from where they end; where the way back had begun, from its top once more. Travel counts from their zero,
@@ -107,6 +118,10 @@ using OnStep = std::function<void(const Push& push, const Step& step)>;
 ///         still moved.
 PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
                     const std::function<bool()>& keep_going = {}, const Push* so_far = nullptr);
+
+/// Back along the tool by the start distance, out of an object that it may be so deep in: as far as the robot does, in short pieces.
+/// @throws Error when something is hit  @returns early, with the robot stopped, where the user says so
+void step_back(Robot& robot, double deep_m, const PushOptions& options, const std::function<bool()>& keep_going = {});
 
 /// Runs one push and hands it over whole, the sensor's drift taken off.
 Push whole_push(Robot& robot, const PushPlan& plan, const PushOptions& options);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "palpate/acquisition/ways_around.hpp"
+
 namespace palpate::acquisition {
 
 PushRun::PushRun(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
@@ -50,8 +52,9 @@ void PushRun::push() {
   } catch (const Stopped& stop) {
     told(stop);
   }
-  if (report_.stop != StopReason::user) retreat();
-  if (report_.stop == StopReason::user) robot_.stop();  // where it is: only the user knows why
+  // From beside the push's line nobody knows what lies between.
+  if (report_.stop != StopReason::user && in_front_) retreat();
+  if (report_.stop == StopReason::user || !in_front_) robot_.stop();  // where it is: only the user knows why
 }
 
 void PushRun::let_go() noexcept {
@@ -65,10 +68,9 @@ void PushRun::let_go() noexcept {
   quietly([&] { return robot_.stop(), true; });
   if (!in_front_) return;  // the tip has not been on the push's line yet: nobody knows what lies between
   // All the way, or as much of it as the robot does; a user who wants it to stand is still obeyed.
-  for (const double share : {1.0, 0.5, 0.25, 0.125}) {
+  for (const Pose& back : in_pieces(pose_at(at_m_), pose_at(-options_.start_distance_m), options_.look_every_m, 1)) {
     if (quietly([&] { return keep_going_ && !keep_going_(); })) return;
-    const double back_m = share * (at_m_ + options_.start_distance_m);
-    if (quietly([&] { return robot_.move(pose_at(at_m_ - back_m), options_.approach_speed_m_s) == Motion::done; })) return;
+    if (!quietly([&] { return robot_.move(back, options_.approach_speed_m_s) == Motion::done; })) return;
   }
 }
 
@@ -95,16 +97,32 @@ void PushRun::go_back_step_by_step() {
   }
 }
 
+void PushRun::go_back_to_start() {
+  {
+    const OnTheWay on_the_way(robot_);
+    GuardedMotion motion(robot_, options_, [this] { ask_user(); });
+    const auto stands_here = [&] { at_m_ = along(motion.here().translation() - plan_.contact_m); };
+    try {
+      go_or_stop(motion, pose_at(-options_.start_distance_m), {pressed_m(motion.here()) + options_.search_distance_m, true});
+    } catch (...) {
+      stands_here();
+      throw;
+    }
+    stands_here();
+  }
+  move_to(-options_.start_distance_m, options_.approach_speed_m_s);
+}
+
 void PushRun::retreat() {
   try {
-    move_to(-options_.start_distance_m, options_.approach_speed_m_s);
+    go_back_to_start();
     const FreeAir air = listen();
     report_.drift_n = (air.mean_n - report_.tare_n).norm();
     if (loaded_) report_.drift = ForceDrift{(air.mean_n - report_.tare_n) / (air.time_s - tared_at_s_), tared_at_s_};
     if (report_.stop != StopReason::no_contact) record(air.last, {}, 0, true);
   } catch (const Stopped& stop) {
     robot_.stop();
-    if (stop.reason == StopReason::user) return told(stop);
+    if (stop.reason == StopReason::user || stop.reason == StopReason::obstacle) return told(stop);
     report_.message += "; then " + stop.message;
   }
 }

@@ -9,17 +9,14 @@
 #include <string>
 #include <vector>
 
+#include "palpate/acquisition/guarded_motion.hpp"
 #include "palpate/acquisition/motion_lengths.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/acquisition/recorded_part.hpp"
+#include "palpate/acquisition/stopped.hpp"
 #include "palpate/acquisition/torque_mean.hpp"
 
 namespace palpate::acquisition {
-
-struct Stopped {
-  StopReason reason;
-  std::string message;
-};
 
 class PushRun {
  public:
@@ -73,6 +70,18 @@ class PushRun {
   }
 
   void move_to(double distance_m, double speed_m_s);
+
+  // From wherever the tip stands, clear of the object; the last motion is move_to().
+  void come_to_start();
+  bool stands_on_the_line(const Pose& tip) const;
+  double pressed_m(const Pose& tip) const;
+  void go_around(GuardedMotion& motion, const KeepOut& around);
+  void go_blindly(GuardedMotion& motion);
+  void go_or_stop(GuardedMotion& motion, const Pose& to, const Leaving& leaving = {});
+  // False where the robot refuses every way; where each ended is added.
+  bool go_one_of(GuardedMotion& motion, const KeepOut& box, const Pose& to, std::vector<Pose>& refused);
+  // Back to where the push began.
+  void go_back_to_start();
 
   struct FreeAir {
     Vec3 mean_n = Vec3::Zero();

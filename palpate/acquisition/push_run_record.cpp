@@ -34,7 +34,7 @@ PushRun::FreeAir PushRun::listen() {
 }
 
 void PushRun::look_at_rest() {
-  move_to(-options_.start_distance_m, options_.approach_speed_m_s);
+  come_to_start();
   const FreeAir air = listen();
   report_.tare_n = air.mean_n;
   tared_at_s_ = air.time_s;

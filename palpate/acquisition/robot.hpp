@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the push protocol needs of a robot. A driver implements these six calls, and the two that not every robot can answer where
-// it can; the lab's software arm is one of them.
+// What the push protocol needs of a robot. A driver implements these six calls, and the others where it can; the lab's software arm
+// is one of them.
 #pragma once
 
 #include <functional>
@@ -43,7 +43,7 @@ class Robot {
  public:
   virtual ~Robot() = default;
   virtual RobotState read() = 0;
-  /// Moves the tip on a straight line; returns when it stands.
+  /// Moves the tip on a straight line; returns when it stands. Long ways come in short motions: between them the user may stop it.
   virtual Motion move(const Pose& T_base_tip, double speed_m_s) = 0;
   /// Brings the arm to rest where it is.
   virtual void stop() = 0;
@@ -55,6 +55,9 @@ class Robot {
   virtual double travel_sigma_m() const = 0;
   /// Asked before every push, which then ends at the lower of these and its own. A robot that wraps another hands them on.
   virtual RobotLimits limits() const { return {}; }
+  /// True: until the next false nothing is recorded of what it does and reads, the tip is on its way between pushes. It need not care;
+  /// a lab keeps the noise of what is recorded apart. A robot that wraps another hands it on.
+  virtual void on_the_way([[maybe_unused]] bool is) {}
   /// Carries its camera to the `view`-th, from 0, of `views` places of its own choosing around the untouched object and looks from
   /// there; the arm does not hide the object, or the image's mask says where. Nothing, and no motion: its camera is not carried.
   virtual std::optional<DepthFrame> look([[maybe_unused]] int view, [[maybe_unused]] int views) { return std::nullopt; }

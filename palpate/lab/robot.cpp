@@ -75,11 +75,14 @@ acquisition::RobotState LabRobot::read() {
   const double steady = lab.force();
   const double fading = steady > 0 ? lab.fading_n * std::exp(-(lab.clock_s - lab.moved_s) / lab.options.relaxation_s) : 0;
   const Pose stands = lab.pose_of(lab.hand, lab.true_joints), said = lab.pose_of(lab.hand, lab.commanded);
-  const Vec3 force_n = (steady + fading) * lab.site().direction, acts_m = lab.force_acts_at_m();
-  state.force_n = said.linear() * lab.wrist->read(force_n, stands.linear(), lab.clock_s, lab.force_random);
+  const Vec3 pressed_n = (steady + fading) * lab.site().direction, acts_m = lab.force_acts_at_m(), met_n = lab.met_n();
+  Random& noise = lab.on_the_way ? lab.way_force_random : lab.force_random;
+  state.force_n = said.linear() * lab.wrist->read(pressed_n + met_n, stands.linear(), lab.clock_s, noise);
   // About the tip, as a driver reckons it from what joints and sensor say.
+  const Vec3 true_nm = (acts_m - stands.translation()).cross(pressed_n) +
+                       (lab.tip_of(lab.true_joints).translation() - stands.translation()).cross(met_n);
   const Vec3 at_wrist_nm =
-      said.linear() * lab.wrist->read_torque((acts_m - stands.translation()).cross(force_n), stands.linear(), lab.torque_random);
+      said.linear() * lab.wrist->read_torque(true_nm, stands.linear(), lab.on_the_way ? lab.way_force_random : lab.torque_random);
   state.torque_nm = at_wrist_nm - (state.T_base_tip.translation() - said.translation()).cross(state.force_n);
   return state;
 }
@@ -87,19 +90,37 @@ acquisition::RobotState LabRobot::read() {
 acquisition::Motion LabRobot::move(const Pose& T_base_tip, double speed_m_s) {
   Impl& lab = *impl_;
   if (!(speed_m_s > 0)) throw Error("must be positive", "speed_m_s");
-  const auto joints = sensing::reach(lab.mask.kinematics(), lab.tip, T_base_tip, lab.commanded);
+  const auto reached = [&](const Pose& pose) {
+    return sensing::reach(lab.mask.kinematics(), lab.tip, pose, lab.on_the_way ? lab.commanded : lab.moved_to);
+  };
+  auto joints = reached(T_base_tip);
   if (!joints) return acquisition::Motion::refused;
   const double before = lab.force();
-  lab.clock_s += (T_base_tip.translation() - lab.tip_of(lab.commanded).translation()).norm() / speed_m_s;
-  lab.commanded = *joints;
-  lab.true_joints = *joints;
-  for (double& q : lab.true_joints) q += lab.options.joint_std_rad * lab.joint_random.normal();
+  const Pose from = lab.tip_of(lab.commanded);
+  const Vec3 truly_from_m = lab.tip_of(lab.true_joints).translation();
+  std::vector<double> errors_rad;
+  for (std::size_t i = 0; i < joints->size(); ++i)
+    errors_rad.push_back(lab.options.joint_std_rad * (lab.on_the_way ? lab.way_joint_random : lab.joint_random).normal());
+  const auto come_to = [&](const std::vector<double>& there) {
+    lab.commanded = lab.true_joints = there;
+    for (std::size_t i = 0; i < there.size(); ++i) lab.true_joints[i] += errors_rad[i];
+  };
+  come_to(*joints);
+  const double share = lab.goes_as_far_as(truly_from_m, lab.tip_of(lab.true_joints).translation());
+  if (share < 1) {  // it stands against the object
+    Pose stopped = T_base_tip;
+    stopped.translation() = from.translation() + share * (T_base_tip.translation() - from.translation());
+    if (const auto nearer = reached(stopped)) come_to(*nearer);
+  }
+  if (!lab.on_the_way) lab.moved_to = lab.commanded;
+  lab.clock_s += share * (T_base_tip.translation() - from.translation()).norm() / speed_m_s;
   lab.slide();
   lab.moved_s = lab.clock_s;
   lab.fading_n = lab.options.relaxation * std::max(0.0, lab.force() - before);
   return acquisition::Motion::done;
 }
 
+void LabRobot::on_the_way(bool is) { impl_->on_the_way = is; }
 void LabRobot::wait(double duration_s) { impl_->clock_s += duration_s; }
 
 double LabRobot::travel_sigma_m() const {
@@ -157,6 +178,7 @@ acquisition::PushPlan LabRobot::plan(std::size_t site) {
   plan.contact_m = lab.site().contact_m;
   plan.direction = lab.site().direction;
   plan.R_base_tip = acquisition::tip_along(plan.direction);
+  plan.around = acquisition::keep_out(lab.object.surface.vertices_m, lab.planes);
   return plan;
 }
 

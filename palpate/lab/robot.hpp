@@ -52,6 +52,7 @@ class LabRobot : public acquisition::Robot {
   ~LabRobot() override;
 
   acquisition::RobotState read() override;
+  /// A tip that meets the object elsewhere than at the site that is pushed stops there, and the force says so.
   acquisition::Motion move(const Pose& T_base_tip, double speed_m_s) override;
   void stop() override {}
   DepthFrame take_depth_image() override;
@@ -59,6 +60,7 @@ class LabRobot : public acquisition::Robot {
   double travel_sigma_m() const override;
   /// As much force as the sensor can tell: beyond its range the reading stays, however hard the tip presses.
   acquisition::RobotLimits limits() const override;
+  void on_the_way(bool is) override;
   /// One image of look_around().
   std::optional<DepthFrame> look(int view, int views) override;
 

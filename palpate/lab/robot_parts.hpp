@@ -47,7 +47,10 @@ struct LabRobot::Impl {
         joint_random(given.seed, 1),
         force_random(given.seed, 2),
         depth_random(given.seed, 3),
-        torque_random(given.seed, 7) {
+        torque_random(given.seed, 7),
+        way_joint_random(given.seed, 8),
+        way_force_random(given.seed, 9),
+        at_rest(object.surface) {
     if (object.sites.empty() || !object.press) throw Error("needs a site and a truth", "LabObject");
     curves.resize(object.sites.size());
     Random once(options.seed, 0);
@@ -57,7 +60,7 @@ struct LabRobot::Impl {
     if (turn.norm() > 0) T_true_stated.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
     Random of_camera(options.seed, 5);
     options.depth.bias_m = options.depth.bias_std_m * of_camera.normal();
-    commanded = true_joints = {0, 0.3, 1.2, 0, 1.6, 0, 0.05};
+    commanded = moved_to = true_joints = {0, 0.3, 1.2, 0, 1.6, 0, 0.05};
     for (std::size_t i = 0; i < mask.kinematics().robot().links.size(); ++i)
       for (const RobotShape& shape : mask.kinematics().robot().links[i].visual) {
         TriMesh mesh = sensing::shape_mesh(shape);
@@ -72,6 +75,8 @@ struct LabRobot::Impl {
     camera.cy_px = 238.1;
     const Vec3 low = object.surface.vertices_m.colwise().minCoeff().transpose(),
                high = object.surface.vertices_m.colwise().maxCoeff().transpose();
+    low_m = low;
+    high_m = high;
     table.point_m = Vec3(0.5 * (low(0) + high(0)), 0.5 * (low(1) + high(1)), low(2));
     planes.push_back(table);
     for (const Support& support : object.supports)
@@ -112,6 +117,34 @@ struct LabRobot::Impl {
     const Vec3 offset = tip_of(true_joints).translation() - site().contact_m - slid_m;
     const double along = offset.dot(site().direction);
     return (offset - along * site().direction).norm() < 0.014 ? along : 0;
+  }
+  // Deeper in it than nothing, of the stick's round end; away from where the active site is pressed, whose truth is solved for.
+  Vec3 into_elsewhere_m(const Vec3& tip_m) const {
+    constexpr double pressed_within_m = 0.014, before_site_m = 0.02;
+    const Vec3 point_m = tip_m - slid_m, offset = point_m - site().contact_m;
+    const double along = offset.dot(site().direction);
+    if (along > -before_site_m && (offset - along * site().direction).norm() < pressed_within_m) return Vec3::Zero();
+    const double radius_m = ArmOptions{}.stick_radius_m;
+    const bool near = at_rest.within(point_m, radius_m * radius_m);
+    const bool inside = (point_m - low_m).minCoeff() > 0 && (high_m - point_m).minCoeff() > 0 &&
+                        at_rest.crossings(point_m, Vec3(0.48, 0.36, 0.8)) % 2 == 1;
+    if (!near && !inside) return Vec3::Zero();
+    const Vec3 away_m = at_rest.closest(point_m).point_m - point_m;
+    if (!(away_m.norm() > 1e-9)) return radius_m * (tip_of(true_joints).linear().col(2));
+    return (inside ? -(radius_m + away_m.norm()) : radius_m - away_m.norm()) * away_m.normalized();
+  }
+  /// How far along a straight motion the tip gets before it stands in the object: a share of it, or all.
+  double goes_as_far_as(const Vec3& from_m, const Vec3& to_m) const {
+    if (into_elsewhere_m(from_m).norm() > 0) return 1;  // out of there, too
+    const int pieces = std::max(1, int(std::ceil((to_m - from_m).norm() / 0.001)));
+    for (int k = 1; k <= pieces; ++k)
+      if (into_elsewhere_m(from_m + double(k) / pieces * (to_m - from_m)).norm() > 0) return std::min(1.0, (k + 0.5) / pieces);
+    return 1;
+  }
+  /// Of the tip on the object where it is not pushed: stiff, so that nobody overlooks it.
+  Vec3 met_n() const {
+    constexpr double stiff_n_m = 2e4;
+    return stiff_n_m * into_elsewhere_m(tip_of(true_joints).translation());
   }
   // Of a push that is to go through this point, near the surface or on it.
   Vec3 where_it_meets(const Vec3& contact_m, const Vec3& direction) const {
@@ -195,7 +228,14 @@ struct LabRobot::Impl {
   Plane table;
   std::vector<Plane> planes;  // the table, and what is upright
   Random joint_random, force_random, depth_random, torque_random;
+  // Ways between pushes have noise of their own, and leave no trace in how the arm stands at the next push: what a recording holds
+  // is not changed by how the tip came there.
+  Random way_joint_random, way_force_random;
+  bool on_the_way = false;
+  geometry::TriangleTree at_rest;
+  Vec3 low_m = Vec3::Zero(), high_m = Vec3::Zero();  // of the object's surface
   std::vector<double> commanded, true_joints;
+  std::vector<double> moved_to;  // by the last motion of a push
   std::vector<std::pair<std::size_t, TriMesh>> bodies;  // link, mesh in its frame
   Camera camera;
   Pose T_base_camera, T_true_stated = Pose::Identity();

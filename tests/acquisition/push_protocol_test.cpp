@@ -308,6 +308,10 @@ TEST(PushProtocol, BadOptionsAndPlansAreRefused) {
   EXPECT_TRUE(refused([](O& o) { o.start_distance_m = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.search_distance_m = -1; }));
   EXPECT_TRUE(refused([](O& o) { o.increment_m = 0.02; }));
+  EXPECT_TRUE(refused([](O& o) { o.clearance_m = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.tool_length_m = -1; }));
+  EXPECT_TRUE(refused([](O& o) { o.look_every_m = 0.1; }));
+  EXPECT_TRUE(refused([](O& o) { o.blind_retreat_m = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.approach_speed_m_s = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.push_speed_m_s = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.sample_period_s = 0; }));

@@ -108,7 +108,7 @@ TEST(RobotLimits, ThoseThatCannotBeAreNamedBeforeAnythingMoves) {
   refused({1, 1, nan}, "speed_m_s");
   using enum StopReason;
   for (const StopReason reason : {force_limit, travel_limit, robot_force_limit, robot_travel_limit}) EXPECT_TRUE(is_at_a_limit(reason));
-  for (const StopReason reason : {slip, contact_lost, no_contact, robot_limit, moved, user}) EXPECT_FALSE(is_at_a_limit(reason));
+  for (const StopReason reason : {slip, contact_lost, no_contact, robot_limit, obstacle, moved, user}) EXPECT_FALSE(is_at_a_limit(reason));
 }
 
 struct LookingRobot : SpringRobot {

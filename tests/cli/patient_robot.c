@@ -22,16 +22,25 @@ static void say(const char* call) {
   fclose(log);
 }
 
+static void pass(double duration_s) {
+  const long long ns = (long long)(1e8 * duration_s);
+  struct timespec rest = {(time_t)(ns / 1000000000), (long)(ns % 1000000000)};
+  while (nanosleep(&rest, &rest) != 0) {
+  }
+}
+
 static int wait_really(void* self, double duration_s) {
-  const long ns = (long)(1e8 * duration_s);
-  const struct timespec rest = {ns / 1000000000, ns % 1000000000};
-  nanosleep(&rest, NULL);
+  pass(duration_s);
   return spring.wait(self, duration_s);
 }
 
 static int move_and_say(void* self, const struct PalpatePose* T_base_tip, double speed_m_s) {
+  const double before_s = ((struct World*)self)->clock_s;
+  int answer;
   say("move");
-  return spring.move(self, T_base_tip, speed_m_s);
+  answer = spring.move(self, T_base_tip, speed_m_s);
+  pass(((struct World*)self)->clock_s - before_s);
+  return answer;
 }
 
 static int stop_and_say(void* self) {

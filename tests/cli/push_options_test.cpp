@@ -37,7 +37,8 @@ TEST(PushOptionWords, NothingSaidIsTheProtocolsOwnAndTheObjectsLimits) {
 TEST(PushOptionWords, EveryNumberArrives) {
   const acquisition::PushOptions p = parsed(
       {"--force-limit", "1.5", "--travel-limit", "0.02", "--force-step", "0.3", "--unloading-steps", "4", "--contact-std", "0.005",
-       "--start-distance", "0.06", "--search-distance", "0.07", "--increment", "0.0008", "--approach-speed", "0.09", "--push-speed", "0.01",
+       "--start-distance", "0.06", "--search-distance", "0.07", "--increment", "0.0008", "--clearance", "0.03", "--tool-length", "0.5", "--look-every", "0.02",
+       "--blind-retreat", "0.31", "--approach-speed", "0.09", "--push-speed", "0.01",
        "--sample-period", "0.011", "--free-air-samples", "12", "--contact-threshold", "0.13", "--contact-noise-factor", "14",
        "--contact-samples", "15", "--settling-rate", "0.16", "--settling-relative-rate", "0.17", "--settling-window", "0.18",
        "--settling-timeout", "19", "--slip-sideways", "0.2", "--slip-friction", "0.21", "--slip-force-drop", "0.22", "--slip-deeper",
@@ -50,6 +51,10 @@ TEST(PushOptionWords, EveryNumberArrives) {
   EXPECT_EQ(p.start_distance_m, 0.06);
   EXPECT_EQ(p.search_distance_m, 0.07);
   EXPECT_EQ(p.increment_m, 0.0008);
+  EXPECT_EQ(p.clearance_m, 0.03);
+  EXPECT_EQ(p.tool_length_m, 0.5);
+  EXPECT_EQ(p.look_every_m, 0.02);
+  EXPECT_EQ(p.blind_retreat_m, 0.31);
   EXPECT_EQ(p.approach_speed_m_s, 0.09);
   EXPECT_EQ(p.push_speed_m_s, 0.01);
   EXPECT_EQ(p.sample_period_s, 0.011);

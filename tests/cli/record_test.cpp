@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -80,6 +82,25 @@ TEST_F(Record, CtrlCStopsTheArmWhereItStandsAndKeepsEveryFinishedStep) {
   EXPECT_GE(recording.pushes[0].steps.size(), 2u);
   EXPECT_LT(recording.pushes[0].steps.size(), 7u) << "it was not whole yet";
   EXPECT_THAT(said, HasSubstr("\"steps\": " + std::to_string(recording.pushes[0].steps.size())));
+}
+
+// From 0.15 m above the place where the push begins: 7.5 s of the robot's clock.
+TEST_F(Record, CtrlCOnALongWayStopsItThere) {
+  const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT));
+  const auto motions = [&] {
+    const std::string calls = fs::exists(path("calls")) ? folder.get("calls") : "";
+    return std::count(calls.begin(), calls.end(), '\n');
+  };
+  for (int waited = 0; motions() < 5 && waited < 3000; ++waited) usleep(10000);
+  const auto before = motions();
+  ASSERT_GE(before, 5);
+  ASSERT_LT(before, 12) << "in the middle of it";
+  kill(child, SIGINT);
+  EXPECT_EQ(wait_for(child), numbers) << said;
+  EXPECT_THAT(said, HasSubstr("stopped on request"));
+  EXPECT_TRUE(folder.get("calls").ends_with("stop\n"));
+  EXPECT_LE(motions(), before + 3) << "the piece that it was at, one that had begun meanwhile, and the stop";
+  EXPECT_FALSE(fs::exists(path("recording")));
 }
 
 TEST_F(Record, KilledItGoesOnAsIfNothingHadBeen) {

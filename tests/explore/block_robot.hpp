@@ -101,7 +101,9 @@ class BlockRobot : public acquisition::Robot {
 
  private:
   double force_n() const {
-    const double travel_m = (tip_.translation() - contact_m_).dot(direction_);
+    const Vec3 off_m = tip_.translation() - contact_m_;
+    const double travel_m = off_m.dot(direction_);
+    if ((off_m - travel_m * direction_).norm() > 0.002) return 0;  // on its way past the block
     return give_m_per_n_ > 0 ? std::max(0.0, travel_m) / give_m_per_n_ : 0;
   }
   void press() {
