@@ -78,8 +78,8 @@ acquisition::RobotState LabRobot::read() {
   const Vec3 force_n = (steady + fading) * lab.site().direction, acts_m = lab.force_acts_at_m();
   state.force_n = said.linear() * lab.wrist->read(force_n, stands.linear(), lab.clock_s, lab.force_random);
   // About the tip, as a driver reckons it from what joints and sensor say.
-  const Vec3 at_wrist_nm =
-      said.linear() * lab.wrist->read_torque((acts_m - stands.translation()).cross(force_n), stands.linear(), lab.torque_random);
+  const Vec3 at_wrist_nm = said.linear() * lab.wrist->read_torque((acts_m - stands.translation()).cross(force_n), force_n,
+                                                                  stands.linear(), lab.clock_s, lab.torque_random);
   state.torque_nm = at_wrist_nm - (state.T_base_tip.translation() - said.translation()).cross(state.force_n);
   return state;
 }
