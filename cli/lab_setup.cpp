@@ -40,8 +40,8 @@ void add_lab_options(CLI::App& app, LabArguments& arguments) {
     for (const auto& row : table) text += fmt::format("\n{}: {}", row.name, row.source);
     return text;
   };
-  app.add_option("--depth-sensor", arguments.depth_sensor, "one of" + rows(lab::depth_sensors()))->capture_default_str();
-  app.add_option("--force-sensor", arguments.force_sensor, "one of" + rows(lab::force_sensors()))->capture_default_str();
+  app.add_option("--depth-sensor", arguments.depth_sensor, "one of (the source of every number: docs/lab.md)" + rows(lab::depth_sensors()))->capture_default_str();
+  app.add_option("--force-sensor", arguments.force_sensor, "one of (the source of every number: docs/lab.md)" + rows(lab::force_sensors()))->capture_default_str();
   app.add_option("--young-modulus", arguments.young_modulus_pa,
                  "of the true object, Pa (default: drawn from the seed, 10 to 40 kPa; bar: ten times that)")
       ->check(positive_number());

@@ -3,20 +3,37 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <system_error>
 
 #include "palpate/io/file.hpp"
+#include "palpate/io/message_source.hpp"
 #include "palpate/io/recording_writer.hpp"
 #include "palpate/io/ros_messages.hpp"
+#include "palpate/io/urdf.hpp"
 #include "palpate/io/yaml_text.hpp"
 
 namespace palpate::cli {
 namespace {
 
 /// The recorder starts its clock at a second, so that no stamp is the zero that means "none".
-std::int64_t stamp_of(double time_s) { return 1'000'000'000 + std::llround(time_s * 1e9); }
+constexpr std::int64_t begin_ns = 1'000'000'000;
+std::int64_t stamp_of(double time_s) { return begin_ns + std::llround(time_s * 1e9); }
 
 }  // namespace
+
+io::BagFolder earlier_raw_bag(const std::filesystem::path& folder) {
+  io::BagFolder bag;
+  std::error_code code;
+  if (std::filesystem::exists(folder / "mapping.yaml", code) && io::is_bag(folder)) bag.put_all(folder);
+  return bag;
+}
+
+double not_before_s(const io::BagFolder& bag) {
+  constexpr double pause_s = 1;
+  return bag.last_ns() > begin_ns ? double(bag.last_ns() - begin_ns) * 1e-9 + pause_s : 0;
+}
 
 void LoggedRobot::put(const std::string& topic, const std::string& type, double time_s, const std::string& data) {
   bag_.put(topic, type, stamp_of(time_s), data);
@@ -30,10 +47,16 @@ acquisition::RobotState LoggedRobot::read() {
   put("/wrench", "geometry_msgs/msg/WrenchStamped", state.time_s, io::encode(io::RosWrench{{stamp, "base"}, state.force_n, torque_nm}));
   put("/tf", "tf2_msgs/msg/TFMessage", state.time_s,
       io::encode(std::vector<io::RosTransform>{{{stamp, "base"}, "tip", state.T_base_tip}}));
-  if (joint_names_.size() == state.joints_rad.size())
+  if (scene_.joint_names.size() == state.joints_rad.size())
     put("/joint_states", "sensor_msgs/msg/JointState", state.time_s,
-        io::encode(io::RosJointState{{stamp, ""}, joint_names_, state.joints_rad}));
+        io::encode(io::RosJointState{{stamp, ""}, scene_.joint_names, state.joints_rad}));
   return state;
+}
+
+double LoggedRobot::travel_sigma_m() const {
+  const double sigma_m = robot_.travel_sigma_m();
+  largest_sigma_m_ = std::max(largest_sigma_m_, sigma_m);
+  return sigma_m;
 }
 
 DepthFrame LoggedRobot::take_depth_image() {
@@ -53,25 +76,38 @@ DepthFrame LoggedRobot::take_depth_image() {
   return frame;
 }
 
-void LoggedRobot::write_bag(const Recording& scene, const std::filesystem::path& given) {
+std::string LoggedRobot::mapping_text(const std::filesystem::path& folder, const acquisition::PushOptions& protocol) const {
+  std::string mapping = "format: palpate-mapping/1\n" + io::object_text(scene_, folder);
+  mapping += "topics:\n  wrench: /wrench\n";
+  if (scene_.robot && !scene_.joint_names.empty()) mapping += "  joints: /joint_states\n";
+  if (camera_.camera.width_px > 0) {
+    io::YamlLine line;
+    line.put("image", "/camera/depth/image").put("info", "/camera/depth/camera_info");
+    if (camera_.mask.size() > 0) line.put("mask", "/camera/mask");
+    if (scene_.robot && masked_) line.put("mask_robot", "false");  // the masks are in the bag
+    line.put("noise", io::depth_noise_yaml(camera_.noise));
+    line.number("pose_std_m", camera_.pose_std_m).number("pose_std_rad", camera_.pose_std_rad);
+    mapping += "  depth:\n    - " + line.str() + "\n";
+  }
+  return mapping + fmt::format(
+                       "frames: {{base: base, tip: tip}}\nwrench: {{reports: force_on_object}}   # not tared: the mean before each "
+                       "contact is taken off\nsteps: {{by: detection, travel_sigma_m: {}, travel_offset_std_m: {}}}\n",
+                       largest_sigma_m_, acquisition::travel_offset_std_m(protocol, largest_sigma_m_));
+}
+
+void LoggedRobot::write_bag(const std::filesystem::path& given, const acquisition::PushOptions& protocol) {
   std::filesystem::path folder = given.lexically_normal();
   if (folder.filename().empty()) folder = folder.parent_path();
   std::filesystem::create_directories(folder);
-  std::string mapping = "format: palpate-mapping/1\n" + io::object_text(scene, folder);
-  mapping += "topics:\n  wrench: /wrench\n";
-  if (scene.robot && !joint_names_.empty()) mapping += "  joints: /joint_states\n";
-  if (camera_.camera.width_px > 0)
-    mapping += fmt::format(
-        "  depth:\n    - {{image: /camera/depth/image, info: /camera/depth/camera_info{}, noise: {}, pose_std_m: {}, "
-        "pose_std_rad: {}}}\n",
-        camera_.mask.size() > 0 ? ", mask: /camera/mask" : "", io::depth_noise_yaml(camera_.noise), camera_.pose_std_m, camera_.pose_std_rad);
-  mapping += fmt::format(
-      "frames: {{base: base, tip: tip}}\nwrench: {{reports: force_on_object}}   # not tared: the mean before each contact "
-      "is taken off\n"
-      "steps: {{by: detection, travel_sigma_m: {}, travel_offset_std_m: 0.0005}}\n",
-      robot_.travel_sigma_m());
-  io::write_file(folder / "mapping.yaml", mapping);
+  if (scene_.robot && !bag_.has("/robot_description"))
+    bag_.put("/robot_description", "std_msgs/msg/String", bag_.first_ns(), io::encode(io::urdf_for_viewers(*scene_.robot, folder)));
+  io::write_file(folder / "mapping.yaml", mapping_text(folder, protocol));
   bag_.write(folder);
+}
+
+void LoggedRobot::write_bag_if_small(const std::filesystem::path& folder, const acquisition::PushOptions& protocol) {
+  constexpr std::size_t small_bytes = 64 << 20;
+  if (bag_.size_bytes() < small_bytes) write_bag(folder, protocol);
 }
 
 }  // namespace palpate::cli

@@ -25,6 +25,7 @@
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_write.hpp"
+#include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/lab/built_in.hpp"
 
@@ -122,8 +123,14 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   const std::vector<Push> recorded = recording.pushes;
   NewFolder made_here(folder);
   io::RecordingWriter writer(folder, recording);
-  LaterRobot later(robot->robot(), not_before_s(recorded));
-  LoggedRobot logged(later, recording.joint_names);
+  io::BagFolder so_far_said;
+  if (arguments.resume && !arguments.raw_bag.empty()) so_far_said = earlier_raw_bag(arguments.raw_bag);
+  if (!arguments.raw_bag.empty() && !recorded.empty() && so_far_said.last_ns() == 0)
+    session.warn("--raw-bag: holds only what the sensors say from now on: the run that began this recording left no such bag there");
+  LaterRobot later(robot->robot(), std::max(not_before_s(recorded), not_before_s(so_far_said)));
+  Recording scene = recording;
+  scene.pushes.clear();
+  LoggedRobot logged(later, scene, std::move(so_far_said));
   Made made;
   for (std::size_t site = 0; site < plans.size() && !Session::interrupted(); ++site) {
     const acquisition::PushPlan plan = robot->plan(site);  // the robot then presses there
@@ -139,12 +146,14 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
           begun = true;
           writer.add_step(step);
           made_here.keep();
+          if (!arguments.raw_bag.empty()) logged.write_bag_if_small(arguments.raw_bag, protocol);
           const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
           session.say(fmt::format("{} ({}), {:.1f} s: {:.2f} N{}", push.name, plan.site, step.time_s, force,
                                   step.unloading ? ", going back" : ""));
         },
         [] { return !Session::interrupted(); }, so_far);
     if (report.drift && report.steps > 0) writer.end_push(*report.drift);
+    if (!arguments.raw_bag.empty()) logged.write_bag(arguments.raw_bag, protocol);
     for (const std::string& warning : push_warnings(plan.name, report)) session.warn(warning);
     const std::string why = stop_words(plan, report, protocol.start_distance_m);
     if (report.steps == 0 && so_far == nullptr && report.stop != acquisition::StopReason::user)
@@ -161,15 +170,8 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   session.say(nothing ? fmt::format("{}: nothing was recorded", arguments.output)
                       : fmt::format("{}: {} steps{}. Next: palpate estimate {} -o RESULT", arguments.output, made.steps,
                                     truth.is_known() ? "; the truth is in " + truth_file.string() : "", arguments.output));
-  if (!arguments.raw_bag.empty()) {
-    Recording scene = robot->scene();
-    if (logged.is_masked()) {  // the masks are in the bag
-      scene.robot.reset();
-      scene.joint_names.clear();
-    }
-    logged.write_bag(scene, arguments.raw_bag);
+  if (!arguments.raw_bag.empty())
     session.say(fmt::format("{}: all that the sensors said, as a robot's recorder keeps it", arguments.raw_bag));
-  }
   nlohmann::json json = {{"recording", arguments.output},
                          {"object", recording.name},
                          {"steps", made.steps},
@@ -209,7 +211,8 @@ void must_take_outputs(const RecordArguments& arguments) {
   for (const auto& [option, bag] : {std::pair{"--bag", arguments.bag}, {"--raw-bag", arguments.raw_bag}}) {
     if (bag.empty()) continue;
     must_take_files(bag);
-    if (std::filesystem::exists(bag, code) && !std::filesystem::is_empty(bag, code))
+    const bool goes_on = arguments.resume && bag == arguments.raw_bag && io::is_bag(bag);
+    if (!goes_on && std::filesystem::exists(bag, code) && !std::filesystem::is_empty(bag, code))
       throw Error("is there already; choose another folder or remove it", bag);
     if (!folders.insert(std::filesystem::weakly_canonical(std::filesystem::path(bag) / "", code)).second)
       throw Error("names a folder that is written already; give it one of its own", option);

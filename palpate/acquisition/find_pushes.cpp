@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "palpate/acquisition/force_begin.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::acquisition {
@@ -106,6 +107,30 @@ class Onset {
   std::optional<std::size_t> since_;
 };
 
+/// Where the force began, as the push protocol finds it (`force_began_before_m`): a force is noticed above its noise only, which
+/// of a soft object is half a millimetre late. From the approach up to the end of the first stand; or, where the tool does not
+/// stop early, as far as the force is small, since a line is not what a round tip presses.
+Vec3 traced_contact(const Track& track, const StreamPlan& plan, const ContactSpan& span, std::size_t air_begin) {
+  constexpr double farthest_m = 0.03, increment_m = 0.0005;  // PushOptions::search_distance_m, ::increment_m
+  constexpr double small = 10;                               // thresholds
+  constexpr std::ptrdiff_t enough_samples = 10;
+  const auto& samples = track.samples;
+  const auto before_m = [&](std::size_t i) { return span.direction.dot(span.contact_m - samples[i].tip_m); };
+  std::size_t first = span.begin;
+  while (first > air_begin && before_m(first - 1) < farthest_m) --first;
+  const auto still = find_still_times(track, span, plan);
+  const double stood_s = still.empty() ? samples[span.end - 1].time_s : still.front().time_s;
+  std::vector<sensing::ContactSample> rise;
+  std::ptrdiff_t touching = 0;
+  for (std::size_t i = first; i < span.end && samples[i].time_s <= stood_s; ++i) {
+    rise.push_back(samples[i]);
+    rise.back().force_n -= span.tare_n;
+    touching += i >= span.begin ? 1 : 0;
+    if (touching > enough_samples && span.direction.dot(rise.back().force_n) > small * plan.contact_threshold_n) break;
+  }
+  return span.contact_m - force_began_before_m(rise, span.contact_m, span.direction, {farthest_m, increment_m, 0}) * span.direction;
+}
+
 /// From the free air before a push to that between it and the next one, which begins with sample `next`.
 ForceDrift drift_after(const Track& track, const ForceSums& sums, const ContactSpan& span, double tared_at_s, std::size_t next,
                        double tare_s) {
@@ -131,6 +156,7 @@ ForceDrift drift_after(const Track& track, const ForceSums& sums, const ContactS
 
 std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& plan) {
   std::vector<ContactSpan> spans;
+  std::vector<std::size_t> air_begins;  // of each span: the end of the contact before it
   const auto& samples = track.samples;
   if (samples.size() < 2 * confirm_samples) return spans;
   const ForceSums sums(track);
@@ -186,6 +212,7 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
       span.contact_m = samples[first].tip_m;
       span.direction = track.direction[first];
       spans.push_back(span);
+      air_begins.push_back(free_since);
     } else {
       spans.back().end = noticed;
       onset.forget();
@@ -195,10 +222,18 @@ std::vector<ContactSpan> find_contacts(const Track& track, const StreamPlan& pla
   }
   // A touch that is lost for a moment is the same push.
   std::vector<ContactSpan> joined;
-  for (const ContactSpan& span : spans) {
+  std::vector<std::size_t> air_before;
+  for (std::size_t k = 0; k < spans.size(); ++k) {
+    const ContactSpan& span = spans[k];
     const bool close = !joined.empty() && samples[span.begin].time_s - samples[joined.back().end - 1].time_s < plan.hold_s;
-    close ? void(joined.back().end = span.end) : joined.push_back(span);
+    if (close) {
+      joined.back().end = span.end;
+      continue;
+    }
+    joined.push_back(span);
+    air_before.push_back(air_begins[k]);
   }
+  for (std::size_t k = 0; k < joined.size(); ++k) joined[k].contact_m = traced_contact(track, plan, joined[k], air_before[k]);
   for (std::size_t k = 0; k < joined.size() && plan.tare == Tare::before_contact; ++k) {
     const std::size_t next = k + 1 < joined.size() ? joined[k + 1].begin : samples.size();
     joined[k].drift = drift_after(track, sums, joined[k], joined[k].drift.zero_at_s, next, plan.tare_s);

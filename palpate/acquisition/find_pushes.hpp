@@ -23,7 +23,7 @@ struct ContactSpan {
   ForceDrift drift;  ///< of the tare, to the free air after the push; zero where there is none, or `tare` is not before_contact
   double free_air_std_n = 0;         ///< of one sample, largest of the three axes
   std::size_t free_air_samples = 0;  ///< that made the tare
-  Vec3 contact_m = Vec3::Zero();     ///< tip at the first sample in contact
+  Vec3 contact_m = Vec3::Zero();     ///< tip where the force began, its rise traced back to zero
   Vec3 direction = -Vec3::UnitZ();
 };
 

@@ -181,8 +181,10 @@ class Assembly {
                              seconds_text(plan_.hold_s) + ", so that no step was taken there (steps.hold_s, steps.still_m_s)");
         continue;
       }
-      const double before = begin - 0.5 * plan_.tare_s, after = end + plan_.tare_s;
-      const double next = k + 1 < spans_.size() ? track_.samples[spans_[k + 1].begin].time_s : track_.samples.back().time_s;
+      const double next = k + 1 < spans_.size() ? track_.samples[spans_[k + 1].begin].time_s : track_.samples.back().time_s + 1e-6;
+      const double ended = k > 0 ? track_.samples[spans_[k - 1].end - 1].time_s : track_.samples.front().time_s;
+      const double before = seen_in_free_air(begin - 0.5 * plan_.tare_s, ended, begin, span);
+      const double after = seen_in_free_air(end + plan_.tare_s, end, next, span);
       if (before > track_.samples.front().time_s) push.steps.push_back({before, false, false});
       for (const StillTime& one : still) {
         push.steps.push_back({one.time_s, true, {}});
@@ -199,6 +201,27 @@ class Assembly {
               : "the tool never stood still while it touched; give the times of the steps (steps: {by: times})",
           plan_.source + ": steps");
     return all;
+  }
+
+  /// The time at which the object is looked at without a load: that asked for, or where no picture was taken then, that of the
+  /// nearest picture between two contacts with the tool off the object. Some cameras take one picture a step.
+  double seen_in_free_air(double wanted_s, double from_s, double to_s, const ContactSpan& span) const {
+    constexpr double clear_m = 0.002;
+    const bool has_images = !streams_.cameras.empty();
+    if (!has_images && streams_.clouds.empty()) return wanted_s;
+    const std::vector<double>& times = has_images ? streams_.cameras.front().times_s : streams_.clouds.front().times_s;
+    const double offset_s = has_images ? camera_offset_s_.front() : cloud_offset_s_;
+    if (smallest_gap_s(times, offset_s, wanted_s) < plan_.image_gap_s) return wanted_s;
+    double best_s = wanted_s, gap_s = std::numeric_limits<double>::infinity();
+    for (const double one : times) {
+      const double time_s = one + offset_s;
+      if (time_s <= from_s || time_s >= to_s || std::abs(time_s - wanted_s) >= gap_s) continue;
+      const auto tip = tree_.lookup(plan_.base_frame, plan_.tip_frame, time_s);
+      if (!tip || span.direction.dot(tip->translation() - span.contact_m) > -clear_m) continue;
+      best_s = time_s;
+      gap_s = std::abs(time_s - wanted_s);
+    }
+    return best_s;
   }
 
   std::optional<StepForce> force_at(double time_s, double seen_s) const {

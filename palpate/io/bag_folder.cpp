@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "palpate/io/file.hpp"
+#include "palpate/io/message_source.hpp"
 #include "palpate/io/ros_messages.hpp"
 #include "palpate/io/yaml_text.hpp"
 
@@ -21,9 +22,16 @@ void BagFolder::put(const std::string& topic, const std::string& type, std::int6
   last_ns_ = std::max(last_ns_, time_ns);
 }
 
-void BagFolder::write(const std::filesystem::path& folder) {
+void BagFolder::put_all(const std::filesystem::path& folder) {
+  const MessageSource bag = read_bag(folder);
+  for (const Message& message : bag.messages)
+    put(bag.topics[message.topic].name, bag.topics[message.topic].type, message.log_time_ns, message.data);
+}
+
+void BagFolder::write(const std::filesystem::path& folder) const {
   const std::string file = folder.filename().string() + "_0.mcap";
-  write_file(folder / file, mcap_.finish());
+  McapWriter whole = mcap_;  // more may be put into ours
+  write_file(folder / file, whole.finish());
   write_file(folder / "metadata.yaml", metadata_text(file));
 }
 

@@ -18,8 +18,14 @@ class BagFolder {
   /// @param type  one of ros_types()
   void put(const std::string& topic, const std::string& type, std::int64_t time_ns, std::string_view data);
   bool has(const std::string& topic) const { return topics_.contains(topic); }
-  /// Writes NAME_0.mcap and metadata.yaml into the folder NAME, which is there. Nothing may be put after.
-  void write(const std::filesystem::path& folder);
+  /// Puts everything that a bag in this folder holds, of an earlier run. @throws Error when it is none.
+  void put_all(const std::filesystem::path& folder);
+  /// Earliest and latest time so far; 0 without a message.
+  std::int64_t first_ns() const { return topics_.empty() ? 0 : first_ns_; }
+  std::int64_t last_ns() const { return last_ns_; }
+  std::size_t size_bytes() const { return mcap_.size_bytes(); }
+  /// Writes NAME_0.mcap and metadata.yaml into the folder NAME, which is there: a whole bag of what has been put so far.
+  void write(const std::filesystem::path& folder) const;
 
  private:
   struct Topic {

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string_view>
 
 #include "palpate/core/error.hpp"
@@ -80,6 +81,17 @@ const SurveyedTopic* camera_info_of(const BagSurvey& survey, const std::string& 
   return best;
 }
 
+/// Grey pictures that are named a mask, of the same camera.
+const SurveyedTopic* mask_of(const BagSurvey& survey, const std::string& image) {
+  const SurveyedTopic* best = nullptr;
+  for (const SurveyedTopic& topic : survey.topics) {
+    if (topic.use != "grey images" || topic.messages == 0 || topic.name.find("mask") == std::string::npos) continue;
+    const std::size_t shared = common_prefix(topic.name, image);
+    if (shared > 1 && (best == nullptr || shared > common_prefix(best->name, image))) best = &topic;
+  }
+  return best;
+}
+
 std::string guess_frame(const std::vector<std::string>& frames, std::initializer_list<const char*> words) {
   for (const char* word : words)
     for (const std::string& frame : frames)
@@ -107,15 +119,20 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
   for (const SurveyedTopic& topic : survey.topics) {
     if (topic.messages == 0) continue;
     if (topic.use == "depth images" && !is_repeated(survey, topic)) {
-      const SurveyedTopic* info = camera_info_of(survey, topic.name);
+      const SurveyedTopic *info = camera_info_of(survey, topic.name), *mask = mask_of(survey, topic.name);
       depth += "    - {image: " + topic.name + ", info: " + (info ? info->name : std::string(fill_in)) +
-               ", noise: {model: constant, sigma_m: 0.003}}   # check: noise of the sensor\n";
+               (mask ? ", mask: " + mask->name : "") + ", noise: {model: constant, sigma_m: 0.003}}   # check: noise of the sensor\n";
     }
     if (topic.use == "clouds")
       clouds += "    - {topic: " + topic.name + ", sigma_m: 0.003}   # check: standard deviation of a point\n";
   }
   if (!depth.empty()) text += "  depth:\n" + depth;
-  if (!clouds.empty() && depth.empty()) text += "  clouds:\n" + clouds;  // both would show the same points twice
+  if (!clouds.empty() && depth.empty()) text += "  clouds:\n" + clouds;
+  if (!clouds.empty() && !depth.empty()) {  // both would most often show the same points twice
+    text += "  # in place of depth, or beside it where they are another device's:\n";
+    std::istringstream lines("  clouds:\n" + clouds);
+    for (std::string line; std::getline(lines, line);) text += "  #" + line.substr(1) + "\n";
+  }
   const std::string base = std::find(frames.begin(), frames.end(), "base_link") != frames.end() ? "base_link"
                            : roots.empty()                                                      ? fill_in
                                                                                                 : roots.front();

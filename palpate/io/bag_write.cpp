@@ -44,10 +44,8 @@ class BagWriter {
   explicit BagWriter(const Recording& recording) : recording_(recording) {}
 
   void write(const fs::path& folder) {
-    if (recording_.robot) {
-      const auto files = urdf_files(*recording_.robot, "robot");
-      put("/robot_description", "std_msgs/msg/String", time_ns_, encode(files.at("robot.urdf")));
-    }
+    if (recording_.robot)
+      put("/robot_description", "std_msgs/msg/String", time_ns_, encode(urdf_for_viewers(*recording_.robot, folder)));
     for (const Push& push : recording_.pushes) add_push(push);
     const std::string head = "format: palpate-mapping/1\n" + object_text(recording_, folder);
     write_file(folder / "mapping.yaml", head + mapping_text());

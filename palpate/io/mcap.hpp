@@ -51,6 +51,8 @@ class McapWriter {
                             const std::string& schema_encoding = "ros2msg", const std::string& message_encoding = "cdr");
   /// Times need not come in order.
   void add_message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data);
+  /// Of what was added so far, as it is packed; of the last chunk as it is.
+  std::size_t size_bytes() const { return out_.size() + chunk_.size(); }
   /// The file's bytes. Nothing may be added after.
   std::string finish();
 

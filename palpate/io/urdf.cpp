@@ -2,6 +2,7 @@
 #include "palpate/io/urdf.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <map>
 
@@ -15,6 +16,22 @@ namespace palpate::io {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// RFC 3986: %20 is a space.
+std::string without_percent(const std::string& url) {
+  std::string out;
+  for (std::size_t i = 0; i < url.size(); ++i) {
+    unsigned value = 0;
+    const char* const from = url.data() + i + 1;
+    if (url[i] == '%' && i + 2 < url.size() && std::from_chars(from, from + 2, value, 16).ptr == from + 2) {
+      out += static_cast<char>(value);
+      i += 2;
+    } else {
+      out += url[i];
+    }
+  }
+  return out;
+}
 
 class UrdfReader {
  public:
@@ -85,9 +102,11 @@ class UrdfReader {
 
   TriMesh mesh(const XmlElement& element) const {
     std::string file = need(element, "filename");
+    const bool is_whole_path = file.starts_with("file://");
     for (const char* scheme : {"package://", "file://"}) {
       if (file.rfind(scheme, 0) == 0) file = file.substr(std::string(scheme).size());
     }
+    if (is_whole_path) file = without_percent(file);
     const fs::path relative = fs::path(file).relative_path();
     if (std::find(relative.begin(), relative.end(), "..") != relative.end())
       fail(element, "mesh '" + file + "' lies outside the robot's folder");
@@ -95,7 +114,15 @@ class UrdfReader {
     for (auto part = relative.begin(); part != relative.end(); ++part) {
       if (part != relative.begin()) without_package /= *part;
     }
-    for (const fs::path& one : {relative, without_package}) {
+    std::vector<fs::path> names{relative, without_package};
+    // A whole path names another machine's folder, perhaps: what it ends with lies beside the URDF.
+    for (fs::path rest = without_package; is_whole_path && !rest.empty(); names.push_back(rest)) {
+      fs::path shorter;
+      for (auto part = rest.begin(); part != rest.end(); ++part)
+        if (part != rest.begin()) shorter /= *part;
+      rest = shorter;
+    }
+    for (const fs::path& one : names) {
       std::error_code code;
       if (one.empty() || !fs::is_regular_file(mesh_root_ / one, code)) continue;
       TriMesh result = read_tri_mesh(mesh_root_ / one);

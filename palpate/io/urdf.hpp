@@ -22,4 +22,9 @@ RobotModel read_urdf(const std::filesystem::path& path);
 /// The model as a URDF (`STEM.urdf`) and a PLY for each mesh: file name -> bytes.
 std::map<std::string, std::string> urdf_files(const RobotModel& robot, const std::string& stem);
 
+/// The model as viewers want it in a topic (`robot_description`), which lies in no folder: its meshes are written into
+/// FOLDER/robot_view, as OBJ, and named by `file://` and their whole path. RViz and Foxglove know neither relative names nor,
+/// the latter, PLY. parse_urdf finds them by the end of the path, too, when the folder has been moved.
+std::string urdf_for_viewers(const RobotModel& robot, const std::filesystem::path& folder);
+
 }  // namespace palpate::io

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <cctype>
 #include <cmath>
+#include <functional>
+#include <system_error>
 
+#include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/urdf.hpp"
 #include "palpate/io/xml.hpp"
@@ -36,10 +40,18 @@ const char* name_of(RobotJoint::Kind kind) {
   return "fixed";
 }
 
-}  // namespace
+/// RFC 3986: what is no letter, digit or one of a few signs stands as %XX.
+std::string file_url(const std::filesystem::path& absolute) {
+  std::string url = "file://";
+  for (const char one : absolute.generic_string()) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(one)) != 0 || std::string_view("/-._~").find(one) != std::string_view::npos;
+    url += plain ? std::string(1, one) : fmt::format("%{:02X}", static_cast<unsigned char>(one));
+  }
+  return url;
+}
 
-std::map<std::string, std::string> urdf_files(const RobotModel& robot, const std::string& stem) {
-  std::map<std::string, std::string> files;
+/// @param keep  takes a mesh of that number, and says by what name the text is to call it
+std::string urdf_text(const RobotModel& robot, const std::function<std::string(int, const MeshData&)>& keep) {
   std::string text = "<?xml version=\"1.0\"?>\n<robot name=\"" + xml_escaped(robot.name) + "\">\n";
   int meshes = 0;
   const auto shape_text = [&](const RobotShape& shape, const char* element) {
@@ -49,9 +61,7 @@ std::map<std::string, std::string> urdf_files(const RobotModel& robot, const std
         MeshData mesh;
         mesh.points_m = shape.mesh.vertices_m;
         mesh.triangles = shape.mesh.triangles;
-        const std::string file = fmt::format("{}_meshes/{}.ply", stem, meshes++);
-        files[file] = mesh_format_named("ply").write(mesh);
-        geometry = fmt::format("<mesh filename=\"{}\"/>", file);
+        geometry = fmt::format("<mesh filename=\"{}\"/>", xml_escaped(keep(meshes++, mesh)));
         break;
       }
       case RobotShape::Kind::box:
@@ -85,8 +95,31 @@ std::map<std::string, std::string> urdf_files(const RobotModel& robot, const std
     }
     text += "  </joint>\n";
   }
-  files[stem + ".urdf"] = text + "</robot>\n";
+  return text + "</robot>\n";
+}
+
+}  // namespace
+
+std::map<std::string, std::string> urdf_files(const RobotModel& robot, const std::string& stem) {
+  std::map<std::string, std::string> files;
+  const std::string text = urdf_text(robot, [&](int number, const MeshData& mesh) {
+    const std::string file = fmt::format("{}_meshes/{}.ply", stem, number);
+    files[file] = mesh_format_named("ply").write(mesh);
+    return file;
+  });
+  files[stem + ".urdf"] = text;
   return files;
+}
+
+std::string urdf_for_viewers(const RobotModel& robot, const std::filesystem::path& folder) {
+  const std::filesystem::path there = folder / "robot_view";
+  std::error_code code;
+  std::filesystem::create_directories(there, code);
+  return urdf_text(robot, [&](int number, const MeshData& mesh) {
+    const std::filesystem::path file = there / fmt::format("{}.obj", number);
+    write_file(file, mesh_format_named("obj").write(mesh));
+    return file_url(std::filesystem::absolute(file).lexically_normal());
+  });
 }
 
 }  // namespace palpate::io

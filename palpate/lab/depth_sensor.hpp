@@ -20,7 +20,8 @@ struct DepthSensorOptions {
   double correlated_sigma_m = 0.0;     ///< part of the noise that neighbours share, on top of the model's
   double correlation_px = 8.0;         ///< its correlation length (Gaussian kernel)
   bool lateral_jitter = true;          ///< where the model states a lateral noise
-  double flying_pixel_share = 0.6;     ///< of the pixels beside a depth edge that report a mixture of both sides
+  double flying_pixel_share = 0.6;     ///< of the pixels on either side of a depth edge that report a mixture of both; no source
+                                       ///< states one: as many as a spot of 1.2 pixels touches
   double dropout_incidence_rad = 1.4;  ///< no data at more grazing angles (80 degrees: Nguyen et al. 2012)
   double depth_unit_m = 0.001;         ///< quantisation of the reported depth; 0 = none
   bool needs_texture = false;          ///< passive stereo: on a surface of texture t the share 1 - t is lost, in patches

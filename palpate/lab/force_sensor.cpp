@@ -21,20 +21,21 @@ Vec3 as_read(Vec3 value, double unit, const Vec3& range) {
   return value;
 }
 
-// Noise, drift and cross-talk are not in the sheets that could be had: they are of the size that users of strain-gauge sensors
-// report. Ranges and resolutions are the makers' where a source is named.
+// Every number with its source, or that it has none: docs/lab.md, "Where the numbers come from". Ranges and resolutions are the
+// makers' where a source is named; no sheet that could be had states noise, drift or cross-talk.
 constexpr std::array<ForceSensorModel, 4> table{{
     {"generic", "a good strain-gauge sensor without cross-talk", {}},
-    {"schunk_ftcl_050", "range 300 N: Frank et al. 2010, section V; the rest of the size usual in its class",
+    {"schunk_ftcl_050", "range 300 N: Frank et al. 2010, section V; the rest has no source: assumed",
      {.sigma_n = 0.08, .unit_n = 0.05, .range_n = 300, .range_along_n = 300, .bias_n = 1.0, .drift_n_s = 0.0003, .scale_std = 0.015,
-      .cross_talk_std = 0.01, .torque_sigma_nm = 0.004, .torque_unit_nm = 0.001, .torque_range_nm = 7}},
+      .cross_talk_std = 0.01, .torque_sigma_nm = 0.004, .torque_unit_nm = 0.001, .torque_range_nm = 7, .torque_drift_nm_s = 7e-6}},
     {"ati_gamma", "ATI Gamma SI-32-2.5: ranges 32 N across, 100 N along and 2.5 N m, resolutions 6.25 mN and 0.5 mN m (manual 9620-05); "
-                  "the rest of the size usual",
+                  "the rest has no source: assumed",
      {.sigma_n = 0.01, .unit_n = 0.00625, .range_n = 32, .range_along_n = 100, .bias_n = 0.5, .drift_n_s = 0.0001, .scale_std = 0.01,
-      .cross_talk_std = 0.005, .torque_sigma_nm = 0.0005, .torque_unit_nm = 0.0005, .torque_range_nm = 2.5}},
+      .cross_talk_std = 0.005, .torque_sigma_nm = 0.0005, .torque_unit_nm = 0.0005, .torque_range_nm = 2.5,
+      .torque_drift_nm_s = 2.5e-6}},
     {"ideal", "none such: for tests of the rest",
      {.sigma_n = 0.001, .unit_n = 0.0001, .range_n = 1000, .range_along_n = 1000, .bias_n = 1.0, .drift_n_s = 0, .scale_std = 0.01,
-      .torque_sigma_nm = 1e-5, .torque_unit_nm = 0, .torque_range_nm = 100}},
+      .torque_sigma_nm = 1e-5, .torque_unit_nm = 0, .torque_range_nm = 100, .torque_drift_nm_s = 0}},
 }};
 
 }  // namespace
@@ -66,6 +67,7 @@ void check(const ForceSensorOptions& o) {
   need(o.torque_unit_nm >= 0, "torque_unit_nm", "must not be negative");
   need(o.torque_range_nm > 0, "torque_range_nm", "must be positive");
   need(o.torque_bias_nm >= 0, "torque_bias_nm", "must not be negative");
+  need(o.torque_drift_nm_s >= 0, "torque_drift_nm_s", "must not be negative");
   need(o.tool_mass_kg >= 0, "tool_mass_kg", "must not be negative");
 }
 
@@ -83,6 +85,13 @@ ForceSensor::ForceSensor(const ForceSensorOptions& options, Random& once, Random
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       if (i != j) gain_(i, j) = options.cross_talk_std * once.normal();
+  torque_drift_nm_s_ = options.torque_drift_nm_s * of_torque.normal3();
+  const double of_force_m = options.cross_talk_std * options.torque_range_nm / options.range_along_n;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      if (i != j) torque_gain_(i, j) = options.cross_talk_std * of_torque.normal();
+      torque_of_force_m_(i, j) = of_force_m * of_torque.normal();
+    }
 }
 
 Vec3 ForceSensor::read(const Vec3& true_force_n, const Mat3& R_base_sensor, double time_s, Random& noise) const {
@@ -94,10 +103,13 @@ Vec3 ForceSensor::read(const Vec3& true_force_n, const Mat3& R_base_sensor, doub
   return as_read(force, options_.unit_n, Vec3(across_n, across_n, options_.range_along_n));
 }
 
-Vec3 ForceSensor::read_torque(const Vec3& true_torque_nm, const Mat3& R_base_sensor, Random& noise) const {
+Vec3 ForceSensor::read_torque(const Vec3& true_torque_nm, const Vec3& true_force_n, const Mat3& R_base_sensor, double time_s,
+                              Random& noise) const {
   const Vec3 weight_n(0, 0, gravity_m_s2 * options_.tool_mass_kg), centre_m(0, 0, options_.tool_centre_m);
   const Vec3 along_axes = R_base_sensor.transpose() * true_torque_nm + centre_m.cross(Vec3(R_base_sensor.transpose() * weight_n));
-  const Vec3 torque = scale_ * along_axes + torque_bias_nm_ + options_.torque_sigma_nm * noise.normal3();
+  const Vec3 of_force_nm = torque_of_force_m_ * (R_base_sensor.transpose() * (true_force_n + weight_n));
+  const Vec3 torque = scale_ * (torque_gain_ * along_axes + of_force_nm) + torque_bias_nm_ + torque_drift_nm_s_ * time_s +
+                      options_.torque_sigma_nm * noise.normal3();
   return as_read(torque, options_.torque_unit_nm, Vec3::Constant(options_.torque_range_nm));
 }
 

@@ -81,8 +81,8 @@ acquisition::RobotState LabRobot::read() {
   // About the tip, as a driver reckons it from what joints and sensor say.
   const Vec3 true_nm = (acts_m - stands.translation()).cross(pressed_n) +
                        (lab.tip_of(lab.true_joints).translation() - stands.translation()).cross(met_n);
-  const Vec3 at_wrist_nm =
-      said.linear() * lab.wrist->read_torque(true_nm, stands.linear(), lab.on_the_way ? lab.way_force_random : lab.torque_random);
+  const Vec3 at_wrist_nm = said.linear() * lab.wrist->read_torque(true_nm, pressed_n + met_n, stands.linear(), lab.clock_s,
+                                                                 lab.on_the_way ? lab.way_force_random : lab.torque_random);
   state.torque_nm = at_wrist_nm - (state.T_base_tip.translation() - said.translation()).cross(state.force_n);
   return state;
 }

@@ -18,6 +18,7 @@
 
 #include "cli/running_program.hpp"
 #include "io/recording_folder.hpp"
+#include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
 
 namespace palpate::io {
@@ -120,6 +121,32 @@ TEST_F(Record, KilledItGoesOnAsIfNothingHadBeen) {
     EXPECT_GT(step.time_s, time_s);
     time_s = step.time_s;
   }
+}
+
+TEST_F(Record, KilledItsRawBagHoldsWhatWasSaidAndGoesOn) {
+  const auto forces_s = [&] {
+    const MessageSource bag = read_bag(path("raw"));
+    EXPECT_TRUE(bag.warnings.empty()) << bag.warnings.front();
+    std::vector<double> times_s;
+    for (const Message& one : bag.messages)
+      if (bag.topics[one.topic].name == "/wrench") times_s.push_back(1e-9 * double(one.log_time_ns));
+    return times_s;
+  };
+  const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT, {"--raw-bag", path("raw")}));
+  ASSERT_TRUE(says(": 4.")) << said;
+  kill(child, SIGKILL);
+  wait_for(child);
+  const std::vector<double> before = forces_s();
+  ASSERT_GT(before.size(), 100u) << "free air and two steps";
+  ASSERT_EQ(palpate(with_contact(spring, {"--resume", "--raw-bag", path("raw")})), 0) << said;
+  EXPECT_THAT(said, Not(HasSubstr("holds only what")));
+  const std::vector<double> after = forces_s();
+  ASSERT_GT(after.size(), before.size() + 100);
+  EXPECT_TRUE(std::equal(before.begin(), before.end(), after.begin()));
+  EXPECT_GT(after[before.size()], before.back()) << "its clock does not go back";
+
+  ASSERT_EQ(palpate(with_contact(spring, {"--contact", "0.52", "0.01", "0.1", "--resume", "--raw-bag", path("late")})), 0) << said;
+  EXPECT_THAT(said, HasSubstr("--raw-bag: holds only what the sensors say from now on"));
 }
 
 TEST_F(Record, ItsTruthIsThereStepByStep) {

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "geometry/shapes.hpp"
@@ -213,6 +214,20 @@ TEST_F(Info, ComparesTheScatterOfUnloadedStepsWithWhatIsStated) {
   EXPECT_NE(outcome.err.find("intervals would be too narrow"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find("intervals would be too wide"), std::string::npos) << outcome.err;
   EXPECT_TRUE(nlohmann::json::parse(outcome.out)["static_scatter"][0]["doubtful"].get<bool>());
+}
+
+// A bag of ours has images with masks, and clouds: the mapping to start from names them all.
+TEST(InfoOfABag, SuggestsMaskAndClouds) {
+  if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  const TemporaryFolder folder("bag_suggested");
+  write_bag(made_up(), folder.path() / "bag");
+  std::filesystem::remove(folder.path() / "bag/mapping.yaml");
+  const std::string command = "'" + std::string(PALPATE_CLI) + "' info --json '" + (folder.path() / "bag").string() + "' > '" +
+                              folder.path().string() + "/out' 2> '" + folder.path().string() + "/err'";
+  ASSERT_EQ(std::system(command.c_str()), 0) << folder.get("err");
+  const std::string mapping = nlohmann::json::parse(folder.get("out")).at("mapping");
+  EXPECT_NE(mapping.find("image: /camera_1/depth/image, info: /camera_1/depth/camera_info, mask: /camera_1/mask,"), std::string::npos) << mapping;
+  EXPECT_NE(mapping.find("  # clouds:\n  #   - {topic: /points,"), std::string::npos) << mapping;
 }
 
 }  // namespace
