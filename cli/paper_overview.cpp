@@ -10,11 +10,12 @@
 namespace palpate::cli {
 namespace {
 
-/// "+3.1 % &plusmn; 2.0 %, rms 3.7 %"
+/// "+3.1 % &plusmn; 2.0 %", "rms 3.7 %", a line each.
 std::string errors(const Score& score) {
   if (score.answers == 0) return "no answer";
   return number(score.bias_percent, "{:+.1f} %") + (std::isfinite(score.spread_percent) ? number(score.spread_percent, " &plusmn; {:.1f} %") : "") +
-         number(score.rms_percent, ", rms {:.1f} %") + (score.without > 0 ? fmt::format("; {} of {} without an answer", score.without, score.asked) : "");
+         number(score.rms_percent, "<br>rms {:.1f} %") +
+         (score.without > 0 ? fmt::format("<br>{} of {} unanswered", score.without, score.asked) : "");
 }
 
 std::string apparent(const SceneAnswers& answers, MethodAnswer TrialAnswer::* method) {

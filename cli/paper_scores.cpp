@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "cli/paper_words.hpp"
+
 namespace palpate::cli {
 namespace {
 
@@ -171,15 +173,18 @@ std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
   const auto scenes_named = [&](const std::string& names) { return !any ? "nothing to compare" : names.empty() ? std::string("in all") : "not in: " + names; };
   return {{"palpate's rms error of E is smaller in every scene", any && worse.empty(), scenes_named(worse) + left_out},
           {"in the median scene it is at most half", middle <= 0.5,
-           (any ? fmt::format("{:.2f} of the paper's method's", middle) : "nothing to compare") + left_out},
+           (!any                     ? "nothing to compare"
+            : std::isfinite(middle) ? fmt::format("{:.2f} of the paper's method's", middle)
+                                    : "palpate left out an answer there") +
+               left_out},
           {"at least 88 % of the truths lie in palpate's 95 % intervals (no interval: not inside)", in >= 88,
            fmt::format("{:.0f} % of {}", in, asked)},
           {"palpate's finite elements are solved for at most a fifth as many load cases as the paper's method asks for simulations, "
            "each of which would be one without unit loads",
            any && dear.empty(),
-           scenes_named(dear) + fmt::format("; like with like, in the median scene: {:.2f} of the simulations asked for, {:.2f} of the "
-                                            "load cases solved here, where both have unit loads",
-                                            median(simulated), median(solved))}};
+           scenes_named(dear) + fmt::format("; like with like, in the median scene: {} of the simulations asked for, {} of the load "
+                                            "cases solved here, where both have unit loads",
+                                            number(median(simulated), "{:.2f}"), number(median(solved), "{:.2f}"))}};
 }
 
 }  // namespace palpate::cli

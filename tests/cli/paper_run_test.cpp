@@ -68,13 +68,13 @@ void make_up(std::uint64_t seed, const TrialOptions& options, TrialAnswer& out) 
   out.surface.at_found_m2 = 1e-6;
 }
 
-struct Run {
+struct MadeUp {
   PaperPlan plan;
   PaperWork work;
   int made = 0, stops_after = 1000;
   std::vector<std::string> said;
 
-  Run() {
+  MadeUp() {
     plan.scenes = {&lab::paper_scene("cow"), &lab::paper_scene("cube")};
     plan.studies = {&studies().front()};
     plan.seeds = 4;
@@ -93,21 +93,21 @@ struct Run {
 
 TEST(PaperRun, WhatWasStoppedGoesOnToTheSamePage) {
   const test::TemporaryFolder files("paper_run");
-  Run whole;
+  MadeUp whole;
   run_plan(whole.plan, whole.work, files / "whole");
   EXPECT_EQ(whole.made, 9);
 
-  Run first;
+  MadeUp first;
   first.stops_after = 3;  // in the midst of the third seed
   run_plan(first.plan, first.work, files / "parts");
   EXPECT_NE(page_of(files / "parts"), page_of(files / "whole"));
-  Run again;
+  MadeUp again;
   again.plan = first.plan;
   run_plan(again.plan, again.work, files / "parts");
   EXPECT_EQ(again.made, 7) << "two seeds were there";
   EXPECT_EQ(page_of(files / "parts"), page_of(files / "whole"));
   EXPECT_THAT(contents(files / "whole" / "paper.html"), HasSubstr("<svg"));
-  Run nothing;
+  MadeUp nothing;
   run_plan(nothing.plan, nothing.work, files / "parts");
   EXPECT_EQ(nothing.made, 0);
   EXPECT_EQ(page_of(files / "parts"), page_of(files / "whole"));
@@ -115,9 +115,9 @@ TEST(PaperRun, WhatWasStoppedGoesOnToTheSamePage) {
 
 TEST(PaperRun, PiecesJoinedAreTheWhole) {
   const test::TemporaryFolder files("paper_pieces");
-  Run whole;
+  MadeUp whole;
   run_plan(whole.plan, whole.work, files / "whole");
-  Run one, two;
+  MadeUp one, two;
   one.plan.seeds = 1;
   two.plan.first_seed = 2;
   two.plan.seeds = 3;
@@ -133,7 +133,7 @@ TEST(PaperRun, PiecesJoinedAreTheWhole) {
   EXPECT_EQ(page_of(files / "joined"), page_of(files / "whole"));
   EXPECT_THAT(contents(files / "joined" / "paper.html"), HasSubstr("E from every sample"));
 
-  Run other;
+  MadeUp other;
   other.plan.seeds = 1;
   other.work.trial = [](const lab::PaperScene&, std::uint64_t, const TrialOptions& options, SharedModels&, TrialAnswer& out) { make_up(9, options, out); };
   run_plan(other.plan, other.work, files / "other");
@@ -143,7 +143,7 @@ TEST(PaperRun, PiecesJoinedAreTheWhole) {
 
 TEST(PaperRun, AFailedSeedIsARowAndTheRunGoesOn) {
   const test::TemporaryFolder files("paper_failed");
-  Run run;
+  MadeUp run;
   run.work.trial = [&](const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels&, TrialAnswer& out) {
     ++run.made;
     if (scene.name == "cube" && seed == 2) throw std::runtime_error("the pad went <through> it");
@@ -164,11 +164,11 @@ TEST(PaperRun, AFailedSeedIsARowAndTheRunGoesOn) {
 
 TEST(PaperRun, SeedsOfOtherOptionsAreRefusedByName) {
   const test::TemporaryFolder files("paper_options");
-  Run run;
+  MadeUp run;
   run.plan.seeds = 2;
   run_plan(run.plan, run.work, files / "out");
   const auto refused = [&](auto change) {
-    Run other;
+    MadeUp other;
     other.plan.seeds = 2;
     change(other.plan);
     const std::string message = message_of([&] { run_plan(other.plan, other.work, files / "out"); });
