@@ -59,6 +59,7 @@ nlohmann::json demo_truth_json(const lab::DemoTruth& truth) {
 struct Made {
   nlohmann::json told = nlohmann::json::array();
   int steps = 0;
+  bool loaded = false;  ///< some step is under load: there is something to estimate
   bool fine = true;
 };
 
@@ -79,6 +80,9 @@ bool ended_well(acquisition::StopReason stop) {
   using enum acquisition::StopReason;
   return acquisition::is_at_a_limit(stop) || stop == slip || stop == contact_lost;
 }
+
+bool is_loaded(const Step& step) { return !step.loads.empty(); }
+bool is_loaded(const Push& push) { return std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) { return is_loaded(step); }); }
 
 const Push* push_named(const std::vector<Push>& pushes, const std::string& name) {
   for (const Push& push : pushes)
@@ -125,12 +129,13 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   LaterRobot later(robot->robot(), not_before_s(recorded));
   LoggedRobot logged(later, recording.joint_names);
   Made made;
+  made.loaded = std::any_of(recorded.begin(), recorded.end(), [](const Push& push) { return is_loaded(push); });
   for (std::size_t site = 0; site < plans.size() && !Session::interrupted(); ++site) {
     const acquisition::PushPlan plan = robot->plan(site);  // the robot then presses there
     if (!(arguments.push.force_step_n > 0)) protocol.force_step_n = robot->force_step_n(site);
     const Push* const so_far = push_named(recorded, plan.name);
     if (so_far != nullptr && so_far != &recorded.back()) continue;  // a later one was begun
-    bool begun = so_far != nullptr;
+    bool begun = so_far != nullptr, loaded = so_far != nullptr && is_loaded(*so_far);
     const acquisition::PushReport report = acquisition::run_push(
         logged, plan, protocol,
         [&](const Push& push, const Step& step) {
@@ -138,6 +143,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
           if (!begun) writer.begin_push(push);
           begun = true;
           writer.add_step(step);
+          loaded = loaded || is_loaded(step);
           made_here.keep();
           const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
           session.say(fmt::format("{} ({}), {:.1f} s: {:.2f} N{}", push.name, plan.site, step.time_s, force,
@@ -152,15 +158,23 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
     else
       session.say(fmt::format("{} stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps", plan.name, acquisition::to_words(report.stop), why,
                               report.highest_force_n, 1000 * report.deepest_m, report.steps));
+    if (report.stop == acquisition::StopReason::slip) session.warn(fmt::format("{}: {}", plan.name, report.message));
+    if (report.steps > 0 && !loaded && report.stop != acquisition::StopReason::user)
+      session.warn(fmt::format("{}: {} before any step under load, so nothing can be estimated from it; push elsewhere or more across the "
+                               "surface, or with a smaller --force-step",
+                               plan.name, acquisition::to_words(report.stop)));
     made.told.push_back(json_of(plan, report));
     made.steps += report.steps;
-    made.fine = made.fine && ended_well(report.stop);
+    made.loaded = made.loaded || loaded;
+    made.fine = made.fine && loaded && ended_well(report.stop);
     if (report.stop == acquisition::StopReason::obstacle) break;  // a person looks first; --resume goes on
   }
   const bool nothing = made.steps == 0 && recorded.empty();
   session.say(nothing ? fmt::format("{}: nothing was recorded", arguments.output)
-                      : fmt::format("{}: {} steps{}. Next: palpate estimate {} -o RESULT", arguments.output, made.steps,
-                                    truth.is_known() ? "; the truth is in " + truth_file.string() : "", arguments.output));
+                      : fmt::format("{}: {} steps{}. {}", arguments.output, made.steps,
+                                    truth.is_known() ? "; the truth is in " + truth_file.string() : "",
+                                    made.loaded ? fmt::format("Next: palpate estimate {} -o RESULT", arguments.output)
+                                                : "None is under load: nothing can be estimated from it"));
   if (!arguments.raw_bag.empty()) {
     Recording scene = robot->scene();
     if (logged.is_masked()) {  // the masks are in the bag
