@@ -124,6 +124,9 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
     }
   }
   const std::vector<Push> recorded = recording.pushes;
+  std::size_t steps_before = 0;
+  for (const Push& push : recorded) steps_before += push.steps.size();
+  robot->go_on_after(steps_before);
   NewFolder made_here(folder);
   io::RecordingWriter writer(folder, recording);
   LaterRobot later(robot->robot(), not_before_s(recorded));
