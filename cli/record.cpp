@@ -64,6 +64,9 @@ struct Made {
 };
 
 nlohmann::json json_of(const acquisition::PushPlan& plan, const acquisition::PushReport& report) {
+  const bool touched = report.deepest_m > 0;
+  nlohmann::json drift_n_s;
+  if (report.drift) drift_n_s = {report.drift->rate_n_s.x(), report.drift->rate_n_s.y(), report.drift->rate_n_s.z()};
   return {{"push", plan.name},
           {"site", plan.site},
           {"stop", acquisition::to_words(report.stop)},
@@ -71,8 +74,13 @@ nlohmann::json json_of(const acquisition::PushPlan& plan, const acquisition::Pus
           {"steps", report.steps},
           {"highest_force_n", report.highest_force_n},
           {"deepest_m", report.deepest_m},
+          {"overshoot_n", report.overshoot_n},
+          {"contact_m", touched ? nlohmann::json({report.contact_m.x(), report.contact_m.y(), report.contact_m.z()}) : nlohmann::json()},
+          {"drift_n", report.drift ? nlohmann::json(report.drift_n) : nlohmann::json()},
+          {"drift_n_s", drift_n_s},
           {"unsettled", report.unsettled},
-          {"came_back", report.compared ? nlohmann::json(report.came_back) : nlohmann::json()}};
+          {"came_back", report.compared ? nlohmann::json(report.came_back) : nlohmann::json()},
+          {"changed_share", report.compared ? nlohmann::json(report.changed_share) : nlohmann::json()}};
 }
 
 /// The force or the object ended it, not the robot or the user.

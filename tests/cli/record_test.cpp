@@ -158,7 +158,7 @@ TEST_F(Record, KilledAtEveryStepItGoesOnFromWhereTheTipStands) {
       if (one.loads.empty()) continue;
       // The tare is free air's, though the arm was found pressed: force and travel lie on one line through zero.
       const double force_n = -one.loads[0].force_n->z(), travel_m = std::get<ToolTravel>(one.observations.front()).travel_m;
-      EXPECT_NEAR(force_n, expected_n[k], 0.6) << step << ", " << k;
+      EXPECT_NEAR(force_n, expected_n[k], 1.3) << step << ", " << k << ": two motions of 0.4 N and what noise does";
       EXPECT_NEAR(force_n, 800 * travel_m, 0.3) << step << ", " << k;
     }
   }
@@ -184,7 +184,7 @@ TEST_F(Record, TheLabErrsAnewWhereItGoesOn) {
     same += first.data()[i] > 0 && first.data()[i] == second.data()[i];
   }
   EXPECT_GT(seen, 10000);
-  EXPECT_LT(same, seen / 20) << "the table in the picture, to the last digit";
+  EXPECT_LT(same, seen / 5) << "the table in the picture, to the last digit of the sensor";
 }
 
 TEST_F(Record, ItsTruthIsThereStepByStep) {
@@ -257,6 +257,54 @@ TEST_F(Record, GoesOnWithTheSameThingOnly) {
   refused(thicker, "rest shape");
   ASSERT_EQ(palpate(with_contact(spring, {"--contact", "0.52", "0.01", "0.1", "--contact", "0.51", "0", "0.1", "--resume"})), 0) << said;
   EXPECT_EQ(made().pushes.size(), 3u) << "more pushes of the same thing are welcome";
+}
+
+TEST_F(Record, TheSameSeedGivesTheSameBytes) {
+  const auto record_with = [&](const std::string& name, const std::string& threads) {
+    fs::create_directories(path(name));
+    return palpate({"--seed", "7", "--threads", threads, "record", "--object", "cube", "--contact", "0.58", "0", "0.15", "--travel-limit",
+                    "0.004", "--unloading-steps", "1", "--views", "3", "-o", path(name + "/recording"), "--bag", path(name + "/bag"),
+                    "--raw-bag", path(name + "/raw")});
+  };
+  ASSERT_EQ(record_with("one", "1"), 0) << said;
+  ASSERT_EQ(record_with("again", "1"), 0) << said;
+  ASSERT_EQ(record_with("two", "2"), 0) << said;
+  int compared = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(path("one"))) {
+    if (!entry.is_regular_file()) continue;
+    const fs::path file = fs::relative(entry.path(), path("one"));
+    for (const std::string other : {"again", "two"}) {
+      EXPECT_TRUE(read_file(entry.path()) == read_file(path(other) / file)) << file << ", " << other;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 10);
+  for (const char* what : {"recording/recording.yaml", "recording.truth.json", "bag/mapping.yaml", "raw/mapping.yaml"})
+    EXPECT_TRUE(fs::exists(fs::path(path("one")) / what)) << what;
+}
+
+TEST_F(Record, ASlipBeforeAnyLoadIsNoSuccess) {
+  const std::vector<std::string> words{"record", "--object", "cube", "--young-modulus", "20000", "--slip-at", "0.002", "--force-step", "20",
+                                       "--slip-sideways", "0.001", "--slip-least-force", "0.1", "--contact", "0.6", "0", "0.15",
+                                       "-o", path("recording"), "--bag", path("bag")};
+  EXPECT_EQ(palpate(words), numbers) << said;
+  EXPECT_THAT(said, HasSubstr("before any step under load, so nothing can be estimated from it"));
+  EXPECT_THAT(said, Not(HasSubstr("Next: palpate estimate")));
+  for (const Step& step : read_recording_unchecked(folder.path() / "recording").pushes.at(0).steps) EXPECT_TRUE(step.loads.empty());
+  palpate({"info", path("bag")});
+  EXPECT_THAT(said, Not(HasSubstr("is not in the bag")));
+}
+
+TEST_F(Record, TheReportHasWhatTheProtocolFound) {
+  ASSERT_EQ(palpate(with_contact(spring, {"--json", "--bag", path("bag")})), 0) << said;
+  const std::size_t begins = said.find("{\n"), ends = said.rfind("\n}") + 2;
+  ASSERT_LT(begins, ends);
+  const nlohmann::json told = nlohmann::json::parse(said.substr(begins, ends - begins)).at("pushes").at(0);
+  EXPECT_EQ(told.at("overshoot_n"), 0);
+  EXPECT_NEAR(told.at("contact_m").at(2).get<double>(), 0.1, 1e-3);
+  EXPECT_LT(told.at("drift_n").get<double>(), 0.02);
+  EXPECT_EQ(told.at("drift_n_s").size(), 3u);
+  EXPECT_LT(told.at("changed_share").get<double>(), 2e-4);
 }
 
 TEST_F(Record, NobodyListensAndThePushGoesOn) {
