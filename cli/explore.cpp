@@ -205,6 +205,9 @@ int run(const Options& given, Session& session) {
     EarlierExploration earlier = earlier_exploration(given.out, scene, given.views);
     scene = std::move(earlier.recording);
     truth.go_on(scene.pushes);
+    std::size_t steps = 0;
+    for (const Push& push : scene.pushes) steps += push.steps.size();
+    robot->go_on_after(steps);
     for (const std::string& words : earlier.words) session.warn(words);
   } else if (given.views > 0 && !look_around(*robot, given.views, scene)) {
     session.say("stopped on request before the first push; nothing was recorded");

@@ -15,6 +15,7 @@ struct Hint {
 
 constexpr Hint hints[] = {
     {"ObjectOptions.stands", "--stands rough"},
+    {"ObjectOptions.region_ratio", "--region-ratio"},
     {": extent_m", "--object-size"},
     {"result: regions", "--regions none"},
     {"PushOptions.increment_m", "--increment"},

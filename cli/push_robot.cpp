@@ -80,6 +80,7 @@ class FromLab : public PushRobot {
     return places_.empty() ? lab_.object().force_step_at(lab_.object().sites[site]) : lab_.object().force_step_n;
   }
   double travel_limit_m() const override { return lab_.object().travel_limit_m; }
+  void go_on_after(std::size_t steps) override { lab_.go_on_after(steps); }
   std::optional<nlohmann::json> truth() const override { return truth_json(lab_); }
   nlohmann::json truth_of(const Push& push, const Step& step) const override { return truth_json(push, step, lab_); }
 

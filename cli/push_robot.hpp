@@ -42,6 +42,8 @@ class PushRobot {
   /// Between recorded steps, where the user says nothing.
   virtual double force_step_n(std::size_t site) const = 0;
   virtual double travel_limit_m() const = 0;
+  /// The recording has so many steps already: a simulation must not err as it did then.
+  virtual void go_on_after([[maybe_unused]] std::size_t steps) {}
   /// What only a simulation knows; nothing where the world is real.
   virtual std::optional<nlohmann::json> truth() const { return {}; }
   virtual nlohmann::json truth_of(const Push&, const Step&) const { return {}; }

@@ -60,10 +60,14 @@ nlohmann::json demo_truth_json(const lab::DemoTruth& truth) {
 struct Made {
   nlohmann::json told = nlohmann::json::array();
   int steps = 0;
+  bool loaded = false;  ///< some step is under load: there is something to estimate
   bool fine = true;
 };
 
 nlohmann::json json_of(const acquisition::PushPlan& plan, const acquisition::PushReport& report) {
+  const bool touched = report.deepest_m > 0;
+  nlohmann::json drift_n_s;
+  if (report.drift) drift_n_s = {report.drift->rate_n_s.x(), report.drift->rate_n_s.y(), report.drift->rate_n_s.z()};
   return {{"push", plan.name},
           {"site", plan.site},
           {"stop", acquisition::to_words(report.stop)},
@@ -71,8 +75,13 @@ nlohmann::json json_of(const acquisition::PushPlan& plan, const acquisition::Pus
           {"steps", report.steps},
           {"highest_force_n", report.highest_force_n},
           {"deepest_m", report.deepest_m},
+          {"overshoot_n", report.overshoot_n},
+          {"contact_m", touched ? nlohmann::json({report.contact_m.x(), report.contact_m.y(), report.contact_m.z()}) : nlohmann::json()},
+          {"drift_n", report.drift ? nlohmann::json(report.drift_n) : nlohmann::json()},
+          {"drift_n_s", drift_n_s},
           {"unsettled", report.unsettled},
-          {"came_back", report.compared ? nlohmann::json(report.came_back) : nlohmann::json()}};
+          {"came_back", report.compared ? nlohmann::json(report.came_back) : nlohmann::json()},
+          {"changed_share", report.compared ? nlohmann::json(report.changed_share) : nlohmann::json()}};
 }
 
 /// The force or the object ended it, not the robot or the user.
@@ -80,6 +89,9 @@ bool ended_well(acquisition::StopReason stop) {
   using enum acquisition::StopReason;
   return acquisition::is_at_a_limit(stop) || stop == slip || stop == contact_lost;
 }
+
+bool is_loaded(const Step& step) { return !step.loads.empty(); }
+bool is_loaded(const Push& push) { return std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) { return is_loaded(step); }); }
 
 const Push* push_named(const std::vector<Push>& pushes, const std::string& name) {
   for (const Push& push : pushes)
@@ -121,6 +133,9 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
     }
   }
   const std::vector<Push> recorded = recording.pushes;
+  std::size_t steps_before = 0;
+  for (const Push& push : recorded) steps_before += push.steps.size();
+  robot->go_on_after(steps_before);
   NewFolder made_here(folder);
   io::RecordingWriter writer(folder, recording);
   io::BagFolder so_far_said;
@@ -132,12 +147,13 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   scene.pushes.clear();
   LoggedRobot logged(later, scene, std::move(so_far_said));
   Made made;
+  made.loaded = std::any_of(recorded.begin(), recorded.end(), [](const Push& push) { return is_loaded(push); });
   for (std::size_t site = 0; site < plans.size() && !Session::interrupted(); ++site) {
     const acquisition::PushPlan plan = robot->plan(site);  // the robot then presses there
     if (!(arguments.push.force_step_n > 0)) protocol.force_step_n = robot->force_step_n(site);
     const Push* const so_far = push_named(recorded, plan.name);
     if (so_far != nullptr && so_far != &recorded.back()) continue;  // a later one was begun
-    bool begun = so_far != nullptr;
+    bool begun = so_far != nullptr, loaded = so_far != nullptr && is_loaded(*so_far);
     const acquisition::PushReport report = acquisition::run_push(
         logged, plan, protocol,
         [&](const Push& push, const Step& step) {
@@ -145,6 +161,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
           if (!begun) writer.begin_push(push);
           begun = true;
           writer.add_step(step);
+          loaded = loaded || is_loaded(step);
           made_here.keep();
           if (!arguments.raw_bag.empty()) logged.write_bag_if_small(arguments.raw_bag, protocol);
           const double force = step.loads.empty() ? 0.0 : step.loads[0].force_n->norm();
@@ -161,15 +178,23 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
     else
       session.say(fmt::format("{} stopped: {} ({}). {:.1f} N, {:.1f} mm; {} steps", plan.name, acquisition::to_words(report.stop), why,
                               report.highest_force_n, 1000 * report.deepest_m, report.steps));
+    if (report.stop == acquisition::StopReason::slip) session.warn(fmt::format("{}: {}", plan.name, report.message));
+    if (report.steps > 0 && !loaded && report.stop != acquisition::StopReason::user)
+      session.warn(fmt::format("{}: {} before any step under load, so nothing can be estimated from it; push elsewhere or more across the "
+                               "surface, or with a smaller --force-step",
+                               plan.name, acquisition::to_words(report.stop)));
     made.told.push_back(json_of(plan, report));
     made.steps += report.steps;
-    made.fine = made.fine && ended_well(report.stop);
+    made.loaded = made.loaded || loaded;
+    made.fine = made.fine && loaded && ended_well(report.stop);
     if (report.stop == acquisition::StopReason::obstacle) break;  // a person looks first; --resume goes on
   }
   const bool nothing = made.steps == 0 && recorded.empty();
   session.say(nothing ? fmt::format("{}: nothing was recorded", arguments.output)
-                      : fmt::format("{}: {} steps{}. Next: palpate estimate {} -o RESULT", arguments.output, made.steps,
-                                    truth.is_known() ? "; the truth is in " + truth_file.string() : "", arguments.output));
+                      : fmt::format("{}: {} steps{}. {}", arguments.output, made.steps,
+                                    truth.is_known() ? "; the truth is in " + truth_file.string() : "",
+                                    made.loaded ? fmt::format("Next: palpate estimate {} -o RESULT", arguments.output)
+                                                : "None is under load: nothing can be estimated from it"));
   if (!arguments.raw_bag.empty())
     session.say(fmt::format("{}: all that the sensors said, as a robot's recorder keeps it", arguments.raw_bag));
   nlohmann::json json = {{"recording", arguments.output},

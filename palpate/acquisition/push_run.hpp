@@ -48,6 +48,14 @@ class PushRun {
   Vec3 force(const RobotState& state) const { return state.force_n - report_.tare_n; }
   double pressing(const RobotState& state) const { return along(force(state)); }
   double travel(const RobotState& state) const { return along(state.T_base_tip.translation() - report_.contact_m); }
+  // Until a step has told where the force began, contact counts from where it was noticed. Limits hold from where it began, as far
+  // as that can be known.
+  double late_m(double travel_m);
+  double gone_m(const RobotState& state) { return travel(state) + late_m(travel(state)); }
+  bool is_at_travel_limit(const RobotState& state) {
+    const double fine_m = begins_late_ ? 0.1 * options_.increment_m : 1e-9;  // as fine as late_m() is
+    return gone_m(state) >= options_.travel_limit_m - fine_m;
+  }
   RobotState look() {
     const RobotState state = robot_.read();
     peak_n_ = std::max(peak_n_, pressing(state));
@@ -210,6 +218,8 @@ class PushRun {
   MotionLengths lengths_{options_};
   std::vector<sensing::ContactSample> approach_, history_;  // before contact was noticed, and since
   Vec3 noticed_m_ = Vec3::Zero();                           // there
+  std::size_t late_of_ = 0;                                 // so many samples of history_ gave ...
+  double late_m_ = 0;                                       // ... this
   double free_air_std_n_ = 0, tared_at_s_ = 0;
   std::optional<TorqueMean> torque_tare_;
   bool in_front_ = false;     // the tip has been in front of the object

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <utility>
 
+#include "palpate/acquisition/force_begin.hpp"
 #include "palpate/sensing/push_events.hpp"
 
 namespace palpate::acquisition {
@@ -45,6 +46,7 @@ void PushRun::touched(const std::vector<sensing::ContactSample>& samples, std::s
   // Encoders are absolute: what goes on counts from the zero that the recorded travels have.
   report_.contact_m = recorded_.contact_m.value_or(noticed_m_);
   begins_late_ = true;
+  late_of_ = 0;
   approach_.assign(samples.begin(), samples.begin() + std::ptrdiff_t(contact));
   history_.assign(samples.begin() + std::ptrdiff_t(contact), samples.end());
   lengths_.touched(at_m_, motion_m);
@@ -84,7 +86,7 @@ Stopped PushRun::rise() {
       end_rise(top_recorded);
       return at_force_limit();
     }
-    if (travel(state) >= options_.travel_limit_m - 1e-9) {
+    if (is_at_travel_limit(state)) {
       end_rise(top_recorded);
       return at_travel_limit();
     }
@@ -96,7 +98,7 @@ Stopped PushRun::rise() {
         if (lengths_.is_far_beyond(along(history_.back().force_n), at_m_)) continue;
       }
       target += options_.force_step_n;
-      if (travel(robot_.read()) < options_.travel_limit_m - 1e-9) settle_and_record(false);  // else as the last one
+      if (!is_at_travel_limit(robot_.read())) settle_and_record(false);  // else as the last one
       continue;
     }
     advance(state);
@@ -118,9 +120,25 @@ Stopped PushRun::at_travel_limit() const {
   return {StopReason::robot_travel_limit, words.str()};
 }
 
+double PushRun::late_m(double travel_m) {
+  if (!begins_late_ || recorded_.contact_m) return 0;
+  if (late_of_ == history_.size()) return late_m_;
+  late_of_ = history_.size();
+  std::vector<sensing::ContactSample> samples = approach_;
+  samples.insert(samples.end(), history_.begin(), history_.end());
+  const auto found_m = [&](double increment_m) {
+    const ForceBeginSearch search{options_.search_distance_m, increment_m, increment_m};
+    return std::max(0.0, force_began_before_m(samples, noticed_m_, plan_.direction, search));
+  };
+  // Roughly, until the limit is near.
+  late_m_ = found_m(5 * options_.increment_m);
+  if (travel_m + late_m_ + 4 * options_.increment_m >= options_.travel_limit_m) late_m_ = found_m(options_.increment_m);
+  return late_m_;
+}
+
 void PushRun::advance(const RobotState& state) {
   const double from_m = at_m_;
-  move_to(at_m_ + std::min(next_m(state), options_.travel_limit_m - travel(state)), options_.push_speed_m_s);
+  move_to(at_m_ + std::min(next_m(state), options_.travel_limit_m - gone_m(state)), options_.push_speed_m_s);
   robot_.wait(options_.sample_period_s);
   history_.push_back(sample(robot_.read()));
   lengths_.moved(at_m_ - from_m, along(history_.back().force_n) - pressing(state));

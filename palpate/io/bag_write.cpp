@@ -46,6 +46,7 @@ class BagWriter {
   void write(const fs::path& folder) {
     if (recording_.robot)
       put("/robot_description", "std_msgs/msg/String", time_ns_, encode(urdf_for_viewers(*recording_.robot, folder)));
+    if (!is_any_loaded()) put_free_air();
     for (const Push& push : recording_.pushes) add_push(push);
     const std::string head = "format: palpate-mapping/1\n" + object_text(recording_, folder);
     write_file(folder / "mapping.yaml", head + mapping_text());
@@ -53,6 +54,20 @@ class BagWriter {
   }
 
  private:
+  // A mapping names the topics of force and tip, and those must be there: pushes that never pressed have one reading before them.
+  void put_free_air() {
+    Pose tip = Pose::Identity();
+    for (const Push& push : recording_.pushes)
+      for (const Step& step : push.steps)
+        if (step.T_base_tip) tip = *step.T_base_tip;
+    put("/wrench", "geometry_msgs/msg/WrenchStamped", time_ns_, encode(RosWrench{header("base"), Vec3::Zero(), Vec3::Zero()}));
+    put("/tf", "tf2_msgs/msg/TFMessage", time_ns_, encode(std::vector<RosTransform>{{header("base"), "tip", tip}}));
+  }
+  bool is_any_loaded() const {
+    for (const Push& push : recording_.pushes)
+      if (std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) { return !step.loads.empty(); })) return true;
+    return false;
+  }
   void put(const std::string& topic, const std::string& type, std::int64_t time_ns, const std::string& data) {
     bag_.put(topic, type, time_ns, data);
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/lab/object.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -289,6 +290,14 @@ constexpr std::array<BuiltInObject, 6> table_of_objects{{
     {"balloon", "inflated skin of 150 mm, at its top: it has an apparent modulus only", balloon, {0.6, 0.7}},
 }};
 
+constexpr std::array<std::string_view, 2> with_regions{"bar", "bear"};
+
+// Before anything is made: a ratio that changes nothing would be believed to have.
+void check_regions(std::string_view name, const ObjectOptions& o) {
+  if (o.region_ratio == 1 || std::find(with_regions.begin(), with_regions.end(), name) != with_regions.end()) return;
+  throw Error("must be 1 for " + std::string(name) + ", which is of one stiffness; objects with regions are: bar, bear", "ObjectOptions.region_ratio");
+}
+
 LabObject looking(LabObject object, const ObjectOptions& o, const Look& usual) {
   object.look = {o.albedo.value_or(usual.albedo), o.texture.value_or(usual.texture)};
   return object;
@@ -348,6 +357,7 @@ std::span<const BuiltInObject> built_in_objects() { return table_of_objects; }
 LabObject make_object(std::string_view name, const ObjectOptions& options) {
   std::string names;
   for (const BuiltInObject& row : table_of_objects) {
+    if (row.name == name) check_regions(name, options);
     if (row.name == name) return looking(row.make(options), options, row.look);
     names += (names.empty() ? "" : ", ") + std::string(row.name);
   }
@@ -372,6 +382,7 @@ LabObject object_from_surface(const TriMesh& surface, const std::string& name, c
   const Vec3 extent = check.max_m - check.min_m;
   if (!(extent.minCoeff() > 0.02 && extent.maxCoeff() < 0.5))
     throw Error("must be between 2 cm and 50 cm large; are its units metres? Scale it first", name + ": extent_m");
+  check_regions("the surface " + name, options);
   LabObject object = draw(name, options);
   object.description = "the surface " + name + ", " + standing(options);
   object.surface = surface;

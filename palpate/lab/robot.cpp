@@ -120,6 +120,18 @@ acquisition::Motion LabRobot::move(const Pose& T_base_tip, double speed_m_s) {
   return acquisition::Motion::done;
 }
 
+void LabRobot::go_on_after(std::size_t steps) {
+  Impl& lab = *impl_;
+  if (steps == 0) return;
+  const auto of = [&](std::uint64_t stream) { return Random(lab.options.seed, stream + 16 * std::uint64_t(steps)); };
+  lab.joint_random = of(1);
+  lab.force_random = of(2);
+  lab.depth_random = of(3);
+  lab.torque_random = of(7);
+  lab.way_joint_random = of(8);
+  lab.way_force_random = of(9);
+}
+
 void LabRobot::on_the_way(bool is) { impl_->on_the_way = is; }
 void LabRobot::wait(double duration_s) { impl_->clock_s += duration_s; }
 

@@ -61,6 +61,8 @@ class LabRobot : public acquisition::Robot {
   /// As much force as the sensor can tell: beyond its range the reading stays, however hard the tip presses.
   acquisition::RobotLimits limits() const override;
   void on_the_way(bool is) override;
+  /// Of a recording that has so many steps already: what follows errs anew, and not as its beginning did. 0: nothing changes.
+  void go_on_after(std::size_t steps);
   /// One image of look_around().
   std::optional<DepthFrame> look(int view, int views) override;
 

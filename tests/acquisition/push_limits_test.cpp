@@ -100,6 +100,30 @@ TEST(PushProtocol, WhereNothingAnnouncedTheForceItIsTakenBackAndSaid) {
   EXPECT_NEAR(top_n, 8, 1.3);
 }
 
+// Contact is noticed late; where no step under load has told where the force began, the limit holds from there all the same.
+TEST(PushProtocol, TheTravelLimitHoldsFromTheFirstTouch) {
+  for (const double limit_m : {0.001, 0.0015, 0.003, 0.006})
+    for (unsigned seed = 1; seed <= 40; ++seed) {
+      SpringRobot robot;
+      robot.generator.seed(seed);
+      robot.surface_m = 0.1 - 1.3e-5 * seed;
+      PushOptions o = options();
+      o.travel_limit_m = limit_m;
+      o.force_step_n = seed % 2 == 0 ? 2 : 100;  // a step before the limit, at 5 mm, or none
+      const double surface_m = robot.surface_m;
+      double deepest_m = 0;
+      const PushReport report = run_push(robot, plan(), o, [&](const Push&, const Step& step) {
+        deepest_m = std::max(deepest_m, surface_m - step.T_base_tip->translation().z());
+      });
+      ASSERT_EQ(report.stop, StopReason::travel_limit) << report.message;
+      // Nothing is known of an object before its force is beyond the threshold: 0.3 N are 0.75 mm, and the motion may be at its end.
+      const double touched_m = 0.3 / robot.stiffness_n_m + o.increment_m;
+      EXPECT_LE(deepest_m, std::max(limit_m, touched_m) + 0.5 * o.increment_m) << limit_m << " " << seed;
+      EXPECT_GE(deepest_m, limit_m - 1.5 * o.increment_m) << "nor long before";
+      EXPECT_LE(report.deepest_m, std::max(limit_m, touched_m) + 0.5 * o.increment_m) << "as it is told";
+    }
+}
+
 // An arm that errs by several force steps a motion still records what it reached.
 TEST(PushProtocol, AStiffContactUnderAnArmThatErrsIsRecordedToo) {
   for (unsigned seed = 1; seed <= 60; ++seed) {

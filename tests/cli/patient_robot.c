@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  * The example's spring in real time, ten times as fast as its clock says, so that a signal can catch it in the middle of a push.
- * What it was told to do goes into the file that PATIENT_ROBOT_LOG names, a line a call.
+ * What it was told to do goes into the file that PATIENT_ROBOT_LOG names, a line a call. Where PATIENT_ROBOT_TIP names a file the arm
+ * stands there as it was left when the program is started again.
  */
 #define _POSIX_C_SOURCE 199309L
 #include "palpate/acquisition/driver.h"
@@ -29,6 +30,29 @@ static void pass(double duration_s) {
   }
 }
 
+/* In one piece, for the program may be killed in the middle of it. */
+static void keep_tip(const struct PalpatePose* tip) {
+  const char* name = getenv("PATIENT_ROBOT_TIP");
+  char beside[4096];
+  FILE* file;
+  if (!name || snprintf(beside, sizeof beside, "%s.new", name) >= (int)sizeof beside) return;
+  file = fopen(beside, "w");
+  if (!file) return;
+  fprintf(file, "%.17g %.17g %.17g\n", tip->position_m[0], tip->position_m[1], tip->position_m[2]);
+  fclose(file);
+  rename(beside, name);
+}
+
+static void stand_where_left(struct PalpatePose* tip) {
+  const char* name = getenv("PATIENT_ROBOT_TIP");
+  FILE* file = name ? fopen(name, "r") : NULL;
+  double at[3];
+  if (!file) return;
+  if (fscanf(file, "%lf %lf %lf", &at[0], &at[1], &at[2]) == 3)
+    for (int i = 0; i < 3; ++i) tip->position_m[i] = at[i];
+  fclose(file);
+}
+
 static int wait_really(void* self, double duration_s) {
   pass(duration_s);
   return spring.wait(self, duration_s);
@@ -39,6 +63,7 @@ static int move_and_say(void* self, const struct PalpatePose* T_base_tip, double
   int answer;
   say("move");
   answer = spring.move(self, T_base_tip, speed_m_s);
+  keep_tip(&((struct World*)self)->tip);
   pass(((struct World*)self)->clock_s - before_s);
   return answer;
 }
@@ -52,6 +77,7 @@ int palpate_make_robot(uint32_t abi, const char* settings, struct PalpateRobot* 
   const int answer = make_spring_robot(abi, settings, robot, error, error_size);
   if (answer != PALPATE_DONE) return answer;
   spring = *robot;
+  stand_where_left(&((struct World*)robot->self)->tip);
   robot->wait = wait_really;
   robot->move = move_and_say;
   robot->stop = stop_and_say;

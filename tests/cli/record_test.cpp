@@ -149,6 +149,71 @@ TEST_F(Record, KilledItsRawBagHoldsWhatWasSaidAndGoesOn) {
   EXPECT_THAT(said, HasSubstr("--raw-bag: holds only what the sensors say from now on"));
 }
 
+// The arm stays as it was, pressed into the object from the first step under load to the last.
+TEST_F(Record, KilledAtEveryStepItGoesOnFromWhereTheTipStands) {
+  const auto words = [&](std::vector<std::string> more = {}) {
+    more.insert(more.end(), {"--settling-window", "0.4", "--settling-rate", "0.2", "--free-air-samples", "20"});
+    return with_contact(PALPATE_PATIENT_ROBOT, more);
+  };
+  int pressed = 0;
+  for (std::size_t step = 0; step < 7; ++step) {
+    fs::remove_all(path("recording"));
+    fs::remove(path("tip"));
+    said.clear();
+    const pid_t child = start(words());
+    for (std::size_t k = 0; k <= step; ++k) ASSERT_TRUE(says("push 1 (")) << said;
+    kill(child, SIGKILL);
+    EXPECT_EQ(wait_for(child), 1000 + SIGKILL) << step;
+    const std::size_t before = read_recording_unchecked(folder.path() / "recording").pushes.at(0).steps.size();
+    EXPECT_EQ(before, step + 1);
+    double x_m = 0, y_m = 0, z_m = 0;
+    std::ifstream(path("tip")) >> x_m >> y_m >> z_m;
+    pressed += z_m < 0.1;
+    ASSERT_EQ(palpate(words({"--resume"})), 0) << step << ": " << said;
+    const Recording recording = made();
+    EXPECT_TRUE(check_recording(recording).empty());
+    ASSERT_EQ(recording.pushes.size(), 1u);
+    ASSERT_EQ(recording.pushes[0].steps.size(), 7u) << step;  // rest, 2, 4, 6 N, two on the way back, rest
+    const std::vector<double> expected_n{0, 2, 4, 6, 4, 2, 0};
+    double time_s = -1;
+    for (std::size_t k = 0; k < 7; ++k) {
+      const Step& one = recording.pushes[0].steps[k];
+      EXPECT_GT(one.time_s, time_s);
+      time_s = one.time_s;
+      EXPECT_EQ(one.unloading, k > 3);
+      ASSERT_EQ(one.loads.size(), k == 0 || k == 6 ? 0u : 1u) << step;
+      if (one.loads.empty()) continue;
+      // The tare is free air's, though the arm was found pressed: force and travel lie on one line through zero.
+      const double force_n = -one.loads[0].force_n->z(), travel_m = std::get<ToolTravel>(one.observations.front()).travel_m;
+      EXPECT_NEAR(force_n, expected_n[k], 1.3) << step << ", " << k << ": two motions of 0.4 N and what noise does";
+      EXPECT_NEAR(force_n, 800 * travel_m, 0.3) << step << ", " << k;
+    }
+  }
+  EXPECT_EQ(pressed, 5) << "all but the first and the last";
+}
+
+// What follows must not err as the beginning did: a resumed run would count the same noise twice.
+TEST_F(Record, TheLabErrsAnewWhereItGoesOn) {
+  const std::vector<std::string> words{"record", "--object", "cube", "--young-modulus", "20000", "--force-limit", "4", "--force-step", "2",
+                                       "--contact", "0.58", "0", "0.15", "-o", path("recording")};
+  ASSERT_EQ(palpate(words), 0) << said;
+  std::vector<std::string> more = words;
+  more.insert(more.end(), {"--contact", "0.63", "0", "0.15", "--resume"});
+  ASSERT_EQ(palpate(more), 0) << said;
+  const Recording recording = made();
+  ASSERT_EQ(recording.pushes.size(), 2u);
+  const auto image = [&](std::size_t push) { return std::get<DepthFrame>(recording.pushes[push].steps.front().observations.back()).depth_m; };
+  const DepthImage first = image(0), second = image(1);
+  ASSERT_EQ(first.size(), second.size());
+  Index same = 0, seen = 0;
+  for (Index i = 0; i < first.size(); ++i) {
+    seen += first.data()[i] > 0 && second.data()[i] > 0;
+    same += first.data()[i] > 0 && first.data()[i] == second.data()[i];
+  }
+  EXPECT_GT(seen, 10000);
+  EXPECT_LT(same, seen / 5) << "the table in the picture, to the last digit of the sensor";
+}
+
 TEST_F(Record, ItsTruthIsThereStepByStep) {
   const std::vector<std::string> words{"record",         "--object",      "cube", "-o", path("recording"), "--young-modulus", "20000",
                                        "--force-limit", "5", "--force-step", "2"};
@@ -219,6 +284,54 @@ TEST_F(Record, GoesOnWithTheSameThingOnly) {
   refused(thicker, "rest shape");
   ASSERT_EQ(palpate(with_contact(spring, {"--contact", "0.52", "0.01", "0.1", "--contact", "0.51", "0", "0.1", "--resume"})), 0) << said;
   EXPECT_EQ(made().pushes.size(), 3u) << "more pushes of the same thing are welcome";
+}
+
+TEST_F(Record, TheSameSeedGivesTheSameBytes) {
+  const auto record_with = [&](const std::string& name, const std::string& threads) {
+    fs::create_directories(path(name));
+    return palpate({"--seed", "7", "--threads", threads, "record", "--object", "cube", "--contact", "0.58", "0", "0.15", "--travel-limit",
+                    "0.004", "--unloading-steps", "1", "--views", "3", "-o", path(name + "/recording"), "--bag", path(name + "/bag"),
+                    "--raw-bag", path(name + "/raw")});
+  };
+  ASSERT_EQ(record_with("one", "1"), 0) << said;
+  ASSERT_EQ(record_with("again", "1"), 0) << said;
+  ASSERT_EQ(record_with("two", "2"), 0) << said;
+  int compared = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(path("one"))) {
+    if (!entry.is_regular_file()) continue;
+    const fs::path file = fs::relative(entry.path(), path("one"));
+    for (const std::string other : {"again", "two"}) {
+      EXPECT_TRUE(read_file(entry.path()) == read_file(path(other) / file)) << file << ", " << other;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 10);
+  for (const char* what : {"recording/recording.yaml", "recording.truth.json", "bag/mapping.yaml", "raw/mapping.yaml"})
+    EXPECT_TRUE(fs::exists(fs::path(path("one")) / what)) << what;
+}
+
+TEST_F(Record, ASlipBeforeAnyLoadIsNoSuccess) {
+  const std::vector<std::string> words{"record", "--object", "cube", "--young-modulus", "20000", "--slip-at", "0.002", "--force-step", "20",
+                                       "--slip-sideways", "0.001", "--slip-least-force", "0.1", "--contact", "0.6", "0", "0.15",
+                                       "-o", path("recording"), "--bag", path("bag")};
+  EXPECT_EQ(palpate(words), numbers) << said;
+  EXPECT_THAT(said, HasSubstr("before any step under load, so nothing can be estimated from it"));
+  EXPECT_THAT(said, Not(HasSubstr("Next: palpate estimate")));
+  for (const Step& step : read_recording_unchecked(folder.path() / "recording").pushes.at(0).steps) EXPECT_TRUE(step.loads.empty());
+  palpate({"info", path("bag")});
+  EXPECT_THAT(said, Not(HasSubstr("is not in the bag")));
+}
+
+TEST_F(Record, TheReportHasWhatTheProtocolFound) {
+  ASSERT_EQ(palpate(with_contact(spring, {"--json", "--bag", path("bag")})), 0) << said;
+  const std::size_t begins = said.find("{\n"), ends = said.rfind("\n}") + 2;
+  ASSERT_LT(begins, ends);
+  const nlohmann::json told = nlohmann::json::parse(said.substr(begins, ends - begins)).at("pushes").at(0);
+  EXPECT_EQ(told.at("overshoot_n"), 0);
+  EXPECT_NEAR(told.at("contact_m").at(2).get<double>(), 0.1, 1e-3);
+  EXPECT_LT(told.at("drift_n").get<double>(), 0.02);
+  EXPECT_EQ(told.at("drift_n_s").size(), 3u);
+  EXPECT_LT(told.at("changed_share").get<double>(), 2e-4);
 }
 
 TEST_F(Record, NobodyListensAndThePushGoesOn) {

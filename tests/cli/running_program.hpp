@@ -31,6 +31,7 @@ class RunningProgram : public testing::Test {
     const pid_t child = fork();
     if (child == 0) {
       setenv("PATIENT_ROBOT_LOG", path("calls").c_str(), 1);
+      setenv("PATIENT_ROBOT_TIP", path("tip").c_str(), 1);
       dup2(ends[1], STDERR_FILENO);
       dup2(ends[1], STDOUT_FILENO);
       close(ends[0]);

@@ -26,6 +26,23 @@ const T* observation(const Step& step) {
   return nullptr;
 }
 
+// Every push slipped before a step under load: what was seen is there, and can be read.
+TEST(BagWrite, PushesThatNeverPressedComeBack) {
+  const TemporaryFolder folder("bag_never_pressed");
+  Recording recording = made_up();
+  for (Push& push : recording.pushes) {
+    std::erase_if(push.steps, [](const Step& step) { return !step.loads.empty(); });
+    ASSERT_FALSE(push.steps.empty());
+  }
+  write_bag(recording, folder.path() / "bag");
+  const Recording back = read_back(folder.path() / "bag");
+  ASSERT_EQ(back.pushes.size(), recording.pushes.size());
+  for (std::size_t p = 0; p < back.pushes.size(); ++p) {
+    ASSERT_EQ(back.pushes[p].steps.size(), recording.pushes[p].steps.size());
+    for (const Step& step : back.pushes[p].steps) EXPECT_TRUE(step.loads.empty());
+  }
+}
+
 TEST(BagWrite, ComesBackAsItWas) {
   const TemporaryFolder folder("bag_write");
   const Recording recording = made_up();

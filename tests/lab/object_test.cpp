@@ -50,6 +50,29 @@ TEST(ImplicitSurface, IsCutFlatAtItsFoot) {
   EXPECT_THROW(implicit_surface([](const Vec3&) { return 1.0; }, {{-0.1, -0.1, 0}, {0.1, 0.1, 0.1}, 0.01}), Error);
 }
 
+// A ratio that changes nothing would be believed to have.
+TEST(Regions, AreRefusedWhereAnObjectHasNone) {
+  ObjectOptions options;
+  options.region_ratio = 3;
+  for (const BuiltInObject& row : built_in_objects()) {
+    if (row.name == "bar" || row.name == "bear") {
+      EXPECT_GT(make_object(row.name, options).regions.size(), 1u) << row.name;
+      continue;
+    }
+    try {
+      make_object(row.name, options);
+      ADD_FAILURE() << row.name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.where(), "ObjectOptions.region_ratio");
+      EXPECT_NE(error.message().find("bar, bear"), std::string::npos) << error.message();
+    }
+  }
+  const TriMesh surface = make_object("cube").surface;
+  EXPECT_THROW(object_from_surface(surface, "block.obj", options), Error);
+  options.region_ratio = 1;
+  EXPECT_NO_THROW(object_from_surface(surface, "block.obj", options));
+}
+
 // The bar's upper half is four times as stiff: pressed on its end, 5 mm beside its axis, it is two springs in a row, and two
 // hinges, beside the dent that the pad makes in the upper half. nu = 0: its clamped end then holds nothing back sideways.
 TEST(Regions, OfTheBarAreSpringsInARow) {
@@ -94,7 +117,7 @@ TEST(Regions, AreInTheRecordingWithoutTheirStiffness) {
     });
     EXPECT_EQ(inside->name, site.name);
   }
-  EXPECT_TRUE(LabRobot({}, make_object("ball", options)).scene().regions.empty());
+  EXPECT_TRUE(LabRobot({}, make_object("ball")).scene().regions.empty());
   options.region_ratio = 0;
   EXPECT_THROW(make_object("bear", options), Error);
 }
@@ -138,6 +161,7 @@ TEST(Standing, CountsForWhatSpreads) {
 // Coulomb: pushed more sideways than friction bears, nothing holds the cube but a wall behind it.
 TEST(Standing, AWallHoldsWhatFrictionDoesNot) {
   ObjectOptions options = coarse(ContactLaw::friction, 0.3);
+  options.region_ratio = 1;
   options.friction_coefficient = 0.3;
   options.tetrahedra = 300;
   options.cells_in_radius = 1;
