@@ -13,6 +13,7 @@
 #include "cli/paths.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/lab/built_in.hpp"
 #include "palpate/report/words.hpp"
 
 namespace palpate::cli {
@@ -54,6 +55,28 @@ void compare_with_truth(Session& session, const nlohmann::json& truth, const nlo
   }
 }
 
+/// A prediction is for a push that has not been made: elsewhere than those of the recording, and with another force. The lab makes
+/// it afterwards.
+int predict_and_compare(Session& quiet_json, Session& session, const fs::path& out, const nlohmann::json& truth) {
+  constexpr double site_m = 0.005;  // those of the recording are at -20 and 30 mm
+  const std::vector<double> forces_n = truth.at("force_n").at(0);
+  const double force_n = 0.5 * (forces_n.at(forces_n.size() / 2) + forces_n.at(forces_n.size() / 2 + 1));
+  const lab::DemoPush made = lab::demo_push({}, truth.at("young_modulus_pa"), truth.at("poisson_ratio"), site_m, force_n);
+  const fs::path folder = out / "prediction";
+  std::vector<std::string> words{out.string(), "--contact"};
+  for (const double at_m : made.contact_m) words.push_back(fmt::format("{:g}", at_m));
+  for (const std::string& word : {std::string("--force"), fmt::format("{:g}", force_n), std::string("-o"), folder.string()}) words.push_back(word);
+  const int code = run_verb(verbs::predict, "predict", words, quiet_json);
+  if (code != exit_done) return code;
+  const nlohmann::json band = read_json(folder / "prediction.json").at("travel_m");
+  const double lower_m = band.at("lower_95"), upper_m = band.at("upper_95");
+  session.say(fmt::format("A push that the fit has not seen, at {:g} mm and {} (those seen: -20 and 30 mm): predicted {}, true {}, {} the 95 % band {}",
+                          1000 * site_m, report::quantity(force_n, "N"), report::quantity(band.at("value"), "m"),
+                          report::quantity(made.travel_m, "m"), lower_m <= made.travel_m && made.travel_m <= upper_m ? "inside" : "OUTSIDE",
+                          report::interval(lower_m, upper_m, "m")));
+  return exit_done;
+}
+
 int demonstrate(Session& session, fs::path out) {
   if (out.string().starts_with('-')) out = "." / out;  // the verbs below would take it for an option
   const fs::path recording = out / "recording", truth = out / "truth.json";
@@ -72,7 +95,10 @@ int demonstrate(Session& session, fs::path out) {
   mark_demo(out);
   code = run_verb(verbs::estimate, "estimate", {recording.string(), "-o", out.string()}, session);
   if (!fs::exists(out / "result.json")) return code;
-  compare_with_truth(session, read_json(truth), read_json(out / "result.json"));
+  const nlohmann::json known = read_json(truth);
+  compare_with_truth(session, known, read_json(out / "result.json"));
+  const int predicted = predict_and_compare(quiet_json, session, out, known);
+  if (code == exit_done) code = predicted;
   const int drawn = run_verb(verbs::report, "report", {out.string(), "--png", (out / "figures").string()}, quiet_json);
   return code != exit_done ? code : drawn;
 }

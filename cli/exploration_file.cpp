@@ -53,6 +53,19 @@ nlohmann::json json_of(const ExploredPush& push) {
           {"poisson_ratio_within_95", if_known(estimated, poisson_ratio_half_width(push.poisson_ratio))}};
 }
 
+std::string words_of(const FixedLists& lists, int max_pushes) {
+  const auto count = [&](const std::optional<int>& pushes) {
+    return pushes ? std::to_string(*pushes) : fmt::format("more than {}", 10 * max_pushes);
+  };
+  return fmt::format("a list in random order over the same {} pushes is expected to need {}, the best place alone {}", lists.candidates,
+                     count(lists.random), count(lists.repeated));
+}
+
+nlohmann::json json_of(const FixedLists& lists) {
+  const auto count = [](const std::optional<int>& pushes) { return pushes ? nlohmann::json(*pushes) : nlohmann::json(); };
+  return {{"candidates", lists.candidates}, {"random_order", count(lists.random)}, {"best_place_repeated", count(lists.repeated)}};
+}
+
 void ExplorationFile::go_on(const std::vector<Push>& recorded) {
   std::ifstream stream(file_);
   const nlohmann::json before = nlohmann::json::parse(stream, nullptr, false);

@@ -18,6 +18,10 @@ std::string moduli_words(const std::vector<Parameter>& young);
 /// What is not known (of pushes of an earlier run) is null.
 nlohmann::json json_of(const ExploredPush& push);
 
+/// "a list in random order over the same 24 pushes is expected to need 5, the best place alone 3".
+std::string words_of(const FixedLists& lists, int max_pushes);
+nlohmann::json json_of(const FixedLists& lists);
+
 class ExplorationFile {
  public:
   explicit ExplorationFile(std::filesystem::path file) : file_(std::move(file)) {}

@@ -233,10 +233,12 @@ int run(const Options& given, Session& session) {
   session.say(
       fmt::format("{} after {}. Next: open {}", found.message, count_of(found), (given.out / "report.html").string()));
 
+  if (found.fixed_lists) session.say(fmt::format("For this goal, {}", words_of(*found.fixed_lists, given.explore.max_pushes)));
   live.finish(answer, found.recording, (given.out / "report.html").string());
   nlohmann::json json = {{"format", "palpate-exploration/1"}, {"reached", found.reached},
                          {"message", found.message},          {"fruitless", found.fruitless},
                          {"pushes", kept.pushes.pushes(found)}, {"result", io::result_json(answer)}};
+  if (found.fixed_lists) json["expected_of_fixed_lists"] = json_of(*found.fixed_lists);
   if (given.compare && !Session::interrupted()) compare(session, given, found, json);
   kept.pushes.write(json);
   session.result(json);

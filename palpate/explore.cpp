@@ -320,9 +320,29 @@ class Loop {
     if (out_.reached) out_.message = std::string(two ? "both" : "all") + " intervals are as narrow as was asked for";
   }
 
+  /// Nobody pushes for it: what every push tells is known by now, and a list begins where this loop began.
+  void expect_fixed_lists() {
+    const PushRanking ranking = suggest(out_.scene, &out_.identified.answer, options_.suggest, hooks_.on_progress);
+    std::vector<RatedPush> pushes;
+    for (const std::size_t i : estimation::hardest_pushes(ranking)) pushes.push_back(ranking.pushes[i]);
+    if (pushes.empty()) return;
+    estimation::Knowledge fresh = estimation::before_touch(out_.scene.object, ranking.knowledge.young_modulus_pa);
+    fresh.poisson_ratio = ranking.knowledge.poisson_ratio;
+    fresh.log_ratio = ranking.knowledge.log_ratio;
+    fresh.uncured = ranking.knowledge.uncured;
+    FixedLists lists;
+    const int most = 10 * options_.max_pushes;
+    lists.candidates = static_cast<int>(pushes.size());
+    lists.random = estimation::shuffled_for_target(fresh, pushes, target(), most, options_.seed);
+    const auto again = estimation::repeat_for_target(fresh, pushes, target(), most);
+    if (again.reached) lists.repeated = static_cast<int>(again.order.size());
+    out_.fixed_lists = lists;
+  }
+
   Explored end(const std::string& message) {
     out_.message = message;
     const bool stopped = hooks_.keep_going && !hooks_.keep_going();
+    if (!out_.pushes.empty() && !out_.pushes.back().young_moduli.empty() && !stopped) expect_fixed_lists();
     if (options_.identify.fit.cross_checks && !out_.pushes.empty() && !stopped) estimate(true);
     return std::move(out_);
   }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,11 +57,20 @@ struct ExploredPush {
   estimation::ExpectedSpread found;        ///< standard deviations of that estimate
 };
 
+/// What fixed lists over the same candidates are expected to need for the goal, at the stiffness that was found. Nothing: not within
+/// ten times max_pushes.
+struct FixedLists {
+  int candidates = 0;           ///< pushes that could have been made
+  std::optional<int> random;    ///< in the middle of many orders that were drawn before the first push
+  std::optional<int> repeated;  ///< the place that needs the fewest, again and again
+};
+
 struct Explored {
   Recording recording;
   Identified identified;
   PushScene scene;
   std::vector<ExploredPush> pushes;
+  std::optional<FixedLists> fixed_lists;  ///< nothing: no estimate to expect them by, or stopped on request
   int fruitless = 0;     ///< pushes that found nothing to press on; they count, and their places are not tried again
                          ///< (of an earlier run those that recorded a step)
   bool reached = false;  ///< the goal

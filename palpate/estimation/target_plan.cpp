@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <utility>
 
 #include "palpate/core/error.hpp"
@@ -62,6 +63,16 @@ class Planner {
       plan = shorter;
     }
     return plan;
+  }
+
+  /// Pushes of a given order until the target is reached; most + 1 where they do not.
+  int of_list(const std::vector<std::size_t>& list, int most) const {
+    MatrixX information = knowledge_.information;
+    for (int n = 1; n <= most; ++n) {
+      information += pushes_[list[static_cast<std::size_t>(n - 1) % list.size()]].information;
+      if (target_.miss(spread(information)) <= 1) return n;
+    }
+    return most + 1;
   }
 
   /// The shortest plan of at most `most` pushes out of one or two of them.
@@ -217,6 +228,24 @@ TargetPlan plan_for_target(const Knowledge& knowledge, const std::vector<RatedPu
 TargetPlan repeat_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,
                              int most) {
   return Planner(knowledge, pushes, target).mixed(most, true);
+}
+
+std::optional<int> shuffled_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,
+                                       int most, std::uint64_t seed) {
+  constexpr std::size_t shuffles = 200;
+  if (pushes.empty()) return std::nullopt;
+  const Planner planner(knowledge, pushes, target);
+  std::mt19937_64 random(seed);
+  std::vector<std::size_t> list(pushes.size());
+  for (std::size_t i = 0; i < list.size(); ++i) list[i] = i;
+  std::vector<int> needed;
+  for (std::size_t k = 0; k < shuffles; ++k) {
+    for (std::size_t i = list.size(); i > 1; --i) std::swap(list[i - 1], list[random() % i]);
+    needed.push_back(planner.of_list(list, most));
+  }
+  std::sort(needed.begin(), needed.end());
+  const int middle = needed[shuffles / 2];
+  return middle <= most ? std::optional(middle) : std::nullopt;
 }
 
 }  // namespace palpate::estimation

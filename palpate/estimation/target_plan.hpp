@@ -3,6 +3,8 @@
 // the first of them where E and nu want different places.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "palpate/estimation/next_push.hpp"
@@ -35,5 +37,10 @@ TargetPlan plan_for_target(const Knowledge& knowledge, const std::vector<RatedPu
 /// The one push that needs to be repeated least, for comparison.
 TargetPlan repeat_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,
                              int most);
+
+/// How many pushes a list takes that was shuffled before the first of them and begins anew at its end: the number in the middle
+/// of many shuffles, of an even number the larger one. Nothing: more than `most`.
+std::optional<int> shuffled_for_target(const Knowledge& knowledge, const std::vector<RatedPush>& pushes, const SpreadTarget& target,
+                                       int most, std::uint64_t seed);
 
 }  // namespace palpate::estimation

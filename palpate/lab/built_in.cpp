@@ -31,8 +31,7 @@ struct TruePush {
   Index nodes = 0, tetrahedra = 0;
 };
 
-TruePush press_step_by_step(const DemoOptions& options, double site_m, double young_pa, double poisson, double level_n,
-                            const std::function<bool()>& keep_going) {
+PressedBlockOptions block_of(const DemoOptions& options, double site_m, double young_pa, double poisson) {
   PressedBlockOptions block;
   block.size_m = Vec3::Constant(options.edge_m);
   block.pad_radius_m = options.disc_radius_m;
@@ -42,7 +41,12 @@ TruePush press_step_by_step(const DemoOptions& options, double site_m, double yo
   block.material = options.material;
   block.young_modulus_pa = young_pa;
   block.poisson_ratio = poisson;
-  PressedBlock cube(block);
+  return block;
+}
+
+TruePush press_step_by_step(const DemoOptions& options, double site_m, double young_pa, double poisson, double level_n,
+                            const std::function<bool()>& keep_going) {
+  PressedBlock cube(block_of(options, site_m, young_pa, poisson));
   TruePush push;
   push.nodes = Index(cube.mesh().nodes_m.rows());
   push.tetrahedra = Index(cube.mesh().tetrahedra.rows());
@@ -259,6 +263,13 @@ Demo make_demo(const DemoOptions& options, const OnProgress& on_progress) {
     recording.pushes.push_back(std::move(push));
   }
   return demo;
+}
+
+DemoPush demo_push(const DemoOptions& options, double young_modulus_pa, double poisson_ratio, double site_m, double force_n) {
+  check(options);
+  PressedBlock cube(block_of(options, site_m, young_modulus_pa, poisson_ratio));
+  cube.press(force_n);
+  return {cube_centre_m + Vec3(site_m, 0, options.edge_m), force_n, cube.travel_m()};
 }
 
 Recording make_demo_recording(std::uint64_t seed) {

@@ -55,6 +55,15 @@ struct Demo {
 /// @throws Error naming the option that is out of range, or when the true object finds no equilibrium under its load.
 Demo make_demo(const DemoOptions& options = {}, const OnProgress& on_progress = {});
 
+/// A push of the same cube that no recording holds.
+struct DemoPush {
+  Vec3 contact_m = Vec3::Zero();  ///< on the top face, base frame; pressed along -z
+  double force_n = 0, travel_m = 0;
+};
+/// What the true cube does there.
+/// @param site_m  along x from the middle of its top face  @throws Error as make_demo
+DemoPush demo_push(const DemoOptions& options, double young_modulus_pa, double poisson_ratio, double site_m, double force_n);
+
 /// The recording alone.
 Recording make_demo_recording(std::uint64_t seed);
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -13,7 +14,10 @@
 #include <string>
 
 #include "io/recording_folder.hpp"
+#include "palpate/io/file.hpp"
 #include "palpate/io/recording.hpp"
+#include "palpate/lab/pressed_block.hpp"
+#include "palpate/report/words.hpp"
 
 namespace palpate::io {
 namespace {
@@ -49,6 +53,23 @@ TEST(Demo, GoesTheWholeWayAndIsRight) {
   EXPECT_EQ(found, (std::set<std::string>{"young_modulus", "poisson_ratio"}));
   EXPECT_THAT(folder.get("err"), HasSubstr("inside the 95 % interval"));
   EXPECT_THAT(folder.get("err"), Not(HasSubstr("OUTSIDE")));
+  // A push of its own, at another place than the two of the recording and with another force, by the lab's own solver.
+  const nlohmann::json predicted = read_json("prediction/prediction.json");
+  lab::PressedBlockOptions cube;
+  cube.young_modulus_pa = truth.at("young_modulus_pa");
+  cube.poisson_ratio = truth.at("poisson_ratio");
+  cube.site_m = predicted.at("contact_m").at(0).get<double>() - cube.base_centre_m.x();
+  const double force_n = predicted.at("force_n").at("value");
+  for (const double seen_m : {-0.02, 0.03}) EXPECT_GT(std::abs(cube.site_m - seen_m), 0.02);
+  for (const auto& push : truth.at("force_n"))
+    for (const double seen_n : push) EXPECT_GT(std::abs(force_n - seen_n), 0.2);
+  lab::PressedBlock pressed(cube);
+  pressed.press(force_n);
+  EXPECT_GE(pressed.travel_m(), predicted.at("travel_m").at("lower_95").get<double>());
+  EXPECT_LE(pressed.travel_m(), predicted.at("travel_m").at("upper_95").get<double>());
+  EXPECT_NEAR(predicted.at("travel_m").at("value").get<double>() / pressed.travel_m(), 1, 0.03);
+  EXPECT_THAT(folder.get("err"), HasSubstr("$ palpate predict "));
+  EXPECT_THAT(folder.get("err"), HasSubstr("true " + report::quantity(pressed.travel_m(), "m")));
   EXPECT_THAT(read_file(out / "report.html"), HasSubstr("</html>"));
   for (const char* figure : {"object", "force_travel", "posterior", "residuals", "per_push", "budget"})
     for (const char* kind : {".svg", ".png"})

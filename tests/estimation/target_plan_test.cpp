@@ -143,5 +143,20 @@ TEST(TargetPlan, NothingToChooseFromAndBadTargets) {
   EXPECT_THROW(plan_for_target(nearly_nothing(), {}, {0.05, std::nan("")}, 3), Error);
 }
 
+// Two pushes are needed, one for E and one for nu, among useless ones. The later of two places out of five is the second with a
+// chance of 1 in 10, the third with 2, the fourth with 3 and the fifth with 4: the fourth in the middle. Out of three: the third.
+TEST(TargetPlan, AShuffledListNeedsWhatChanceSays) {
+  const SpreadTarget target{0.04, 0.02};
+  std::vector<RatedPush> pushes{push_of(0.015, 0.3), push_of(0.3, 0.009), push_of(1, 1)};
+  EXPECT_EQ(shuffled_for_target(nearly_nothing(), pushes, target, 20, 1), 3);
+  pushes.push_back(push_of(1, 1));
+  pushes.push_back(push_of(1, 1));
+  EXPECT_EQ(shuffled_for_target(nearly_nothing(), pushes, target, 20, 1), 4);
+  EXPECT_EQ(shuffled_for_target(nearly_nothing(), pushes, target, 3, 1), std::nullopt) << "more than three";
+  EXPECT_EQ(shuffled_for_target(nearly_nothing(), {push_of(1, 1)}, target, 20, 1), std::nullopt);
+  // One that does it in two, over and over: the list begins anew at its end.
+  EXPECT_EQ(shuffled_for_target(nearly_nothing(), {push_of(0.025, 0.013)}, target, 20, 1), 2);
+}
+
 }  // namespace
 }  // namespace palpate::estimation

@@ -40,6 +40,11 @@ TEST(Explore, EndsWhenBothIntervalsAreAsNarrowAsAskedForAndHoldTheTruth) {
   }
   EXPECT_EQ(found.pushes.front().pushes_planned, static_cast<int>(found.pushes.size()));
   EXPECT_EQ(last.pushes_planned, 1);
+  // Whoever had written a list down before is expected to push more often; that this is so, the comparison of orders below shows.
+  ASSERT_TRUE(found.fixed_lists);
+  EXPECT_GE(found.fixed_lists->candidates, 8);
+  EXPECT_GT(found.fixed_lists->random.value_or(1000), static_cast<int>(found.pushes.size()));
+  EXPECT_GE(found.fixed_lists->repeated.value_or(1000), static_cast<int>(found.pushes.size()));
   // The recording is the whole of it, and every step was handed over as it was made.
   ASSERT_EQ(found.recording.pushes.size(), found.pushes.size());
   std::size_t steps = 0;
