@@ -33,7 +33,7 @@ struct Options {
   std::optional<double> poisson_ratio, young_start_pa;
   double mesh_tolerance = 0.01;
   int max_iterations = 60;
-  bool budget = false;
+  bool budget = false, compare_laws = false;
   LiveOptions live;
 };
 
@@ -69,6 +69,7 @@ IdentifyOptions identify_options(const Options& given, const Session& session) {
   if (given.young_start_pa) options.fit.young_start_pa = *given.young_start_pa;
   options.mesh_tolerance = given.mesh_tolerance;
   options.fit.max_iterations = given.max_iterations;
+  options.fit.compare_laws = given.compare_laws;
   options.fit.threads = session.thread_count();
   return options;
 }
@@ -103,6 +104,20 @@ void tell(Session& session, const HeldOut& held_out) {
   session.say(fmt::format("held out           {}:{}", held_out.what, words.substr(0, words.size() - 1)));
 }
 
+void tell(Session& session, const std::vector<LawFit>& laws) {
+  if (laws.empty()) return;
+  session.say("laws               fitted to the same data on one mesh; the highest loads predicted from the lower ones:");
+  for (const LawFit& fit : laws) {
+    if (!fit.usable) {
+      session.say(fmt::format("  {:<16} {}", fit.law, fit.message));
+      continue;
+    }
+    session.say(fmt::format("  {:<16} E {}, nu {:.3f}; force within {:.2g} %, surface {} rms, chi2 of these loads {:.0f}, of the fit {:.0f}", fit.law,
+                            report::quantity(fit.young_modulus_pa, "Pa"), fit.poisson_ratio, 100 * fit.held_out.force_error,
+                            report::quantity(fit.held_out.surface_rms_m, "m"), fit.held_out_chi2, fit.chi2));
+  }
+}
+
 void tell(Session& session, const Options& given, const Identification& answer) {
   for (const auto& parameter : answer.parameters) {
     const bool young = parameter.name == "young_modulus" && parameter.region.empty();
@@ -129,6 +144,7 @@ void tell(Session& session, const Options& given, const Identification& answer) 
                                         (as_given ? " (--refine auto does both)" : "")));
   }
   tell(session, answer.prediction);
+  tell(session, answer.laws);
   if (given.budget) {
     session.say("error budget       what each input's uncertainty does to E and nu:");
     for (const auto& entry : answer.budget) session.say(fmt::format("  {:<24} {}", entry.input, budget_words(entry)));
@@ -206,6 +222,8 @@ Run verbs::estimate(CLI::App& app) {
   app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)")
       ->check(positive_number());
   app.add_option("--max-iterations", given->max_iterations, "most iterations of the fit")->check(positive_number());
+  app.add_flag("--compare-laws", given->compare_laws,
+               "fit linear, neo_hookean and foam to the same data and predict the highest loads from the lower ones, also where E does not drift with the load");
   app.add_flag("--budget", given->budget, "print what each input's uncertainty does to E and nu");
   given->live.add_to(app);
   return [given](Session& session) { return estimate(session, *given); };

@@ -73,6 +73,7 @@ std::string stage_words(std::string_view stage) {
       {"posterior", "exploring the posterior"},
       {"stress", "stresses"},
       {"cross-check", "checking the parts against each other"},
+      {"other laws", "comparing laws of elasticity"},
       {"write", "writing"},
   };
   for (const auto& [name, said] : words) {

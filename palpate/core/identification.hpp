@@ -68,6 +68,26 @@ struct RegionShare {
   double young_modulus_percent = 0;
 };
 
+/// E of some of the loads alone, and how far they deform the object: the farthest of them.
+struct YoungAtLoad {
+  Parameter young;  ///< region = "low loads" or "high loads"
+  double force_n = HeldOut::unknown, travel_m = HeldOut::unknown;
+  double strain = HeldOut::unknown;       ///< travel over the object's extent along the push
+  double indentation = HeldOut::unknown;  ///< travel over the radius of the touched patch; NaN = not a round one
+};
+
+/// What another law makes of the same data, on one mesh for all laws.
+struct LawFit {
+  std::string law;
+  bool usable = false;
+  std::string message;  ///< where it is not: why
+  double young_modulus_pa = HeldOut::unknown, poisson_ratio = HeldOut::unknown;
+  double chi2 = HeldOut::unknown;           ///< of the fit: robust costs and priors, twice
+  double chi2_per_dof = HeldOut::unknown;
+  HeldOut held_out;                         ///< the highest load of each push, from the lower ones
+  double held_out_chi2 = HeldOut::unknown;  ///< what these loads add to chi2 while E and nu stay where the lower ones have them
+};
+
 /// What one input's uncertainty does to the answer.
 struct BudgetEntry {
   std::string input;
@@ -127,6 +147,8 @@ struct Identification {
   std::vector<BudgetEntry> budget_if;
   std::vector<Parameter> per_push;  ///< young_modulus of each push alone (region = push name)
   std::vector<Parameter> per_site;  ///< of all pushes at one place (region = its name); empty = one site
+  std::vector<YoungAtLoad> per_load;  ///< low loads, high loads; empty = pushes have one level only
+  std::vector<LawFit> laws;           ///< empty = not compared
   Termination termination = Termination::failed;
   std::string message = "identify() was not called.";
   std::map<std::string, std::string> provenance;

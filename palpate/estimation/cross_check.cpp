@@ -124,6 +124,8 @@ class CrossCheck {
     if (!any_low || !any_high || fits_.cancelled()) return;
     out.low_loads = fits_.young_of(low, "low loads");
     if (!fits_.cancelled()) out.high_loads = fits_.young_of(high, "high loads");
+    out.low_steps = std::move(low);
+    out.high_steps = std::move(high);
   }
 
   void compare_ways(CrossChecks& out) {

@@ -15,6 +15,7 @@ struct CrossChecks {
   std::vector<PartialYoung> pushes;             ///< empty where there is one push only
   std::vector<PartialYoung> sites;              ///< pushes at one place together; empty where there is one place only
   PartialYoung low_loads, high_loads;           ///< usable where pushes have levels
+  StepFlags low_steps, high_steps;              ///< what they are made of, with the unloaded steps
   PartialYoung loading, unloading;              ///< usable where steps were recorded on the way back
   HeldOut held_out;
   bool cancelled = false;

@@ -15,6 +15,8 @@
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/doubts.hpp"
 #include "palpate/estimation/error_budget.hpp"
+#include "palpate/estimation/law_comparison.hpp"
+#include "palpate/estimation/load_drift.hpp"
 #include "palpate/estimation/mesh_correction.hpp"
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/optimise.hpp"
@@ -27,19 +29,11 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr double z_95 = 1.959963984540054;
-
 /// E of each push (or site) alone, nu held at the joint optimum.
 std::vector<Parameter> young_of_parts(const std::vector<PartialYoung>& parts) {
   std::vector<Parameter> out;
   for (const auto& part : parts) {
-    if (!part.usable) continue;
-    Parameter young{"young_modulus", part.name, "Pa"};
-    young.value = std::exp(part.log_young);
-    young.std = young.value * part.std;
-    young.lower_95 = std::exp(part.log_young - z_95 * part.std);
-    young.upper_95 = std::exp(part.log_young + z_95 * part.std);
-    out.push_back(young);
+    if (part.usable) out.push_back(parameter_of(part));
   }
   return out;
 }
@@ -405,6 +399,12 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     if (regions.size() == 1) {  // of one region each, else
       answer.per_push = young_of_parts(checks.pushes);
       answer.per_site = young_of_parts(checks.sites);
+    }
+    answer.per_load = young_by_load(checks, model, answer.steps);
+    if (options.compare_laws || drifts_with_load(checks, answer.parameters[1].std)) {
+      LawComparison compared = compare_laws(recording, object, inputs, options, unknowns, optimum, progress);
+      if (compared.cancelled) return stopped();
+      answer.laws = std::move(compared.laws);
     }
   }
   answer.fit.solves = model.solves() + elsewhere.solves + (correction ? correction->model().solves() : 0);

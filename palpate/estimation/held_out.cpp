@@ -158,7 +158,7 @@ LeftOut highest_loads(const PartialFits& fits, const std::vector<StepFlags>& pus
   return out;
 }
 
-HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<PartialYoung>& pushes) {
+HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<PartialYoung>& pushes, std::vector<Optimum>* learned) {
   ForwardModel& model = fits.model();
   const Points& rest_m = model.object().surface.rest().vertices_m;
   HeldOut out;
@@ -170,6 +170,7 @@ HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<P
     for (std::size_t s = 0; s < held.size(); ++s) rest[s] = held[s] == 0;
     const Optimum others = fits.refit(rest, false);
     if (fits.cancelled() || !others.evaluation.usable) return out;
+    if (learned != nullptr) learned->push_back(others);
     const StepFlags loaded = loaded_steps(fits, held, as_good_as_none);
     bool force_driven = false;
     for (std::size_t s = 0; s < held.size(); ++s) {

@@ -28,7 +28,8 @@ LeftOut whole_pushes(const PartialFits& fits, const std::vector<StepFlags>& push
 /// that it must be extrapolated to.
 LeftOut highest_loads(const PartialFits& fits, const std::vector<StepFlags>& pushes, std::size_t most);
 
-/// @param pushes  E of each push alone, where that is known
-HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<PartialYoung>& pushes);
+/// @param pushes   E of each push alone, where that is known
+/// @param learned  if given: what each set was predicted from
+HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<PartialYoung>& pushes, std::vector<Optimum>* learned = nullptr);
 
 }  // namespace palpate::estimation

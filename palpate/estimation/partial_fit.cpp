@@ -19,6 +19,16 @@ OptimiseOptions few_iterations() {
 
 }  // namespace
 
+Parameter parameter_of(const PartialYoung& young) {
+  constexpr double z_95 = 1.959963984540054;
+  Parameter out{"young_modulus", young.name, "Pa"};
+  out.value = std::exp(young.log_young);
+  out.std = out.value * young.std;
+  out.lower_95 = std::exp(young.log_young - z_95 * young.std);
+  out.upper_95 = std::exp(young.log_young + z_95 * young.std);
+  return out;
+}
+
 PartialFits::PartialFits(Objective& objective, const Optimum& optimum, const Loss& loss, double factor, const OnProgress& progress)
     : objective_(objective), optimum_(optimum), loss_(loss), factor_(factor), progress_(progress),
       joint_rows_(objective.last_rows()), joint_predictions_(objective.last_predictions()) {}

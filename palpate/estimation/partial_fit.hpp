@@ -18,6 +18,9 @@ struct PartialYoung {
   bool cancelled = false;
 };
 
+/// As answers list it: the part's name is the region.
+Parameter parameter_of(const PartialYoung& young);
+
 /// Steps that count, one flag each.
 using StepFlags = std::vector<char>;
 

@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "palpate/core/quantity.hpp"
+#include "palpate/estimation/law_comparison.hpp"
+#include "palpate/estimation/load_drift.hpp"
 #include "palpate/estimation/step_checks.hpp"
 
 namespace palpate::estimation {
@@ -154,6 +156,19 @@ void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
   }
 }
 
+/// What other laws make of an E that drifts with the load.
+std::string better_law(const Identification& answer) {
+  const LawFit* best = best_law(answer.laws, answer.material);
+  if (best == nullptr) return "try another law (foam softens)";
+  std::string others;
+  for (const LawFit& each : answer.laws)
+    if (each.law != answer.material) others += (others.empty() ? "`" : ", `") + each.law + "`";
+  if (best->law == answer.material) return "of the laws " + others + " none predicts the highest loads better from the lower ones";
+  return "of the laws that were fitted to the same data (`" + answer.material + "`, " + others + ") `" + best->law +
+         "` predicts the highest loads best from the lower ones, with E " + quantity(best->young_modulus_pa, "Pa") + " and nu " +
+         number(best->poisson_ratio, "{:.2g}") + ": estimate with `--material " + best->law + "`";
+}
+
 void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
   double poisson_std = 0;
   for (const auto& parameter : in.answer.parameters) {
@@ -190,13 +205,13 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
     return a.usable && b.usable && homogeneity_p_value({a, b}, poisson_std) < rare;
   };
   const auto ratio = [](const PartialYoung& a, const PartialYoung& b) { return number(std::exp(a.log_young - b.log_young)); };
-  if (differ(in.checks.low_loads, in.checks.high_loads)) {
+  if (drifts_with_load(in.checks, poisson_std)) {
     const bool softens = in.checks.high_loads.log_young < in.checks.low_loads.log_young;
     out.push_back({"not_linear",
                    "E drifts with the load: the higher half of the loads gives " + ratio(in.checks.high_loads, in.checks.low_loads) +
                        " times the E of the lower half, so the material " + (softens ? "softens" : "stiffens") +
                        " beyond what the law `" + in.answer.material +
-                       "` describes. For small strains believe the lower loads; try another law (foam softens)."});
+                       "` describes. For small strains believe the lower loads; " + better_law(in.answer) + "."});
   }
   if (differ(in.checks.loading, in.checks.unloading)) {
     out.push_back({"hysteresis", "Unloading gives " + ratio(in.checks.unloading, in.checks.loading) +

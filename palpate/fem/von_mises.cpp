@@ -41,7 +41,13 @@ double von_mises_of(const Mat3& cauchy) {
 VectorX von_mises(const TetMesh& mesh, const std::string& material, double young_modulus_pa, double poisson_ratio,
                   const VectorX& extra, const VectorX& displacement_m, const VectorX& stiffness) {
   const MaterialLaw& law = material_law(material);
-  const Moduli constants = moduli(young_modulus_pa, poisson_ratio, extra);
+  VectorX further = extra;
+  if (further.size() == 0) {  // as the solvers take them, too
+    const auto parameters = law.extra_parameters();
+    further.resize(static_cast<Index>(parameters.size()));
+    for (std::size_t i = 0; i < parameters.size(); ++i) further(static_cast<Index>(i)) = parameters[i].initial;
+  }
+  const Moduli constants = moduli(young_modulus_pa, poisson_ratio, further);
   const Index nodes = Index(mesh.tetrahedra.cols());
   const auto points = nodes == 10 ? tet_quadrature_4() : tet_quadrature_1();
   VectorX sum = VectorX::Zero(mesh.nodes_m.rows()), weight = sum;

@@ -150,6 +150,44 @@ HeldOut held_out_from(const json& object) {
           later("deformation_explained")};
 }
 
+json from(const YoungAtLoad& one) {
+  json object = from(one.young);
+  object["force_n"] = number(one.force_n);
+  object["travel_m"] = number(one.travel_m);
+  object["strain"] = number(one.strain);
+  object["indentation"] = number(one.indentation);
+  return object;
+}
+YoungAtLoad young_at_load_from(const json& object) {
+  return {parameter_from(object), number_at(object, "force_n"), number_at(object, "travel_m"), number_at(object, "strain"),
+          number_at(object, "indentation")};
+}
+
+json from(const LawFit& one) {
+  return {{"law", one.law},
+          {"usable", one.usable},
+          {"message", one.message},
+          {"young_modulus_pa", number(one.young_modulus_pa)},
+          {"poisson_ratio", number(one.poisson_ratio)},
+          {"chi2", number(one.chi2)},
+          {"chi2_per_dof", number(one.chi2_per_dof)},
+          {"held_out", from(one.held_out)},
+          {"held_out_chi2", number(one.held_out_chi2)}};
+}
+LawFit law_fit_from(const json& object) {
+  LawFit fit;
+  fit.law = object.at("law");
+  fit.usable = object.at("usable");
+  fit.message = object.at("message");
+  fit.young_modulus_pa = number_at(object, "young_modulus_pa");
+  fit.poisson_ratio = number_at(object, "poisson_ratio");
+  fit.chi2 = number_at(object, "chi2");
+  fit.chi2_per_dof = number_at(object, "chi2_per_dof");
+  fit.held_out = held_out_from(object.at("held_out"));
+  fit.held_out_chi2 = number_at(object, "held_out_chi2");
+  return fit;
+}
+
 json from(const BudgetEntry& one) {
   json object = {{"input", one.input},
                  {"young_modulus_percent", number(one.young_modulus_percent)},
@@ -241,6 +279,8 @@ json result_json(const Identification& answer) {
   object["budget_if"] = array_from(answer.budget_if);
   object["per_push"] = array_from(answer.per_push);
   object["per_site"] = array_from(answer.per_site);
+  object["per_load"] = array_from(answer.per_load);
+  object["laws"] = array_from(answer.laws);
   object["termination"] = "failed";
   for (const auto& [name, value] : termination_names) {
     if (value == answer.termination) object["termination"] = name;
@@ -283,6 +323,8 @@ Identification parse_result(const std::string& bytes, const std::string& name) {
     if (object.contains("budget_if")) answer.budget_if = all_of(part("budget_if"), budget_from);  // earlier versions did not say
     answer.per_push = all_of(part("per_push"), parameter_from);
     if (object.contains("per_site")) answer.per_site = all_of(part("per_site"), parameter_from);
+    if (object.contains("per_load")) answer.per_load = all_of(part("per_load"), young_at_load_from);
+    if (object.contains("laws")) answer.laws = all_of(part("laws"), law_fit_from);
     for (const auto& [word, value] : termination_names) {
       if (part("termination") == word) answer.termination = value;
     }

@@ -45,10 +45,30 @@ json as_json(const Nuisance& n) {
 
 json as_json(const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); }
 
+json as_json(const LawFit& fit) {
+  return {{"law", fit.law},
+          {"usable", fit.usable},
+          {"message", fit.message},
+          {"young_text", fit.usable ? quantity(fit.young_modulus_pa, "Pa") : ""},
+          {"force_error", fit.held_out.force_error},
+          {"held_out_chi2", fit.held_out_chi2}};
+}
+
 template <class Items>
 json list_of(const Items& items) {
   json list = json::array();
   for (const auto& item : items) list.push_back(as_json(item));
+  return list;
+}
+
+/// As `list_of`, the loads named with how far they deform the object.
+json list_by_load(const std::vector<YoungAtLoad>& items) {
+  json list = json::array();
+  for (const YoungAtLoad& item : items) {
+    Parameter young = item.young;
+    if (std::isfinite(item.strain)) young.region += fmt::format(", to {:.2g} % strain", 100 * item.strain);
+    list.push_back(as_json(young));
+  }
   return list;
 }
 
@@ -328,6 +348,8 @@ json payload(const Identification& identification, const Recording* recording, c
   page["parameters"] = list_of(identification.parameters);
   page["per_push"] = list_of(identification.per_push);
   page["per_site"] = list_of(identification.per_site);
+  page["per_load"] = list_by_load(identification.per_load);
+  page["laws"] = list_of(identification.laws);
   page["nuisances"] = list_of(identification.nuisances);
   page["verdicts"] = json::array();
   for (const Verdict& v : identification.verdicts) page["verdicts"].push_back({{"code", v.code}, {"message", v.message}});

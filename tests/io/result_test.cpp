@@ -40,6 +40,17 @@ Identification whole_answer() {
   answer.budget = {{"force scale", 1.0, 0.001, {{"head", 1.0}, {"body", 0.5}}}};
   answer.budget_if = {{"contact_shift", 0.7, 0.002, {}, "1 mm across the push", "contact_std_m"}};
   answer.per_push = {{"young_modulus", "push 1", "Pa", 19900, 200, 19500, 20300, true}};
+  answer.per_load = {{{"young_modulus", "low loads", "Pa", 19900, 200, 19500, 20300, true}, 2.5, 0.004, 0.03, 0.2}};
+  LawFit foam;
+  foam.law = "foam";
+  foam.usable = true;
+  foam.young_modulus_pa = 21000;
+  foam.chi2 = 1234.5;
+  foam.held_out = answer.prediction;
+  LawFit linear;
+  linear.law = "linear";
+  linear.message = "found no equilibrium";
+  answer.laws = {foam, linear};
   answer.termination = Termination::no_progress;
   answer.message = "stopped";
   answer.provenance = {{"version", "0.1.0"}, {"input rest.msh", "abc"}};

@@ -75,6 +75,8 @@ interface Raw {
   parameters: Parameter[];
   per_push: Parameter[];
   per_site: Parameter[];
+  per_load: Parameter[]; // their regions say how far the loads deform the object
+  laws: { law: string; usable: boolean; message: string; young_text: string; force_error: Num; held_out_chi2: Num }[];
   nuisances: Nuisance[];
   verdicts: { code: string; message: string }[];
   fit: {

@@ -162,6 +162,11 @@ export function perSite(report: Report, width: number): SVGElement | null {
   return youngOfParts(report, width, [[sites, category(3)]], "Young's modulus of each site alone");
 }
 
+export function perLoad(report: Report, width: number): SVGElement | null {
+  const loads = report.per_load.filter((p) => known(p.lower_95) && known(p.upper_95));
+  return youngOfParts(report, width, [[loads, category(4)]], "Young's modulus of low and of high loads");
+}
+
 export function nuisances(report: Report, width: number): SVGElement | null {
   const list = report.nuisances
     .filter((n) => known(n.pull))
@@ -220,6 +225,19 @@ export const budget = (report: Report, width: number): SVGElement | null =>
 
 export const budgetIf = (report: Report, width: number): SVGElement | null =>
   shares(report.budget_if, width, category(4), "change of Young's modulus (%)", "What inputs that are stated as exact would do were they off");
+
+/** How much of a surprise the highest loads are to each law that has seen the lower ones. */
+export function laws(report: Report, width: number): SVGElement | null {
+  const list = report.laws.filter((l) => l.usable && known(l.held_out_chi2));
+  if (list.length === 0) return null;
+  const items = list.map((l) => ({
+    label: l.law.replaceAll("_", " "),
+    value: Math.max(0, l.held_out_chi2!),
+    text: `E ${l.young_text}${known(l.force_error) ? `, force off by ${digits(100 * l.force_error, 2)} %` : ""}`,
+    colour: l.law === report.material ? category(2) : "var(--faint)",
+  }));
+  return bars(width, items, "\u03c7\u00b2 of the highest loads", "Laws of elasticity compared by prediction");
+}
 
 export function heldOut(report: Report, width: number): SVGElement | null {
   const p = report.prediction;

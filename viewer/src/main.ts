@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import "./style.css";
 import { decode, type Report, type Step } from "./data";
-import { budget, budgetIf, heldOut, nuisances, perPush, perSite, posterior, sparkline } from "./figures_answer";
+import { budget, budgetIf, heldOut, laws, nuisances, perLoad, perPush, perSite, posterior, sparkline } from "./figures_answer";
 import { convergence, forceTravel, histogram, rmsBySteps } from "./figures_fit";
 import { watch } from "./live";
 import { citation, provenance, recordingFacts } from "./provenance";
@@ -131,6 +131,8 @@ class Page {
       steps,
       Panel.make("Each push on its own", "Young's modulus with 95 % interval from each push (or region) alone; shaded: all together. Intervals that do not overlap speak for an object that is not homogeneous.", (w) => perPush(report, w)),
       Panel.make("Each site on its own", "The same for all pushes at one place together.", (w) => perSite(report, w)),
+      Panel.make("Low and high loads", "The same for the lower and the higher half of the loads. Where they disagree, the material does not obey the law.", (w) => perLoad(report, w)),
+      Panel.make("Other laws", `Each law fitted to the same data on one mesh, and once without the highest loads, which it then predicts: the shortest bar is the law that these surprise least.${report.laws.filter((l) => !l.usable).map((l) => ` ${l.law}: ${l.message}.`).join("")}`, (w) => laws(report, w)),
       Panel.make("Error budget", "How far one standard deviation of each input moves the answer. The longest bar is what to calibrate next.", (w) => budget(report, w)),
       Panel.make("Stated as exact", "In no interval, since the recording says that these inputs are exactly known: what each would do to the answer were it off by a typical size.", (w) => budgetIf(report, w)),
       Panel.make("Prediction of what was held out", `Fitted without ${p.what || "it"}, then predicted under load${known(p.deformation_explained) ? `: ${digits(100 * p.deformation_explained, 2)} % of the deformation that the fit of everything explains, noise left out` : ""}${known(p.force_error) ? `; force off by ${digits(100 * Math.abs(p.force_error), 2)} %` : ""}. Grey: the fit that has seen it (hardly more than noise), and trivial guesses.`, (w) => heldOut(report, w)),
