@@ -83,7 +83,7 @@ double young_at(const LabObject& object, const PushSite& site) {
 LabObject object_of(const PaperScene& scene, std::uint64_t seed) {
   ObjectOptions truth;
   truth.seed = seed;
-  truth.material = scene.true_law;
+  if (!scene.apparent) truth.material = scene.true_law;  // a skin takes no law but its own
   if (scene.young_modulus_pa > 0) truth.young_modulus_pa = scene.young_modulus_pa;
   if (scene.poisson_ratio > 0) truth.poisson_ratio = scene.poisson_ratio;
   truth.region_ratio = scene.region_ratio;

@@ -49,6 +49,19 @@ TEST(Paper, BothMethodsAnswerAndAGridJudgesTheBaseline) {
   EXPECT_NE(page.str().find("<svg"), std::string::npos);
   EXPECT_NE(page.str().find("What it should show"), std::string::npos);
   EXPECT_EQ(page.str().find("http"), page.str().find("http://www.w3.org/2000/svg"));  // nothing is fetched
+
+  // The seed is there now: again, and joined alone, it is the same page in no time.
+  const auto contents = [](const fs::path& file) {
+    std::stringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+  };
+  ASSERT_EQ(palpate("--quiet --threads 2 paper --quick --scene cube -o " + out.string()), 0);
+  EXPECT_EQ(contents(out / "paper.html"), page.str());
+  ASSERT_EQ(palpate("--quiet paper --from " + out.string() + " -o " + (files / "joined").string()), 0);
+  EXPECT_EQ(contents(files / "joined" / "paper.html"), page.str());
+  EXPECT_EQ(palpate("--quiet paper --seeds 1 --scene cube -o " + out.string() + " 2>" + (files / "refused").string()), 3);
+  EXPECT_NE(contents(files / "refused").find("cube_0001.json: was made with other options"), std::string::npos);
 }
 
 TEST(Paper, UnknownSceneIsNamedWithTheOnesThereAre) {

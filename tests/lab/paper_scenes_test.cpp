@@ -32,6 +32,15 @@ TEST(PaperScenes, HaveNamesOfTheirOwn) {
   EXPECT_THROW(paper_scene("penguin"), Error);
 }
 
+// The balloon was refused for the law that its scene did not mean to give it.
+TEST(PaperScenes, CanAllBeBegun) {
+  for (const PaperScene& scene : paper_scenes()) {
+    const PaperTrial begun = make_paper_trial(scene, 1, [](std::string_view, double) { return false; });
+    EXPECT_FALSE(begun.recording.tools.empty()) << scene.name;
+    EXPECT_EQ(begun.recording.model.material, scene.law) << scene.name;
+  }
+}
+
 // A slip after the first of nine samples: before it the two recordings are one; after it the tip presses elsewhere, the encoders
 // have come deeper by what was lost, and the recording goes on naming the first place.
 TEST(PaperScenes, AFaultChangesWhatItSaysAndNothingElse) {
