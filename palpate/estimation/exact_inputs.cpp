@@ -228,7 +228,8 @@ std::vector<ExactInput> free_exact_inputs(const Recording& recording, const Inpu
 std::vector<BudgetEntry> budget_if(const std::vector<ExactInput>& exact, const Unknowns& unknowns, const MatrixX& curvature,
                                    const std::vector<int>& moving, const std::vector<std::string>& regions) {
   const Eigen::LDLT<MatrixX> fitted(MatrixX(curvature(moving, moving)));
-  const MatrixX young = log_young_of_regions(unknowns, moving);
+  // Places that are doubted to be of one stiffness have ratios here, too; they are no regions of the answer.
+  const MatrixX young = log_young_of_regions(unknowns, moving).topRows(std::max<Index>(1, static_cast<Index>(regions.size())));
   const auto nu = std::find(moving.begin(), moving.end(), static_cast<int>(poisson));
   std::vector<BudgetEntry> out;
   for (const ExactInput& one : exact) {
