@@ -191,7 +191,10 @@ export function nuisances(report: Report, width: number): SVGElement | null {
 function bars(width: number, items: { label: string; value: number; text: string; colour: string }[], label: string, title: string): SVGElement {
   const longest = Math.max(...items.map((r) => Math.min(r.label.length, 30)));
   const left = Math.min(Math.max(60, longest * 6.6 + 14), width * 0.45);
-  const plot = new Plot(width, 48 + items.length * 26, { label, from: 0, to: Math.max(...items.map((r) => r.value)) * 1.7 || 1 }, null, title, left);
+  // So long an axis that what stands behind a bar has room.
+  const room = width - left - 20;
+  const end = (r: { value: number; text: string }) => (r.value * room) / Math.max(room - 12 - r.text.length * 6.3, 0.1 * room);
+  const plot = new Plot(width, 48 + items.length * 26, { label, from: 0, to: Math.max(...items.map(end)) || 1 }, null, title, left);
   items.forEach((row, i) => {
     const y = plot.top + 3 + i * 26;
     const short = row.label.length > 30 ? `${row.label.slice(0, 29)}\u2026` : row.label;
