@@ -90,7 +90,10 @@ bool ended_well(acquisition::StopReason stop) {
   return acquisition::is_at_a_limit(stop) || stop == slip || stop == contact_lost;
 }
 
-bool is_loaded(const Step& step) { return !step.loads.empty(); }
+/// A folder that is read may hold loads of nothing.
+bool is_loaded(const Step& step) {
+  return std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) { return load.force_n && load.force_n->norm() > 0; });
+}
 bool is_loaded(const Push& push) { return std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) { return is_loaded(step); }); }
 
 const Push* push_named(const std::vector<Push>& pushes, const std::string& name) {

@@ -317,7 +317,8 @@ TEST_F(Record, ASlipBeforeAnyLoadIsNoSuccess) {
   EXPECT_EQ(palpate(words), numbers) << said;
   EXPECT_THAT(said, HasSubstr("before any step under load, so nothing can be estimated from it"));
   EXPECT_THAT(said, Not(HasSubstr("Next: palpate estimate")));
-  for (const Step& step : read_recording_unchecked(folder.path() / "recording").pushes.at(0).steps) EXPECT_TRUE(step.loads.empty());
+  const Recording slipped = read_recording_unchecked(folder.path() / "recording");
+  for (const Step& step : slipped.pushes.at(0).steps) EXPECT_TRUE(step.loads.empty());
   palpate({"info", path("bag")});
   EXPECT_THAT(said, Not(HasSubstr("is not in the bag")));
 }

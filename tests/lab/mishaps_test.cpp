@@ -34,6 +34,11 @@ LabOptions quiet() {
 void go(LabRobot& robot, const acquisition::PushPlan& plan, double beyond_m) {
   Pose pose = Pose::Identity();
   pose.linear() = plan.R_base_tip;
+  const Vec3 off_m = robot.read().T_base_tip.translation() - plan.contact_m;
+  if ((off_m - plan.direction.dot(off_m) * plan.direction).norm() > 0.01) {  // along the push's line: the object is in any other way
+    pose.translation() = plan.contact_m - 0.05 * plan.direction;
+    ASSERT_EQ(robot.move(pose, 0.1), acquisition::Motion::done);
+  }
   pose.translation() = plan.contact_m + beyond_m * plan.direction;
   ASSERT_EQ(robot.move(pose, 0.1), acquisition::Motion::done);
 }
@@ -125,7 +130,7 @@ TEST(Mishaps, AForceThatCreepsIsReported) {
   options.relaxation_s = 10;
   LabRobot robot(options, small_ball());
   acquisition::PushOptions protocol;
-  protocol.travel_limit_m = 0.008;
+  protocol.travel_limit_m = 0.012;
   protocol.force_step_n = 4;
   protocol.increment_m = 0.004;  // about 1.2 N, of which 1 N fades at first by 0.1 N a second; less than a step, so not shortened
   protocol.settling_timeout_s = 4;
