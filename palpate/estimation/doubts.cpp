@@ -155,8 +155,15 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   model.set_changes(std::move(changes));
   Optimum there = optimum;
   there.unknowns = unknowns.prior_mean();
-  // Nothing moves but what was fitted and what is doubted; budget_if looks at the others' columns.
-  for (int k = unknowns.parameter_count(); k < unknowns.size(); ++k) unknowns[k].fixed = true;
+  // Nothing moves but what was fitted and what is doubted; budget_if looks at the others' columns. A torque that says nothing of a
+  // contact stated as exactly known speaks here, with what it errs by.
+  std::vector<int> of_torques;
+  for (int k = unknowns.parameter_count(); k < unknowns.size(); ++k) {
+    const std::string& name = unknowns[k].name;
+    if (name.rfind("torque_tare[", 0) == 0 || name.rfind("tip_offset[", 0) == 0) of_torques.push_back(k);
+    unknowns[k].fixed = true;
+  }
+  for (const int k : of_torques) unknowns[k].fixed = false;
   for (const auto& names : more.unknowns)
     for (const int k : unknowns.named(names)) unknowns[k].fixed = false;
   for (std::size_t k = 0; k < at.size(); ++k) {
@@ -174,12 +181,8 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   out.budget_if = budget_if(exact, unknowns, there.evaluation.curvature, without_held_poisson(moving, optimum), fitted.object().region_names);
   if (fitted.touches()) return out;
   out.slip = contact_slip(wider, there, factor);
-  // A torque that says nothing of a contact stated as exactly known speaks here, with what it errs by.
-  for (int k = 0; k < unknowns.size(); ++k) {
-    const std::string& name = unknowns[k].name;
-    const bool of_torque = name.rfind("torque_tare[", 0) == 0 || name.rfind("tip_offset[", 0) == 0;
-    if (of_torque && std::find(moving.begin(), moving.end(), k) == moving.end()) moving.push_back(k);
-  }
+  for (const int k : of_torques)
+    if (std::find(moving.begin(), moving.end(), k) == moving.end()) moving.push_back(k);
   const ScoreTests as_stated{unknowns, there.evaluation.information(factor), there.evaluation.gradient, moving};
   const auto of_sites = [&](const ScoreTests& tests) -> std::optional<SiteStiffness> {
     const std::vector<int> ratios = unknowns.ratios();
