@@ -159,7 +159,7 @@ void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
 /// What other laws make of an E that drifts with the load.
 std::string better_law(const Identification& answer) {
   const LawFit* best = best_law(answer.laws, answer.material);
-  if (best == nullptr) return "try another law (foam softens)";
+  if (best == nullptr) return "try another law (foam softens; `palpate estimate --compare-laws` fits them all, which takes its time on this mesh)";
   std::string others;
   for (const LawFit& each : answer.laws)
     if (each.law != answer.material) others += (others.empty() ? "`" : ", `") + each.law + "`";

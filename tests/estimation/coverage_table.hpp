@@ -194,6 +194,7 @@ struct TableOptions {
   int calculix_each = 0;                  ///< the truth of every so manieth recording is CalculiX's; 0: of none
   bool each = false;                      ///< a line a recording
   bool noiseless = false;
+  bool bound_of_correlated = true;        ///< factors of all points of a step, seconds a recording; false: rms is not held to it there
   std::string outcomes;                   ///< see Outcomes
 };
 
@@ -286,7 +287,8 @@ class Table {
     const double fitted_s = cpu_s();
     const std::string& name = scene.spec().name;
     ASSERT_EQ(answer.termination, Termination::converged) << name << " " << row.name << " seed " << seed << ": " << answer.message;
-    const Vec2 best = bound(scene, row, draw);
+    const bool has_bound = options_.bound_of_correlated || row.correlated_m == 0;
+    const Vec2 best = has_bound ? bound(scene, row, draw) : Vec2(NAN, NAN);
     const Parameter &e = answer.parameters[0], &nu = answer.parameters[1];
     const auto inside = [](std::pair<double, double> range, double truth) { return range.first <= truth && truth <= range.second; };
     const PosteriorGrid& grid = answer.posterior;  // a density over (log E, nu)
