@@ -95,7 +95,7 @@ std::string PaperRuns::command() const {
   return object.empty() ? out : out + " --object " + object;
 }
 
-SeedFolder::SeedFolder(const fs::path& out) : seeds_(out / "seeds") { fs::create_directories(seeds_); }
+SeedFolder::SeedFolder(const fs::path& out) : seeds_(out / "seeds") {}
 
 bool SeedFolder::has(const SeedAsked& asked) const {
   const fs::path file = seeds_ / file_name(asked.name, asked.seed);
@@ -109,6 +109,7 @@ bool SeedFolder::has(const SeedAsked& asked) const {
 }
 
 json SeedFolder::keep(const SeedAsked& asked, const TrialAnswer& answer) const {
+  fs::create_directories(seeds_);
   json seed = header(asked, asked.options.threads);
   seed["trial"] = written(answer);
   io::write_file(seeds_ / file_name(asked.name, asked.seed), seed.dump() + "\n");
@@ -116,6 +117,7 @@ json SeedFolder::keep(const SeedAsked& asked, const TrialAnswer& answer) const {
 }
 
 json SeedFolder::keep(const SeedAsked& asked, const StudyAnswer& answer, int threads) const {
+  fs::create_directories(seeds_);
   json seed = header(asked, threads);
   seed["study"] = {{"rows", written(answer.rows)}, {"failed", answer.failed}, {"seconds", answer.seconds}};
   io::write_file(seeds_ / file_name(asked.name, asked.seed), seed.dump() + "\n");
@@ -123,6 +125,7 @@ json SeedFolder::keep(const SeedAsked& asked, const StudyAnswer& answer, int thr
 }
 
 PaperRuns SeedFolder::collect() const {
+  if (!fs::is_directory(seeds_)) return {};
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(seeds_))
     if (entry.path().extension() == ".json") files.push_back(entry.path());
@@ -136,6 +139,7 @@ void SeedFolder::take_from(const fs::path& out) const {
   const fs::path from = out / "seeds";
   if (!fs::is_directory(from) || fs::is_empty(from))
     throw Error("holds no seeds of palpate paper: give a folder that an earlier run wrote with -o", out.string());
+  fs::create_directories(seeds_);
   for (const auto& entry : fs::directory_iterator(from)) {
     if (entry.path().extension() != ".json") continue;
     const std::string bytes = io::read_file(entry.path());

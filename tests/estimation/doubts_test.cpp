@@ -12,21 +12,10 @@
 namespace palpate::estimation {
 namespace {
 
-/// The block on its large face, glued there and pressed from above in four steps; everything is stated as exactly known.
 Recording glued_block() {
-  Recording recording = pushed_block_recording();
-  recording.supports[0].name = "glue";
-  recording.supports[0].kind = SupportKind::plane;
-  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
-  auto& steps = recording.pushes[0].steps;
-  const Step last = steps.back();
-  steps.clear();
-  for (double newton : {1.5, 3.0, 4.5, 6.0}) {
-    steps.push_back(last);
-    steps.back().loads[0].force_n = Vec3(0.3 * newton, 0, -newton);
-    steps.back().loads[0].contact_m = Vec3(0.03, 0.02, block_size_m.z());
-  }
-  return recording;
+  std::vector<Vec3> forces_n;
+  for (double newton : {1.5, 3.0, 4.5, 6.0}) forces_n.emplace_back(0.3 * newton, 0, -newton);
+  return glued_block_recording(forces_n, 0.03, 0.02);
 }
 
 Identification fitted(const Recording& stated, const Recording& real, unsigned seed = 3) {

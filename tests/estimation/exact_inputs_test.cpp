@@ -16,22 +16,8 @@ namespace {
 
 constexpr double noise_m = 3e-4;
 
-/// The block on its large face, glued there and pressed from above beside its middle; all is stated as exactly known.
-Recording glued_block() {
-  Recording recording = pushed_block_recording();
-  recording.supports[0].name = "glue";
-  recording.supports[0].kind = SupportKind::plane;
-  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
-  auto& steps = recording.pushes[0].steps;
-  const Step last = steps.back();
-  steps.clear();
-  for (double newton : {0.75, 1.5}) {
-    steps.push_back(last);
-    steps.back().loads[0].force_n = Vec3(0, 0, -newton);
-    steps.back().loads[0].contact_m = Vec3(0.036, 0.022, block_size_m.z());
-  }
-  return recording;
-}
+/// Pressed beside its middle.
+Recording glued_block() { return glued_block_recording({Vec3(0, 0, -0.75), Vec3(0, 0, -1.5)}, 0.036, 0.022); }
 
 SimulatedObject object() { return simulated(fem::to_quadratic(kuhn_block(9, 6, 4, block_size_m)), "linear"); }
 

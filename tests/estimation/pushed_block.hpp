@@ -58,6 +58,23 @@ inline Recording pushed_block_recording() {
   return recording;
 }
 
+/// The block on its large face, glued there and pressed from above, a step a force; all is stated as exactly known.
+inline Recording glued_block_recording(const std::vector<Vec3>& forces_n, double x_m, double y_m) {
+  Recording recording = pushed_block_recording();
+  recording.supports[0].name = "glue";
+  recording.supports[0].kind = SupportKind::plane;
+  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
+  auto& steps = recording.pushes[0].steps;
+  const Step like = steps.back();
+  steps.clear();
+  for (const Vec3& force_n : forces_n) {
+    steps.push_back(like);
+    steps.back().loads[0].force_n = force_n;
+    steps.back().loads[0].contact_m = Vec3(x_m, y_m, block_size_m.z());
+  }
+  return recording;
+}
+
 inline SimulatedObject coarse_block(const std::string& material = "neo_hookean") {
   return simulated(fem::to_quadratic(kuhn_block(4, 3, 2, block_size_m)), material);
 }

@@ -17,22 +17,14 @@ namespace {
 const Vec3 off_m(0.0032, -0.0024, 0);  // 4 mm beside the stated place
 constexpr double sigma_nm = 2e-3;
 
-/// The block on its large face, glued there and pressed from above with 2 to 5 N; the contact is known to 4 mm.
+/// With 2 to 5 N; the contact is known to 4 mm.
 Recording glued_block(double contact_std_m = 0.004) {
-  Recording recording = pushed_block_recording();
-  recording.supports[0].name = "glue";
-  recording.supports[0].kind = SupportKind::plane;
-  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
-  auto& steps = recording.pushes[0].steps;
-  const Step like = steps.back();
-  steps.clear();
-  for (double newton : {2.0, 3.0, 4.0, 5.0}) {
-    steps.push_back(like);
-    Load& load = steps.back().loads[0];
-    load.force_n = Vec3(0.2 * newton, 0, -newton);
-    load.contact_m = Vec3(0.03, 0.02, block_size_m.z());
-    load.direction = -Vec3::UnitZ();
-    load.contact_std_m = contact_std_m;
+  std::vector<Vec3> forces_n;
+  for (double newton : {2.0, 3.0, 4.0, 5.0}) forces_n.emplace_back(0.2 * newton, 0, -newton);
+  Recording recording = glued_block_recording(forces_n, 0.03, 0.02);
+  for (Step& step : recording.pushes[0].steps) {
+    step.loads[0].direction = -Vec3::UnitZ();
+    step.loads[0].contact_std_m = contact_std_m;
   }
   return recording;
 }
