@@ -15,7 +15,7 @@ target_compile_features(palpate PUBLIC cxx_std_20)
 target_compile_definitions(palpate PUBLIC EIGEN_MPL2_ONLY)
 target_include_directories(palpate PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}>
                                           $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-target_include_directories(palpate PRIVATE ${METIS_INCLUDE_DIR} ${ZSTD_INCLUDE_DIR} ${LZ4_INCLUDE_DIR})
+target_include_directories(palpate PRIVATE ${METIS_INCLUDE_DIR} ${NANOFLANN_INCLUDE_DIR} ${ZSTD_INCLUDE_DIR} ${LZ4_INCLUDE_DIR})
 target_link_libraries(palpate PUBLIC Eigen3::Eigen Threads::Threads nlohmann_json::nlohmann_json
                               PRIVATE yaml-cpp PNG::PNG ZLIB::ZLIB BZip2::BZip2 SQLite::SQLite3 fmt::fmt ${ZSTD_LIBRARY} ${LZ4_LIBRARY} ${METIS_LIBRARY})
 

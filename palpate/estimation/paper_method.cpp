@@ -12,17 +12,10 @@
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/solve_count.hpp"
-#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/geometry/nearest_vertices.hpp"
 
 namespace palpate::estimation {
 namespace {
-
-/// Vertices as degenerate triangles: the closest point of such a surface is the nearest vertex.
-TriMesh vertices_only(const Points& vertices_m) {
-  TriMesh mesh{vertices_m, Triangles(vertices_m.rows(), 3)};
-  for (Index v = 0; v < vertices_m.rows(); ++v) mesh.triangles.row(v).setConstant(v);
-  return mesh;
-}
 
 Points points_of(const std::vector<TermInput>& inputs) {
   std::vector<Vec3> all;
@@ -40,16 +33,16 @@ Points points_of(const std::vector<TermInput>& inputs) {
 }
 
 /// Besl and McKay's point-to-point ICP; returns the sum of squared distances to the nearest vertices at its end (eq. 6).
-double aligned_squared_distance(const geometry::TriangleTree& vertices, Points points, std::vector<Index>& nearest) {
+double aligned_squared_distance(const geometry::NearestVertices& vertices, Points points,
+                                std::vector<geometry::NearestVertices::Memory>& memory) {
   double last = std::numeric_limits<double>::infinity();
   for (int iteration = 0; iteration < 30; ++iteration) {
     Points targets(points.rows(), 3);
     double sum = 0;
     for (Index i = 0; i < points.rows(); ++i) {
-      const auto hit = vertices.closest(points.row(i), nearest[static_cast<std::size_t>(i)]);
-      nearest[static_cast<std::size_t>(i)] = hit.triangle;
-      targets.row(i) = hit.point_m;
-      sum += hit.squared_distance_m2;
+      const auto found = vertices.nearest(points.row(i), memory[static_cast<std::size_t>(i)]);
+      targets.row(i) = vertices.vertices_m().row(found.vertex);
+      sum += found.squared_distance_m2;
     }
     if (sum > last * (1 - 1e-6)) return sum;
     last = sum;
@@ -77,8 +70,8 @@ struct PaperError::Impl {
   std::unique_ptr<ForwardModel> model;
   std::vector<std::size_t> steps;
   std::vector<Points> points;
-  std::vector<std::vector<Index>> nearest;
-  std::unique_ptr<geometry::TriangleTree> tree;
+  std::vector<geometry::NearestVertices> vertices;                      // a sample
+  std::vector<std::vector<geometry::NearestVertices::Memory>> nearest;  // a point of a sample
   SolveCount for_start;
   std::size_t count = 0;
   double start_pa = 0;
@@ -114,10 +107,10 @@ PaperError::PaperError(const Recording& recording, const SimulatedObject& object
     const std::size_t s = with_points[(k * with_points.size() + with_points.size() / 2) / samples];
     impl_->steps.push_back(s);
     impl_->points.push_back(points_of(inputs[s]));
-    impl_->nearest.emplace_back(static_cast<std::size_t>(impl_->points.back().rows()), -1);
+    impl_->vertices.emplace_back(object.surface.rest().vertices_m);
+    impl_->nearest.emplace_back(static_cast<std::size_t>(impl_->points.back().rows()));
     impl_->count += static_cast<std::size_t>(impl_->points.back().rows());
   }
-  impl_->tree = std::make_unique<geometry::TriangleTree>(vertices_only(object.surface.rest().vertices_m));
 }
 
 PaperError::~PaperError() = default;
@@ -136,8 +129,8 @@ double PaperError::operator()(double young_modulus_pa, double poisson_ratio) {
   for (std::size_t k = 0; k < impl_->steps.size(); ++k) {
     const StepPrediction predicted = impl_->model->predict(impl_->steps[k], at, false);
     if (!predicted.converged) return std::numeric_limits<double>::infinity();
-    impl_->tree->refit(predicted.surface_m);
-    sum += aligned_squared_distance(*impl_->tree, impl_->points[k], impl_->nearest[k]);
+    impl_->vertices[k].move(predicted.surface_m);
+    sum += aligned_squared_distance(impl_->vertices[k], impl_->points[k], impl_->nearest[k]);
   }
   return sum / static_cast<double>(impl_->count);
 }
