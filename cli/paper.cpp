@@ -86,8 +86,8 @@ int remake(Session& session, const PaperArguments& arguments) {
   }
   must_take_files(arguments.output);
   PaperWork work;
-  work.trial = [&](const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels& shared, TrialAnswer& out) {
-    run_trial(scene, seed, options, &shared, session.progress(), out);
+  work.trial = [&](const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared, TrialAnswer& out) {
+    run_trial(scene, seed, options, shared, session.progress(), out);
   };
   work.study = [&](const Study& study, const StudyOptions& options, StudyAnswer& out) {
     const Watch watch;

@@ -39,12 +39,13 @@ void fields(Each each, SiteAnswer& a) {
 
 template <class Each>
 void fields(Each each, Expectation& a) {
-  each("force_n", a.force_n), each("surface_rms_m", a.surface_m);
+  each("force_n", a.force_n), each("surface_rms_m", a.surface_m), each("dent_rms_m", a.dent_m);
 }
 
 template <class Each>
 void fields(Each each, UnusedStep& a) {
   each("force_n", a.force_n), each("travel_m", a.travel_m), each("surface_still_rms_m", a.surface_still_m);
+  each("dent_still_rms_m", a.dent_still_m);
   each("paper", a.paper), each("palpate", a.palpate), each("other_law", a.other);
 }
 
@@ -57,6 +58,11 @@ template <class Each>
 void fields(Each each, RegistrationPicture& a) {
   each("young_modulus_pa", a.young_modulus_pa), each("rms_m", a.rms_m), each("simulated_m", a.simulated_m);
   each("registered_m", a.registered_m);
+}
+
+template <class Each>
+void fields(Each each, PaperView& a) {
+  each("what", a.what), each("width", a.width), each("height", a.height), each("png", a.png);
 }
 
 template <class Each>
@@ -73,7 +79,7 @@ void fields(Each each, TrialAnswer& a) {
   each("paper", a.paper), each("palpate", a.palpate), each("paper_linear_tetrahedra", a.paper_coarse);
   each("other_law", a.other_law), each("palpate_other_law", a.other), each("readings", a.readings), each("sites", a.sites);
   each("verdicts_without_regions", a.as_one_verdicts), each("unused_place", a.unused), each("registrations", a.pictures);
-  each("samples", a.samples), each("error_surface", a.surface);
+  each("views", a.views), each("samples", a.samples), each("error_surface", a.surface);
 }
 
 template <class Each>

@@ -43,7 +43,12 @@ nlohmann::json json_of(const TrialAnswer& trial) {
                                     {{"paper", step.paper.surface_m},
                                      {"palpate", step.palpate.surface_m},
                                      {"other_law", step.other.surface_m},
-                                     {"still", step.surface_still_m}}}});
+                                     {"still", step.surface_still_m}}},
+                                   {"dent_rms_m",
+                                    {{"paper", step.paper.dent_m},
+                                     {"palpate", step.palpate.dent_m},
+                                     {"other_law", step.other.dent_m},
+                                     {"still", step.dent_still_m}}}});
   for (const RegistrationPicture& picture : trial.pictures)
     out["registrations"].push_back({{"young_modulus_pa", picture.young_modulus_pa}, {"rms_m", picture.rms_m}});
   for (const SampleAnswer& sample : trial.samples)

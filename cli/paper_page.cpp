@@ -17,6 +17,17 @@
 namespace palpate::cli {
 namespace {
 
+/// Every pixel of the camera as a square of the same size in all of them.
+std::string view_figures(const std::vector<PaperView>& views) {
+  std::string html;
+  for (const PaperView& view : views) {
+    const double scale = std::max(1.0, std::round(320.0 / std::max(view.width, 1)));
+    html += fmt::format("<figure class=\"view\"><img alt=\"\" width=\"{:.0f}\" height=\"{:.0f}\" src=\"data:image/png;base64,{}\"><figcaption>{}.</figcaption></figure>\n",
+                        scale * view.width, scale * view.height, view.png, view.what);
+  }
+  return html.empty() ? html : "<div class=\"views\">" + html + "</div>\n";
+}
+
 std::string figure(const std::string& svg, const std::string& caption) {
   return svg.empty() ? std::string() : "<figure>" + svg + "<figcaption>" + caption + "</figcaption></figure>\n";
 }
@@ -69,6 +80,7 @@ std::string section(const SceneAnswers& answers) {
   html += figure(registration_figure(first),
                  std::string("What the camera saw of the hardest push, registered with the surface that each E gives; the last is ") +
                      (scene.apparent ? "the one that palpate found." : "the true one."));
+  html += view_figures(first.views);
   html += figure(force_figure(first), "Measured force over travel.");
   html += figure(samples_figure(first),
                  first.sites.empty() ? "E from every sample alone; the lines are E from all samples jointly." : "E from every sample alone.");
@@ -97,7 +109,7 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vecto
       "<title>The paper's evaluation, remade</title><style>body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem "
       "auto;padding:0 1rem;color:#16202c;background:#fff}table{border-collapse:collapse;display:block;overflow-x:auto}td,th{padding:.25rem "
       ".7rem;border-bottom:1px solid #dfe3e8;text-align:right;white-space:nowrap}th{white-space:normal;vertical-align:bottom}"
-      "td:first-child,th:first-child{text-align:left}td:last-child,td:first-child{white-space:normal;min-width:5rem}figure{margin:1rem 0}svg{max-width:100%;height:auto}"
+      "td:first-child,th:first-child{text-align:left}td:last-child,td:first-child{white-space:normal;min-width:5rem}figure{margin:1rem 0}.views{display:flex;flex-wrap:wrap;gap:1rem}.view{margin:0;max-width:min(100%,40rem)}.view img{max-width:100%;height:auto;image-rendering:pixelated;border:1px solid #dfe3e8}svg{max-width:100%;height:auto}"
       ".words{min-width:16rem;max-width:24rem;text-align:left;white-space:normal}.small,figcaption{color:#55606e;font-size:.9rem}code{font-size:.9rem}</style>"
       "</head><body>\n<h1>The paper's evaluation, remade</h1>\n";
   html += fmt::format(

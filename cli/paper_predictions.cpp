@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/paper_expected.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/registration/icp.hpp"
@@ -15,29 +16,6 @@ namespace palpate::cli {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-/// Answers for one step of a recording by solving it at an answer: travel of the tool and surface.
-class Expected {
- public:
-  Expected(const Recording& recording, const estimation::SimulatedObject& object, const estimation::FitOptions& options,
-           estimation::FitMemory& memory)
-      : model_(recording, object, unknowns_, estimation::statics_options(recording, object, options), memory.model) {
-    memory.model = model_.solved();
-  }
-  /// @param by_region  E of the regions, the first one's too; empty = one E
-  estimation::StepPrediction operator()(std::size_t step, double young_pa, double nu, const std::vector<double>& by_region = {}) {
-    VectorX at = unknowns_.prior_mean();
-    at(estimation::log_young) = std::log(by_region.empty() ? young_pa : by_region.front());
-    at(estimation::poisson) = nu;
-    for (std::size_t r = 1; r < by_region.size(); ++r)
-      at(estimation::first_ratio + static_cast<int>(r) - 1) = std::log(by_region[r] / by_region.front());
-    return model_.predict(step, at);  // with derivatives: travel comes with them
-  }
-
- private:
-  estimation::Unknowns unknowns_;
-  estimation::ForwardModel model_;
-};
 
 /// @param moves  the object may have moved as a whole: registered first
 double rms_to(const TriMesh& surface, const RayCloud& seen, bool moves) {
@@ -51,6 +29,31 @@ double rms_to(const TriMesh& surface, const RayCloud& seen, bool moves) {
     sum += tree.closest(T * Vec3(cloud.points_m.row(i))).squared_distance_m2;
   return std::sqrt(sum / static_cast<double>(cloud.points_m.rows()));
 }
+
+/// Vertices of the true surface that have left the one at rest by more than a tenth of the most that one has: the dent, without noise,
+/// and on all its sides.
+Points dent_of(const TriMesh& now, const geometry::TriangleTree& rest) {
+  VectorX left_m(now.vertices_m.rows());
+  for (Index v = 0; v < static_cast<Index>(left_m.size()); ++v) left_m(v) = std::sqrt(rest.closest(now.vertices_m.row(v)).squared_distance_m2);
+  const double far_m = 0.1 * left_m.maxCoeff();
+  std::vector<Index> rows;
+  for (Index v = 0; v < static_cast<Index>(left_m.size()); ++v)
+    if (left_m(v) > far_m) rows.push_back(v);
+  return now.vertices_m(rows, Eigen::all);
+}
+
+double rms_to(const geometry::TriangleTree& surface, const Points& points_m) {
+  if (points_m.rows() == 0) return nan;
+  double sum = 0;
+  for (Index i = 0; i < static_cast<Index>(points_m.rows()); ++i) sum += surface.closest(points_m.row(i)).squared_distance_m2;
+  return std::sqrt(sum / static_cast<double>(points_m.rows()));
+}
+
+/// What was there to be predicted, a step.
+struct Shown {
+  std::vector<RayCloud> seen;
+  std::vector<Points> dent_m;  ///< empty: not known
+};
 
 /// Straight between the forces that were asked for, and on beyond them.
 double force_at(double travel_m, const std::vector<std::pair<double, double>>& travel_force) {
@@ -67,7 +70,7 @@ struct Course {
 };
 
 Course course_of(const Recording& recording, const Prepared& given, const MethodAnswer& answer, const std::vector<double>& by_region,
-                 const std::vector<RayCloud>& seen, const estimation::FitOptions& options, estimation::FitMemory& memory) {
+                 const Shown& shown, const estimation::FitOptions& options, estimation::FitMemory& memory) {
   Course course;
   if (!std::isfinite(answer.young_modulus_pa)) return course;
   Expected expected(recording, given.object, options, memory);
@@ -80,7 +83,8 @@ Course course_of(const Recording& recording, const Prepared& given, const Method
     const Load& load = push.steps[s].loads[0];
     const std::pair<double, double> here{predicted.travel_m(0), load.force_n->dot(load.direction)};
     if (here.first > travel_force.back().first) travel_force.push_back(here);
-    course.at[s] = {nan, rms_to({predicted.surface_m, given.object.surface.rest().triangles}, seen[s], recording.free)};
+    const TriMesh surface{predicted.surface_m, given.object.surface.rest().triangles};
+    course.at[s] = {nan, rms_to(surface, shown.seen[s], recording.free), rms_to(geometry::TriangleTree(surface), shown.dent_m[s])};
   }
   if (travel_force.size() > 1)
     for (auto& [s, expectation] : course.at) expectation.force_n = force_at(travel_of(push.steps[s]), travel_force);
@@ -96,24 +100,29 @@ void predict_unused(const Prepared& given, const Prepared* other, const lab::Pap
   recording.pushes = {trial.unused};
   const TriMesh& rest = given.object.surface.rest();
   const geometry::TriangleTree rest_tree(rest);
-  std::vector<RayCloud> seen;
+  Shown shown;
   for (const auto& step : observe(recording)) {
-    seen.emplace_back();
+    shown.seen.emplace_back();
     for (const auto& input : step)
-      if (const auto* rays = std::get_if<estimation::RayObservation>(&input)) seen.back() = thinned(rays->rays, rest_tree, near_of(recording));
+      if (const auto* rays = std::get_if<estimation::RayObservation>(&input)) shown.seen.back() = thinned(rays->rays, rest_tree, near_of(recording));
   }
+  if (!trial.unused_surface.empty()) {
+    const geometry::TriangleTree true_rest(trial.unused_surface.front());
+    for (const TriMesh& true_surface : trial.unused_surface) shown.dent_m.push_back(dent_of(true_surface, true_rest));
+  }
+  shown.dent_m.resize(shown.seen.size());
   const Prepared one = as_one(given);
-  const Course paper = course_of(recording, one, out.paper, {}, seen, options, shared.fine.unused),
-               ours = course_of(recording, given, out.palpate, by_region, seen, options, shared.fine.unused),
-               by_other = other != nullptr ? course_of(recording, *other, out.other, {}, seen, options, shared.other.unused) : Course{};
+  const Course paper = course_of(recording, one, out.paper, {}, shown, options, shared.fine.unused),
+               ours = course_of(recording, given, out.palpate, by_region, shown, options, shared.fine.unused),
+               by_other = other != nullptr ? course_of(recording, *other, out.other, {}, shown, options, shared.other.unused) : Course{};
   const auto expectation = [](const Course& course, std::size_t s) {
     const auto found = course.at.find(s);
-    return found == course.at.end() ? Expectation{nan, nan} : found->second;
+    return found == course.at.end() ? Expectation{nan, nan, nan} : found->second;
   };
   for (std::size_t s = 0; s < trial.unused.steps.size(); ++s) {
     if (!loaded(trial.unused.steps[s])) continue;
     out.unused.push_back({trial.unused_force_n[s], travel_of(trial.unused.steps[s]), expectation(paper, s), expectation(ours, s),
-                          expectation(by_other, s), rms_to(rest, seen[s], recording.free)});
+                          expectation(by_other, s), rms_to(rest, shown.seen[s], recording.free), rms_to(rest_tree, shown.dent_m[s])});
   }
 }
 

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "palpate/report/words.hpp"
 
 namespace palpate::cli {
@@ -50,16 +52,18 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
     write_page(runs, out);
   };
   for (const lab::PaperScene* scene : plan.scenes) {
-    SharedModels shared;
+    // What serves one seed alone is not worth solving for over all of nu's range.
+    std::optional<SharedModels> shared;
+    if (plan.seeds > 1) shared.emplace();
     for (int k = 0; k < plan.seeds && !work.stopped(); ++k) {
       const SeedAsked asked = asked_of(*scene, k);
       if (folder.has(asked)) continue;
       TrialAnswer trial;
       try {
-        work.trial(*scene, asked.seed, asked.options, shared, trial);
+        work.trial(*scene, asked.seed, asked.options, shared ? &*shared : nullptr, trial);
       } catch (const std::exception& error) {
         trial.failed = error.what();
-        shared = {};  // it may be half made
+        if (shared) shared.emplace();  // it may be half made
       }
       if (work.stopped()) break;
       trial.seed = asked.seed;

@@ -21,7 +21,7 @@ struct PaperPlan {
 
 /// The work itself; tests put other work in its place.
 struct PaperWork {
-  std::function<void(const lab::PaperScene&, std::uint64_t seed, const TrialOptions&, SharedModels&, TrialAnswer&)> trial;
+  std::function<void(const lab::PaperScene&, std::uint64_t seed, const TrialOptions&, SharedModels*, TrialAnswer&)> trial;
   std::function<void(const Study&, const StudyOptions&, StudyAnswer&)> study;
   std::function<bool()> stopped;
   std::function<void(const std::string&)> say;

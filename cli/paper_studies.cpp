@@ -26,10 +26,13 @@ std::vector<StudyRow> meshes(const StudyOptions& study, const OnProgress& progre
     const char* what;
     ModelChoice choice;
   };
-  const std::array<Model, 5> models{{{"815 linear tetrahedra, the force at a point (as in the paper)", {paper_tetrahedra, 0, true, false, true}},
-                                     {"815 linear tetrahedra, the pad's patch", {paper_tetrahedra, 0, true, false, false}},
-                                     {"815 quadratic tetrahedra, the pad's patch", {paper_tetrahedra, 0, false, false, false}},
-                                     {"palpate's mesh with linear tetrahedra, the pad's patch", {0, 0, true, false, false}},
+  const std::array<Model, 6> models{{{"815 linear tetrahedra, the force at a point (as in the paper)",
+                                      {.tetrahedra = paper_tetrahedra, .linear = true, .point_load = true}},
+                                     {"8 times as many linear tetrahedra, the force at a point",
+                                      {.tetrahedra = 8 * paper_tetrahedra, .linear = true, .point_load = true}},
+                                     {"815 linear tetrahedra, the pad's patch", {.tetrahedra = paper_tetrahedra, .linear = true}},
+                                     {"815 quadratic tetrahedra, the pad's patch", {.tetrahedra = paper_tetrahedra}},
+                                     {"palpate's mesh with linear tetrahedra, the pad's patch", {.linear = true}},
                                      {"palpate's mesh and the pad's patch", {}}}};
   std::vector<StudyRow> rows;
   for (const Model& model : models) {

@@ -102,14 +102,21 @@ std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial)
   std::vector<std::string> names{"the paper's method", "palpate"};
   if (!trial.other_law.empty()) names.push_back("palpate, " + trial.other_law + " law");
   const bool travels = std::any_of(trial.unused.begin(), trial.unused.end(), [](const auto& step) { return std::isfinite(step.travel_m); });
+  const bool dents = std::any_of(trial.unused.begin(), trial.unused.end(), [](const auto& step) { return std::isfinite(step.dent_still_m); });
   std::string html = fmt::format("<p>A push that was not used, {}: {}rms distance of what the camera saw to the surface that is expected "
-                                 "under the measured force.</p>\n<table><tr><th>true force</th>{}",
+                                 "under the measured force{}.</p>\n<table><tr><th>true force</th>{}",
                                  scene.unused ? "at another place" : "at the same place with other forces",
-                                 travels ? "force expected at the measured travel, and " : "", travels ? "<th>travel</th>" : "");
+                                 travels ? "force expected at the measured travel, and " : "",
+                                 dents ? "; the dent: rms distance of the true surface, where it moved, to that" : "", travels ? "<th>travel</th>" : "");
   if (travels)
     for (const std::string& name : names) html += "<th>force: " + name + "</th>";
   for (const std::string& name : names) html += "<th>surface: " + name + "</th>";
-  html += "<th>surface if nothing moved</th></tr>\n";
+  html += "<th>surface if nothing moved</th>";
+  if (dents) {
+    for (const std::string& name : names) html += "<th>dent: " + name + "</th>";
+    html += "<th>dent if nothing moved</th>";
+  }
+  html += "</tr>\n";
   for (const UnusedStep& step : trial.unused) {
     const std::array<const Expectation*, 3> all{&step.paper, &step.palpate, &step.other};
     html += fmt::format("<tr><td>{:.2f} N</td>", step.force_n);
@@ -119,7 +126,12 @@ std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial)
                   ? fmt::format("<td>{:.2f} N ({:+.0f} %)</td>", all[k]->force_n, 100 * (all[k]->force_n / step.force_n - 1))
                   : "<td>none</td>";
     for (std::size_t k = 0; k < names.size(); ++k) html += "<td>" + number(1000 * all[k]->surface_m, "{:.2f} mm") + "</td>";
-    html += "<td>" + number(1000 * step.surface_still_m, "{:.2f} mm") + "</td></tr>\n";
+    html += "<td>" + number(1000 * step.surface_still_m, "{:.2f} mm") + "</td>";
+    if (dents) {
+      for (std::size_t k = 0; k < names.size(); ++k) html += "<td>" + number(1000 * all[k]->dent_m, "{:.2f} mm") + "</td>";
+      html += "<td>" + number(1000 * step.dent_still_m, "{:.2f} mm") + "</td>";
+    }
+    html += "</tr>\n";
   }
   return html + "</table>\n";
 }

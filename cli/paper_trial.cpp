@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "cli/paper_predictions.hpp"
+#include "cli/paper_views.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/paper_method.hpp"
 
@@ -119,9 +120,10 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   out.truth_s = truth.seconds();
   SharedModels of_this_seed;
   const bool same_mesh = trial.recording.rest.views.empty();  // in all seeds
-  if (shared == nullptr || !same_mesh) shared = &of_this_seed;
   // What is of no use to another seed need not be solved for over all of nu's range.
-  estimation::FitMemory *const mine = same_mesh ? &shared->fine.palpate : nullptr, *const others = same_mesh ? &shared->other.palpate : nullptr;
+  const bool keeps = shared != nullptr && same_mesh;
+  if (!keeps) shared = &of_this_seed;
+  estimation::FitMemory *const mine = keeps ? &shared->fine.palpate : nullptr, *const others = keeps ? &shared->other.palpate : nullptr;
   out.seed = seed;
   if (!scene.apparent) {
     out.young_modulus_pa = trial.young_modulus_pa;
@@ -167,6 +169,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
                  known ? out.poisson_ratio : out.palpate.poisson_ratio, fit, out);
   }
   if (options.pictures) {
+    out.views = views_of(trial.recording, given, out.palpate, by_region, fit);
     estimation::FitOptions checked = fit;
     checked.cross_checks = true;
     const auto judged = [&](const Prepared& what, MethodAnswer& answer, estimation::FitMemory* memory) {

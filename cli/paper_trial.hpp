@@ -33,6 +33,7 @@ struct SiteAnswer {
 struct Expectation {
   double force_n = 0;
   double surface_m = 0;  ///< rms of the seen points to the expected surface, under the step's force
+  double dent_m = no_value;  ///< rms of the true surface, where it moved, to the expected one
 };
 
 /// A push that no method has seen, at one of its forces.
@@ -40,6 +41,7 @@ struct UnusedStep {
   double force_n = 0, travel_m = 0;  ///< true force, measured travel (NaN: it says nothing)
   Expectation paper, palpate, other;
   double surface_still_m = 0;  ///< rms of the seen points to the surface at rest
+  double dent_still_m = no_value;  ///< rms of the true surface, where it moved, to the one at rest
 };
 
 /// What the sensors of a loaded step read.
@@ -52,6 +54,13 @@ struct ForceReading {
 struct RegistrationPicture {
   double young_modulus_pa = 0, rms_m = 0;
   Points simulated_m, registered_m;  ///< thinned
+};
+
+/// A picture as PNG, base64.
+struct PaperView {
+  std::string what;
+  int width = 0, height = 0;  ///< pixels
+  std::string png;
 };
 
 /// The paper's error function over (E, nu), m2; rows = E. One column, of the nu that was found, where a solve is dear.
@@ -77,6 +86,7 @@ struct TrialAnswer {
   std::vector<std::string> as_one_verdicts;   ///< of ours when it takes such an object for homogeneous; only where asked for
   std::vector<UnusedStep> unused;
   std::vector<RegistrationPicture> pictures;  ///< only where asked for
+  std::vector<PaperView> views;               ///< only where asked for
   std::vector<SampleAnswer> samples;          ///< each sample alone; only where asked for
   ErrorSurface surface;                       ///< only where asked for
 };

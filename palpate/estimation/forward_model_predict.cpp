@@ -19,8 +19,8 @@ void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const V
   out.field_unknown = field_unknown_;
   out.material_m = out.surface_m;
   out.field_directions = field_->normals() * clamp.rotation().transpose();
-  const VectorX offset_m = field_->basis() * unknowns.segment(field_unknown_, field_->modes());
-  out.surface_m += offset_m.asDiagonal() * out.field_directions;
+  const auto offset_m = field_->offset_m(unknowns.segment(field_unknown_, field_->modes()));
+  out.surface_m += offset_m->asDiagonal() * out.field_directions;
 }
 
 StepPrediction ForwardModel::predict(std::size_t s, const VectorX& unknowns, bool derivatives) {

@@ -66,6 +66,7 @@ double slope(std::pair<double, double> behind, const std::pair<double, double>& 
 }
 
 struct PaperError::Impl {
+  Recording recording;  // without the slow error of the rest surface, of which the method knows nothing
   Unknowns unknowns;
   std::unique_ptr<ForwardModel> model;
   std::vector<std::size_t> steps;
@@ -77,9 +78,12 @@ struct PaperError::Impl {
   double start_pa = 0;
 };
 
-PaperError::PaperError(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
+PaperError::PaperError(const Recording& given, const SimulatedObject& object, const Inputs& inputs,
                        const FitOptions& options, FitMemory* memory)
     : impl_(std::make_unique<Impl>()) {
+  impl_->recording = given;
+  impl_->recording.rest.surface_std_m = 0;
+  const Recording& recording = impl_->recording;
   const fem::StaticsOptions statics = statics_options(recording, object, options);
   FitMemory here;
   if (memory == nullptr) memory = &here;

@@ -78,4 +78,13 @@ SurfaceField::SurfaceField(const TriMesh& rest, double std_m, double correlation
   basis_ = full * principal.eigenvectors().rightCols(modes - dropped);
 }
 
+std::shared_ptr<const VectorX> SurfaceField::offset_m(const VectorX& coefficients) const {
+  const std::lock_guard lock(mutex_);
+  if (!last_offset_m_ || last_coefficients_ != coefficients) {
+    last_offset_m_ = std::make_shared<const VectorX>(basis_ * coefficients);
+    last_coefficients_ = coefficients;
+  }
+  return last_offset_m_;
+}
+
 }  // namespace palpate::estimation

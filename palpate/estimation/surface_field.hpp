@@ -3,6 +3,9 @@
 // Frames at rest tell it apart from what the forces do.
 #pragma once
 
+#include <memory>
+#include <mutex>
+
 #include "palpate/core/mesh.hpp"
 
 namespace palpate::estimation {
@@ -18,6 +21,8 @@ class SurfaceField {
 
   Index modes() const { return static_cast<Index>(basis_.cols()); }
   const MatrixX& basis() const { return basis_; }    ///< vertices x modes, metres per unit coefficient
+  /// basis() times coefficients; the last answer is kept, since all steps of an evaluation ask alike. May be asked by several threads at once.
+  std::shared_ptr<const VectorX> offset_m(const VectorX& coefficients) const;
   const Points& normals() const { return normals_; }  ///< of the rest surface, a vertex
   double std_m() const { return std_m_; }
 
@@ -25,6 +30,9 @@ class SurfaceField {
   double std_m_;
   Points normals_;
   MatrixX basis_;
+  mutable std::mutex mutex_;
+  mutable VectorX last_coefficients_;
+  mutable std::shared_ptr<const VectorX> last_offset_m_;
 };
 
 }  // namespace palpate::estimation

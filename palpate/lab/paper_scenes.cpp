@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 
 #include "palpate/acquisition/push_protocol.hpp"
@@ -25,8 +26,8 @@ Depth depth_of(const PaperScene& scene, const LabObject& object, const PushSite&
   return {scene.travel_m, 0.5 * start_n_m * scene.travel_m / scene.samples, scene.samples};
 }
 
-// One push of rising forces. False: the user has had enough.
-bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& depth, Push& push, std::vector<double>* true_force_n,
+// One push of rising forces; `recorded` is called at every step of it. False: the user has had enough.
+bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& depth, Push& push, const std::function<void()>& recorded,
              const OnProgress& progress, double done, double share) {
   acquisition::PushOptions protocol;
   protocol.travel_limit_m = depth.travel_m;
@@ -42,7 +43,7 @@ bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& de
       [&](const Push& now, const Step& step) {
         push = now;
         steps.push_back(step);
-        if (true_force_n != nullptr) true_force_n->push_back(robot.true_force_n());
+        if (recorded) recorded();
       },
       [&] {
         const double part = std::min(1.0, static_cast<double>(steps.size()) / (depth.samples + 1));
@@ -169,7 +170,11 @@ PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const O
   }
   Depth depth = depth_of(scene, robot.object(), sites.front());
   depth.force_step_n *= scene.unused ? 0.8 : 0.93;  // other forces than those of the fit
-  push_at(robot, robot.plan_at(unused.contact_m, unused.direction), depth, trial.unused, &trial.unused_force_n, progress, 1 - share, share);
+  const auto truth = [&] {
+    trial.unused_force_n.push_back(robot.true_force_n());
+    if (!trial.recording.supports.empty()) trial.unused_surface.push_back(robot.true_surface());
+  };
+  push_at(robot, robot.plan_at(unused.contact_m, unused.direction), depth, trial.unused, truth, progress, 1 - share, share);
   if (trial.recording.supports.empty()) {
     trial.recording.pushes.push_back(std::move(trial.unused));  // for as long as both are made free
     say_free(trial.recording, robot.object().foot_m.z(), depth.travel_m);

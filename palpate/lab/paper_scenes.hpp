@@ -21,6 +21,7 @@ struct PaperTrial {
   std::vector<double> site_young_pa;               ///< where each push acts
   Push unused;                                     ///< a push that is not in the recording, to be predicted; may have no steps
   std::vector<double> unused_force_n;              ///< what truly acted, a step
+  std::vector<TriMesh> unused_surface;             ///< how the object truly was, a step; none of one that is free
 };
 
 /// What is known of the object's shape.

@@ -228,6 +228,7 @@ bool LabRobot::reaches(const Vec3& contact_m, const Vec3& direction, double star
 
 double LabRobot::true_force_n() const { return impl_->force(); }
 double LabRobot::true_travel_m() const { return std::max(0.0, impl_->travel()); }
+TriMesh LabRobot::true_surface() const { return impl_->shape(); }
 double LabRobot::true_force_scale() const { return impl_->wrist->scale(); }
 const LabObject& LabRobot::object() const { return impl_->object; }
 

@@ -90,6 +90,8 @@ class LabRobot : public acquisition::Robot {
   double true_force_n() const;
   double true_travel_m() const;
   double true_force_scale() const;
+  /// As deformed now.
+  TriMesh true_surface() const;
   const LabObject& object() const;
 
  private:

@@ -78,7 +78,7 @@ struct MadeUp {
     plan.scenes = {&lab::paper_scene("cow"), &lab::paper_scene("cube")};
     plan.studies = {&studies().front()};
     plan.seeds = 4;
-    work.trial = [this](const lab::PaperScene&, std::uint64_t seed, const TrialOptions& options, SharedModels&, TrialAnswer& out) {
+    work.trial = [this](const lab::PaperScene&, std::uint64_t seed, const TrialOptions& options, SharedModels*, TrialAnswer& out) {
       ++made;
       make_up(seed, options, out);
     };
@@ -135,7 +135,7 @@ TEST(PaperRun, PiecesJoinedAreTheWhole) {
 
   MadeUp other;
   other.plan.seeds = 1;
-  other.work.trial = [](const lab::PaperScene&, std::uint64_t, const TrialOptions& options, SharedModels&, TrialAnswer& out) { make_up(9, options, out); };
+  other.work.trial = [](const lab::PaperScene&, std::uint64_t, const TrialOptions& options, SharedModels*, TrialAnswer& out) { make_up(9, options, out); };
   run_plan(other.plan, other.work, files / "other");
   EXPECT_THAT(message_of([&] { joined.take_from(files / "other"); }), HasSubstr("another answer"));
   EXPECT_THAT(message_of([&] { joined.take_from(files / "nothing"); }), HasSubstr("holds no seeds"));
@@ -144,7 +144,7 @@ TEST(PaperRun, PiecesJoinedAreTheWhole) {
 TEST(PaperRun, AFailedSeedIsARowAndTheRunGoesOn) {
   const test::TemporaryFolder files("paper_failed");
   MadeUp run;
-  run.work.trial = [&](const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels&, TrialAnswer& out) {
+  run.work.trial = [&](const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels*, TrialAnswer& out) {
     ++run.made;
     if (scene.name == "cube" && seed == 2) throw std::runtime_error("the pad went <through> it");
     make_up(seed, options, out);
