@@ -30,16 +30,20 @@ double rms_to(const TriMesh& surface, const RayCloud& seen, bool moves) {
   return std::sqrt(sum / static_cast<double>(cloud.points_m.rows()));
 }
 
-/// Vertices of the true surface that have left the one at rest by more than a tenth of the most that one has: the dent, without noise,
-/// and on all its sides.
+/// Middles of the true surface's triangles that have left the one at rest by more than a tenth of the most that one has: the dent,
+/// without noise, and on all its sides.
 Points dent_of(const TriMesh& now, const geometry::TriangleTree& rest) {
-  VectorX left_m(now.vertices_m.rows());
-  for (Index v = 0; v < static_cast<Index>(left_m.size()); ++v) left_m(v) = std::sqrt(rest.closest(now.vertices_m.row(v)).squared_distance_m2);
+  Points middles_m(now.triangles.rows(), 3);
+  VectorX left_m(now.triangles.rows());
+  for (Index t = 0; t < static_cast<Index>(left_m.size()); ++t) {
+    middles_m.row(t) = now.vertices_m(now.triangles.row(t), Eigen::all).colwise().mean();
+    left_m(t) = std::sqrt(rest.closest(middles_m.row(t)).squared_distance_m2);
+  }
   const double far_m = 0.1 * left_m.maxCoeff();
   std::vector<Index> rows;
-  for (Index v = 0; v < static_cast<Index>(left_m.size()); ++v)
-    if (left_m(v) > far_m) rows.push_back(v);
-  return now.vertices_m(rows, Eigen::all);
+  for (Index t = 0; t < static_cast<Index>(left_m.size()); ++t)
+    if (left_m(t) > far_m) rows.push_back(t);
+  return middles_m(rows, Eigen::all);
 }
 
 double rms_to(const geometry::TriangleTree& surface, const Points& points_m) {

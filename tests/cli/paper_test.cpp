@@ -41,6 +41,9 @@ TEST(Paper, BothMethodsAnswerAndAGridJudgesTheBaseline) {
   const auto& unused = trial.at("unused_place").back();
   EXPECT_NEAR(unused.at("force_palpate_n").get<double>() / unused.at("force_n").get<double>(), 1, 0.2);
   EXPECT_LT(unused.at("surface_rms_m").at("palpate").get<double>(), unused.at("surface_rms_m").at("still").get<double>());
+  const auto& dent = unused.at("dent_rms_m");  // some millimetres deep, and half of it foretold at least
+  EXPECT_LT(dent.at("still").get<double>(), 0.01);
+  EXPECT_LT(dent.at("palpate").get<double>(), 0.5 * dent.at("still").get<double>());
   const auto& registrations = trial.at("registrations");
   ASSERT_EQ(registrations.size(), 4u);
   EXPECT_LT(registrations.at(3).at("rms_m").get<double>(), registrations.at(0).at("rms_m").get<double>()) << "at the truth, at 3 E";
@@ -48,6 +51,9 @@ TEST(Paper, BothMethodsAnswerAndAGridJudgesTheBaseline) {
   page << std::ifstream(out / "paper.html").rdbuf();
   EXPECT_NE(page.str().find("<svg"), std::string::npos);
   EXPECT_NE(page.str().find("What it should show"), std::string::npos);
+  std::size_t views = 0;
+  for (std::size_t at = page.str().find("data:image/png"); at != std::string::npos; at = page.str().find("data:image/png", at + 1)) ++views;
+  EXPECT_EQ(views, 5u) << "model, image, what is left of it, simulated, difference";
   EXPECT_EQ(page.str().find("http"), page.str().find("http://www.w3.org/2000/svg"));  // nothing is fetched
 
   // The seed is there now: again, and joined alone, it is the same page in no time.
