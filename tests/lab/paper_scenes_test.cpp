@@ -103,5 +103,17 @@ TEST(OpposedBall, IsSqueezedFromBothSidesAlike) {
   EXPECT_GT(pressed->travel_m(), 0.6 * half_space_m);
 }
 
+// A push meets the surface's triangles, which lie a little below the very top: the robot's every push of it was refused.
+TEST(OpposedBall, IsPressedWhereItsTrianglesAre) {
+  ObjectOptions truth;
+  truth.tetrahedra = 4000;
+  const LabObject ball = opposed_ball(truth);
+  PushSite there = ball.sites.at(0);
+  there.contact_m.z() -= 4e-4;
+  EXPECT_NO_THROW(ball.press(there));
+  there.contact_m.x() += 0.01;
+  EXPECT_THROW(ball.press(there), Error);
+}
+
 }  // namespace
 }  // namespace palpate::lab
