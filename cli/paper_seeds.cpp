@@ -139,6 +139,8 @@ void SeedFolder::take_from(const fs::path& out) const {
   const fs::path from = out / "seeds";
   if (!fs::is_directory(from) || fs::is_empty(from))
     throw Error("holds no seeds of palpate paper: give a folder that an earlier run wrote with -o", out.string());
+  for (const auto& entry : fs::directory_iterator(from))  // before anything is written
+    if (entry.path().extension() == ".json") read_seed(entry.path());
   fs::create_directories(seeds_);
   for (const auto& entry : fs::directory_iterator(from)) {
     if (entry.path().extension() != ".json") continue;
