@@ -139,6 +139,13 @@ TEST(PaperRun, PiecesJoinedAreTheWhole) {
   run_plan(other.plan, other.work, files / "other");
   EXPECT_THAT(message_of([&] { joined.take_from(files / "other"); }), HasSubstr("another answer"));
   EXPECT_THAT(message_of([&] { joined.take_from(files / "nothing"); }), HasSubstr("holds no seeds"));
+
+  // Of another program: nothing of it is taken, and the file that was given is named.
+  fs::create_directories(files / "old" / "seeds");
+  std::ofstream(files / "old" / "seeds" / "cube_0001.json") << R"({"palpate": "0.0.1", "format": 1})";
+  const SeedFolder empty(files / "empty");
+  EXPECT_THAT(message_of([&] { empty.take_from(files / "old"); }), HasSubstr((files / "old" / "seeds" / "cube_0001.json").string()));
+  EXPECT_FALSE(fs::exists(files / "empty"));
 }
 
 TEST(PaperRun, AFailedSeedIsARowAndTheRunGoesOn) {
