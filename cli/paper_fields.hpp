@@ -77,7 +77,7 @@ void fields(Each each, TrialAnswer& a) {
   each("true_young_modulus_pa", a.young_modulus_pa), each("true_poisson_ratio", a.poisson_ratio), each("tetrahedra", a.tetrahedra);
   each("truth_s", a.truth_s), each("model_s", a.model_s), each("total_s", a.total_s);
   each("paper", a.paper), each("palpate", a.palpate), each("paper_linear_tetrahedra", a.paper_coarse);
-  each("other_law", a.other_law), each("palpate_other_law", a.other), each("readings", a.readings), each("sites", a.sites);
+  each("samples_left_out", a.left_out), each("other_law", a.other_law), each("palpate_other_law", a.other), each("readings", a.readings), each("sites", a.sites);
   each("verdicts_without_regions", a.as_one_verdicts), each("unused_place", a.unused), each("registrations", a.pictures);
   each("views", a.views), each("samples", a.samples), each("error_surface", a.surface);
 }

@@ -146,6 +146,21 @@ Prepared part_of(const Prepared& all, const std::function<bool(std::size_t push,
   return out;
 }
 
+Prepared first_samples(Prepared given, const estimation::StepCounts& counts) {
+  if (counts == estimation::all_steps(given.recording)) return given;
+  given.inputs = estimation::first_steps(given.inputs, given.recording, counts);
+  estimation::keep_first_steps(given.recording, counts);
+  if (given.finer) {
+    given.finer = std::make_shared<estimation::FinerModel>(*given.finer);
+    estimation::keep_first_steps(given.finer->recording, counts);
+  }
+  if (given.doubt) {
+    given.doubt = std::make_shared<estimation::ShapeDoubt>(*given.doubt);
+    for (estimation::AlternativeShape& shape : given.doubt->shapes) estimation::keep_first_steps(shape.recording, counts);
+  }
+  return given;
+}
+
 Prepared with_law(Prepared given, std::string_view law) {
   if (given.finer) given.finer = std::make_shared<estimation::FinerModel>(*given.finer);
   given.recording.model.material = given.object.material = std::string(law);

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "palpate/core/progress.hpp"
+#include "palpate/estimation/deep_loads.hpp"
 #include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/shape_error.hpp"
@@ -53,6 +54,9 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
 
 /// Some steps of it: keep(push, step) says which.
 Prepared part_of(const Prepared& all, const std::function<bool(std::size_t push, std::size_t step)>& keep);
+
+/// The first samples of each push, as all else that was prepared.
+Prepared first_samples(Prepared given, const estimation::StepCounts& counts);
 
 /// The same taken for one material, whatever regions it has: the paper's method knows none.
 Prepared as_one(Prepared given);

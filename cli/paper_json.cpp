@@ -24,6 +24,7 @@ nlohmann::json json_of(const TrialAnswer& trial) {
                         {"paper_linear_tetrahedra", json_of(trial.paper_coarse)},
                         {"palpate", json_of(trial.palpate)}};
   if (!trial.failed.empty()) out["failed"] = trial.failed;
+  if (trial.left_out > 0) out["samples_left_out"] = trial.left_out;
   if (!trial.other_law.empty()) out["palpate_" + trial.other_law] = json_of(trial.other);
   for (const ForceReading& reading : trial.readings)
     out["readings"].push_back({{"push", reading.push}, {"force_n", reading.force_n}, {"travel_m", reading.travel_m}});

@@ -42,23 +42,29 @@ MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& optio
 }
 
 MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
-                        const OnProgress& progress, Identification* whole) {
+                        const OnProgress& progress, Identification* whole, estimation::StepCounts* fitted) {
   const Watch watch;
-  Identification answer = estimation::fit(given.recording, given.object, given.inputs, options, progress, given.finer.get(), memory,
-                                          given.doubt.get());
+  const auto fit = [&](const estimation::StepCounts& steps) {
+    const Prepared some = first_samples(given, steps);
+    Identification answer = estimation::fit(some.recording, some.object, some.inputs, options, progress, some.finer.get(), memory, some.doubt.get());
+    if (given.doubt) given.doubt->effect = some.doubt->effect;
+    return answer;
+  };
+  Identification answer = estimation::fit_within_pressure(given.recording, given.object, given.inputs, options, fit, fitted);
   const MethodAnswer out = summary(answer, watch.seconds());
   if (whole != nullptr) *whole = std::move(answer);
   return out;
 }
 
 MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
-                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole) {
-  const MethodAnswer first = by_palpate(given, options, memory, progress, whole);
+                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole,
+                                        estimation::StepCounts* fitted) {
+  const MethodAnswer first = by_palpate(given, options, memory, progress, whole, fitted);
   if (!given.doubt || !given.doubt->effect || !given.doubt->effect->better) return first;
   given.doubt->effect->better.reset();
   choice.planar_agrees = true;  // the only alternative that is as likely
   given = prepare(recording, choice, nullptr, progress, given.doubt);
-  MethodAnswer out = by_palpate(given, options, nullptr, progress, whole);
+  MethodAnswer out = by_palpate(given, options, nullptr, progress, whole, fitted);
   out.solves += first.solves;
   out.load_cases += first.load_cases;
   out.iterations += first.iterations;

@@ -37,13 +37,15 @@ MethodAnswer summary(const Identification& answer, double seconds);
 
 MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
                       const OnProgress& progress);
-/// @param whole  if given: all that was found
+/// @param whole   if given: all that was found
+/// @param fitted  if given: of which samples; loads too high for the model are left out (deep_loads.hpp)
 MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
-                        const OnProgress& progress, Identification* whole = nullptr);
+                        const OnProgress& progress, Identification* whole = nullptr, estimation::StepCounts* fitted = nullptr);
 /// The same of an object that was seen from one side, as `identify` does it: where a planar back side agrees better with the pushes
 /// than the one that was fitted, it takes its place, and the answer is of that one. What both fits took is counted.
 /// @param given  of `recording` and `choice`; both are changed to what was fitted at last
 MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
-                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole = nullptr);
+                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole = nullptr,
+                                        estimation::StepCounts* fitted = nullptr);
 
 }  // namespace palpate::cli

@@ -102,6 +102,8 @@ void predict_unused(const Prepared& given, const Prepared* other, const lab::Pap
   if (trial.unused.steps.empty()) return;
   Recording recording = given.recording;
   recording.pushes = {trial.unused};
+  if (recording.model.material != "linear" && std::isfinite(out.palpate.young_modulus_pa))  // as far as a patch stands for the tool
+    estimation::keep_first_steps(recording, estimation::steps_within_pressure(recording, out.palpate.young_modulus_pa));
   const TriMesh& rest = given.object.surface.rest();
   const geometry::TriangleTree rest_tree(rest);
   Shown shown;
@@ -123,7 +125,7 @@ void predict_unused(const Prepared& given, const Prepared* other, const lab::Pap
     const auto found = course.at.find(s);
     return found == course.at.end() ? Expectation{nan, nan, nan} : found->second;
   };
-  for (std::size_t s = 0; s < trial.unused.steps.size(); ++s) {
+  for (std::size_t s = 0; s < recording.pushes[0].steps.size(); ++s) {
     if (!loaded(trial.unused.steps[s])) continue;
     out.unused.push_back({trial.unused_force_n[s], travel_of(trial.unused.steps[s]), expectation(paper, s), expectation(ours, s),
                           expectation(by_other, s), rms_to(rest, shown.seen[s], recording.free), rms_to(rest_tree, shown.dent_m[s])});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_trial.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -15,6 +16,12 @@ namespace {
 
 /// Every (E, nu) takes as many searches for equilibrium as there are samples.
 bool dear(const Prepared& given) { return given.object.material != "linear"; }
+
+int samples(const Recording& recording) {
+  int count = 0;
+  for (const Push& push : recording.pushes) count += static_cast<int>(std::count_if(push.steps.begin(), push.steps.end(), loaded));
+  return count;
+}
 
 /// Says what its life took, also where an error ends it.
 class Takes {
@@ -116,7 +123,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
                const OnProgress& progress, TrialAnswer& out) {
   const Takes all(out.total_s);
   const Watch truth;
-  const lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress);
+  lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress);
   out.truth_s = truth.seconds();
   SharedModels of_this_seed;
   const bool same_mesh = trial.recording.rest.views.empty();  // in all seeds
@@ -141,7 +148,13 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
   out.model_s = model.seconds();
   Identification ours;
-  out.palpate = asked([&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, mine, progress, &ours); });
+  estimation::StepCounts fitted = estimation::all_steps(given.recording);
+  out.palpate = asked([&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, mine, progress, &ours, &fitted); });
+  // From here on these samples alone, by both methods.
+  estimation::keep_first_steps(trial.recording, fitted);
+  out.left_out = samples(given.recording);
+  given = first_samples(std::move(given), fitted);
+  out.left_out -= samples(given.recording);
   out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
   const Prepared one = as_one(given);
   out.paper = asked([&] { return by_paper(one, fit, &shared->fine.paper, progress); });

@@ -81,6 +81,7 @@ struct TrialAnswer {
   MethodAnswer paper_coarse = no_answer();    ///< the paper's method on linear tetrahedra of the same mesh; may be left out
   std::string other_law;                      ///< that palpate fitted as well; empty: none
   MethodAnswer other = no_answer();
+  int left_out = 0;                           ///< samples whose loads are too high for the model (deep_loads.hpp): by neither method
   std::vector<ForceReading> readings;
   std::vector<SiteAnswer> sites;              ///< only of an object with regions
   std::vector<std::string> as_one_verdicts;   ///< of ours when it takes such an object for homogeneous; only where asked for

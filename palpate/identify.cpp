@@ -10,6 +10,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/version.hpp"
+#include "palpate/estimation/deep_loads.hpp"
 #include "palpate/estimation/fit_on_fine_mesh.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/estimation/unseen_side.hpp"
@@ -196,6 +197,7 @@ std::map<std::string, std::string> provenance(const Recording& recording, const 
     start << *options.fit.young_start_pa << " Pa";
     said["start of Young's modulus"] = start.str();
   }
+  if (options.all_loads) said["loads"] = "all, also where a patch caves in";
   for (const auto& [file, hash] : recording.input_hashes) said["sha256 " + file] = hash;
   return said;
 }
@@ -384,6 +386,7 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   Recording recording;
   estimation::SimulatedObject object;
   std::optional<estimation::ShapeDoubt> doubt;
+  estimation::StepCounts fitted = estimation::all_steps(as_given);
   const auto fit = [&](reconstruction::Completion completion) {
     recording = as_given;
     estimation::Inputs observed = all_observed;
@@ -395,16 +398,32 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
     if (unseen > 0 && doubt) doubt->side = unseen_side(as_given, recording, seen);
     const auto foot = foot_doubt(recording, strip_m);
     if (foot && options.method != "paper" && !doubt) doubt.emplace().foot = foot;
-    out.answer = options.method == "paper"  // sec. VI: error function and its minimum
-                     ? estimation::fit_as_in_paper(recording, object, observed, options.fit, progress)
-                     : estimation::fit_on_fine_mesh(recording, object, observed, options.fit, options.mesh_tolerance,
-                                                    doubt ? &*doubt : nullptr, progress, fill_anew(as_given, recording));
+    if (options.method == "paper") {
+      out.answer = estimation::fit_as_in_paper(recording, object, observed, options.fit, progress);  // sec. VI: error function and its minimum
+      return;
+    }
+    const Recording whole = recording;
+    const estimation::SimulatedObject filled = object;
+    const std::optional<estimation::ShapeDoubt> unjudged = doubt;
+    const auto fit_steps = [&](const estimation::StepCounts& steps) {
+      recording = whole;
+      object = filled;
+      doubt = unjudged;
+      estimation::keep_first_steps(recording, steps);
+      if (doubt)
+        for (estimation::AlternativeShape& shape : doubt->shapes) estimation::keep_first_steps(shape.recording, steps);
+      return estimation::fit_on_fine_mesh(recording, object, estimation::first_steps(observed, whole, steps), options.fit,
+                                          options.mesh_tolerance, doubt ? &*doubt : nullptr, progress, fill_anew(as_given, recording));
+    };
+    out.answer = options.all_loads ? fit_steps(fitted)
+                                   : estimation::fit_within_pressure(whole, filled, observed, options.fit, fit_steps, &fitted);
   };
   fit(reconstruction::Completion::mirrored);
   if (doubt && doubt->effect && doubt->effect->better) {
     doubt->effect->better.reset();
     fit(reconstruction::Completion::planar);  // the only alternative that is as likely
   }
+  masked_m = estimation::first_steps(masked_m, as_given, fitted);
   for (std::size_t s = 0; s < out.answer.steps.size() && s < masked_m.size(); ++s) {
     out.answer.steps[s].masked_m = std::move(masked_m[s]);
   }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "palpate/core/quantity.hpp"
+#include "palpate/estimation/deep_loads.hpp"
 #include "palpate/estimation/law_comparison.hpp"
 #include "palpate/estimation/load_drift.hpp"
 #include "palpate/estimation/step_checks.hpp"
@@ -18,7 +19,6 @@ constexpr double least_slip_m = 5e-4;      // less is within what a contact poin
 constexpr double least_settling = 0.01;    // of E
 constexpr double pattern_deviate = 4.3;    // one recording in a hundred thousand
 constexpr double pattern_inflation = 1.3;  // of the variance of cell means
-constexpr double largest_pressure = 0.4;   // over E: beyond it a Neo-Hookean solid under an even dead pressure caves in
 constexpr double softest_pa = 1;           // of gels that just keep their shape; both lie inside the ends of the search
 constexpr double stiffest_pa = 1.15e12;    // of diamond
 

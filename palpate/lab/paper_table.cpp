@@ -41,8 +41,9 @@ constexpr std::array<PaperScene, 8> table{{
      .paper_says = "The robot moved for 9 cm and took a sample a centimetre; the curve is nearly straight but for a slip of the probe "
                    "tip at the start; E varies little over the samples.",
      .differs = "The truth is Neo-Hookean and both methods fit that law. The force rises in nine equal steps, the pad is soft and 25 mm "
-                "in radius; after the first sample it slides 5 mm aside and has to come 3 mm deeper, and nothing says so. From about 15 mm on "
-                "the pad's pressure folds the surface: what is solved there, truth and models alike, depends on the mesh.",
+                "in radius; after the first sample it slides 5 mm aside and has to come 3 mm deeper, and nothing says so. From about 20 mm on "
+                "the pad's even pressure, above 0.4 E, folds the surface, and the truth there depends on its mesh: both methods answer from "
+                "the samples before.",
      .object = "cube",
      .depth_sensor = "time_of_flight",
      .force_sensor = "schunk_ftcl_050",
