@@ -51,6 +51,13 @@ bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& de
         return wanted && static_cast<int>(steps.size()) <= depth.samples;
       });
   push.steps = std::move(steps);
+  // Asked to stop after the last sample, the arm stands where it is, deep in the object perhaps: no way to the next push.
+  if (report.stop == acquisition::StopReason::user) {
+    Pose T_base_out = Pose::Identity();
+    T_base_out.linear() = plan.R_base_tip;
+    T_base_out.translation() = plan.contact_m - protocol.start_distance_m * plan.direction;
+    robot.move(T_base_out, protocol.approach_speed_m_s);
+  }
   if (report.drift) take_off(*report.drift, push);
   // Sideways the tip is where the plan puts it; one place then serves all seeds.
   for (Step& step : push.steps)

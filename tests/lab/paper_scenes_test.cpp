@@ -73,6 +73,19 @@ TEST(PaperScenes, AFaultChangesWhatItSaysAndNothingElse) {
 // The mirror image of the upper half is the lower one: the middle goes down by half of what the upper pad does. And near a pad
 // that is small against the ball, the ball gives way as a half space does: 16 p a (1 - nu^2) / (3 pi E) on the mean of the patch
 // (Johnson, Contact Mechanics, 3.4); seen from the other pad, twice that, less what the half space gives beyond the ball.
+// The arm stood 8 cm deep where it was asked to stop, ran into the object on its way to the unused place, and nothing was there to
+// be predicted.
+TEST(PaperScenes, ThePushAfterADeepOneIsMade) {
+  PaperScene deep = paper_scene("foam9cm");
+  deep.true_law = "linear";  // solved at once
+  deep.samples = 3;
+  const PaperTrial trial = make_paper_trial(deep, 1);
+  const Push& push = trial.recording.pushes.at(0);
+  ASSERT_GE(push.steps.size(), 3u);
+  EXPECT_GT(travel_of(push.steps.back()), 0.03);
+  EXPECT_GE(trial.unused.steps.size(), 3u);
+}
+
 TEST(OpposedBall, IsSqueezedFromBothSidesAlike) {
   ObjectOptions truth;
   truth.young_modulus_pa = 20e3;
