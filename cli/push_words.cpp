@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <numbers>
 
 namespace palpate::cli {
 namespace {
@@ -41,6 +42,10 @@ std::vector<std::string> push_warnings(const std::string& name, const acquisitio
     out.push_back(fmt::format("{}: the zero of the force moved by {:.3g} N during the push ({:.1f} N at most); taken off evenly over "
                               "its time. Let the sensor warm up, and keep cables from pulling",
                               name, report.drift_n, report.highest_force_n));
+  if (report.turned_rad > 0.01)  // 1 N that a sensor reads by itself is then 10 mN aside
+    out.push_back(fmt::format("{}: the tip was turned by up to {:.1f} degrees since the force was tared, and what a wrist sensor reads by itself "
+                              "turns with it; let the robot keep the tip's whole orientation, also around the tool's axis",
+                              name, report.turned_rad * 180 / std::numbers::pi));
   if (report.overshoot_n > 0.1 * (report.highest_force_n - report.overshoot_n))
     out.push_back(fmt::format("{}: the force passed its limit by {:.3g} N (to {:.3g} N): the object is stiffer than one motion foresees; "
                               "set a smaller --increment or --push-speed",

@@ -79,6 +79,7 @@ nlohmann::json json_of(const acquisition::PushPlan& plan, const acquisition::Pus
           {"contact_m", touched ? nlohmann::json({report.contact_m.x(), report.contact_m.y(), report.contact_m.z()}) : nlohmann::json()},
           {"drift_n", report.drift ? nlohmann::json(report.drift_n) : nlohmann::json()},
           {"drift_n_s", drift_n_s},
+          {"turned_rad", report.turned_rad},
           {"unsettled", report.unsettled},
           {"came_back", report.compared ? nlohmann::json(report.came_back) : nlohmann::json()},
           {"changed_share", report.compared ? nlohmann::json(report.changed_share) : nlohmann::json()}};

@@ -95,6 +95,7 @@ struct PushReport {
   int steps = 0;               ///< recorded now, resumed ones not counted
   std::vector<int> unsettled;  ///< indices (in the push) of steps whose force still crept
   Vec3 tare_n = Vec3::Zero();  ///< taken off every force
+  double turned_rad = 0;       ///< most that the tip was turned since the tare in a step: what the wrist's sensor errs by in its own axes turned, too
   /// From the tare to the free air after the retreat; not taken off the steps that were handed over. Nothing: no such free air,
   /// or no step under load that was handed over.
   std::optional<ForceDrift> drift;

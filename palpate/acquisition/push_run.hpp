@@ -221,6 +221,7 @@ class PushRun {
   std::size_t late_of_ = 0;                                 // so many samples of history_ gave ...
   double late_m_ = 0;                                       // ... this
   double free_air_std_n_ = 0, tared_at_s_ = 0;
+  Mat3 R_base_tip_tared_ = Mat3::Identity();
   std::optional<TorqueMean> torque_tare_;
   bool in_front_ = false;     // the tip has been in front of the object
   bool loaded_ = false;       // a step under load is recorded

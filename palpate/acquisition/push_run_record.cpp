@@ -39,6 +39,7 @@ void PushRun::look_at_rest() {
   report_.tare_n = air.mean_n;
   tared_at_s_ = air.time_s;
   free_air_std_n_ = air.std_n;
+  R_base_tip_tared_ = air.last.T_base_tip.linear();
   torque_tare_ = air.torque;
   if (torque_tare_ && options_.contact_std_m > 0) {
     push_.torque_tare_std_nm = torque_tare_->mean_std_nm();
@@ -92,6 +93,7 @@ void PushRun::settle_and_record(bool unloading) {
   const Settled step = settle(unloading);
   if (!step.settled) report_.unsettled.push_back(next_index_);
   loaded_ = true;
+  report_.turned_rad = std::max(report_.turned_rad, Eigen::AngleAxisd(R_base_tip_tared_.transpose() * step.last.T_base_tip.linear()).angle());
   record(step.last, step.mean_n, std::hypot(step.sigma_n, second_tare_std_n()), unloading, torque_of(step));
 }
 

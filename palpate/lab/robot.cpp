@@ -9,7 +9,6 @@
 #include "palpate/core/error.hpp"
 #include "palpate/lab/box_surface.hpp"
 #include "palpate/lab/robot_parts.hpp"
-#include "palpate/sensing/reach.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -90,9 +89,7 @@ acquisition::RobotState LabRobot::read() {
 acquisition::Motion LabRobot::move(const Pose& T_base_tip, double speed_m_s) {
   Impl& lab = *impl_;
   if (!(speed_m_s > 0)) throw Error("must be positive", "speed_m_s");
-  const auto reached = [&](const Pose& pose) {
-    return sensing::reach(lab.mask.kinematics(), lab.tip, pose, lab.on_the_way ? lab.commanded : lab.moved_to);
-  };
+  const auto reached = [&](const Pose& pose) { return lab.reached(pose, lab.on_the_way ? lab.commanded : lab.moved_to); };
   auto joints = reached(T_base_tip);
   if (!joints) return acquisition::Motion::refused;
   const double before = lab.force();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "palpate/lab/random.hpp"
 #include "palpate/lab/robot.hpp"
 #include "palpate/lab/scene.hpp"
+#include "palpate/sensing/reach.hpp"
 #include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate::lab {
@@ -89,6 +91,21 @@ struct LabRobot::Impl {
     return mask.kinematics().link_poses(mask.kinematics().free_joints(), joints)[std::size_t(link)];
   }
   Pose tip_of(const std::vector<double>& joints) const { return pose_of(tip, joints); }
+  // As the tool is round its roll may be any, but it does not turn along a straight way: what the wrist sensor errs by in its own axes
+  // would turn with it, and no tare could know.
+  std::optional<std::vector<double>> reached(const Pose& pose, const std::vector<double>& from) const {
+    const Mat3 stood = tip_of(from).linear();
+    const Vec3 had = stood.col(2), wanted = pose.linear().col(2);
+    if (had.dot(wanted) > 1 - 1e-6) {
+      Pose same_roll = pose;
+      same_roll.linear() = Eigen::Quaterniond::FromTwoVectors(had, wanted) * stood;
+      sensing::ReachOptions whole;
+      whole.any_roll = false;
+      whole.starts = 1;
+      if (auto joints = sensing::reach(mask.kinematics(), tip, same_roll, from, whole)) return joints;
+    }
+    return sensing::reach(mask.kinematics(), tip, pose, from);
+  }
   // Where an image is taken from, as the joints that are read say, and how well that is known.
   void place_camera(DepthFrame& frame) const {
     frame.pose_std_m = options.camera_std_m;

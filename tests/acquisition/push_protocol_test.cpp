@@ -120,6 +120,14 @@ TEST(PushProtocol, ADriftOfTheSensorIsFoundInTheFreeAirAfterThePush) {
   EXPECT_TRUE(run(nothing).push.steps.size() == 1 && run(nothing).report.stop == StopReason::no_contact);
 }
 
+TEST(PushProtocol, ATipThatTurnsAfterTheTareIsToldOf) {
+  SpringRobot keeps, rolls;
+  rolls.rolls_rad_m = 2;  // from 5 cm before contact on
+  EXPECT_LT(run(keeps).report.turned_rad, 1e-9);
+  const Result result = run(rolls);
+  EXPECT_NEAR(result.report.turned_rad, 2 * (0.05 + result.report.deepest_m), 0.01);
+}
+
 TEST(PushProtocol, WaitsForTheForceToSettleAndSaysWhenItDoesNot) {
   SpringRobot quick, slow;
   quick.relaxation_s = 0.1;

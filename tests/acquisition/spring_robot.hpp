@@ -29,6 +29,7 @@ struct SpringRobot : Robot {
   int images = 0;
   double highest_n = 0;  // of the spring, as nobody reads it
   bool camera_moves = false;
+  double rolls_rad_m = 0;  // around its axis, with the way it goes down
   double breaks_beyond_m = 1e9;  // cannot be read any more
   std::mt19937 generator{7};
 
@@ -45,6 +46,7 @@ struct SpringRobot : Robot {
     state.time_s = clock_s;
     state.joints_rad = {tip.translation().z(), 0.5};
     state.T_base_tip = tip;
+    state.T_base_tip.rotate(Eigen::AngleAxisd(rolls_rad_m * depth(), Vec3::UnitZ()));
     if (depth() > slips_at_m) state.T_base_tip.translation().x() += 0.004;
     const double fading = depth() > 0 ? faded_n * std::exp(-(clock_s - moved_s) / relaxation_s) : 0;
     state.force_n =

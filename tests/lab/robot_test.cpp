@@ -221,6 +221,31 @@ TEST(LabRobot, SameSeedSameRecording) {
   EXPECT_NE(run(other_seed).report.tare_n, a.report.tare_n);
 }
 
+// With the hand the wrist sensor's own errors turned, by up to 8 degrees on the bear's belly: no tare holds then, and 0.2 N stood aside
+// of 2 N in the push's direction.
+TEST(LabRobot, AlongItsToolTheHandDoesNotTurn) {
+  ObjectOptions soft;
+  soft.material = "linear";
+  LabRobot robot(quick(), make_object("bear", soft));
+  for (std::size_t site = 0; site < robot.object().sites.size(); ++site) {
+    const acquisition::PushPlan plan = robot.plan(site);
+    const auto stands = [&](double before_m) {
+      Pose there = Pose::Identity();
+      there.linear() = plan.R_base_tip;
+      there.translation() = plan.contact_m - before_m * plan.direction;
+      EXPECT_EQ(robot.move(there, 0.02), acquisition::Motion::done) << plan.site;
+      return robot.read().T_base_tip;
+    };
+    const Pose first = stands(0.05);
+    EXPECT_NEAR((first.linear().col(2) - plan.direction).norm(), 0, 1e-5) << plan.site;
+    for (const double before_m : {0.02, 0.0, -0.005}) {
+      const Pose now = stands(before_m);
+      EXPECT_LT(Eigen::AngleAxisd(first.linear().transpose() * now.linear()).angle(), 1e-4) << plan.site << " " << before_m;
+      EXPECT_NEAR((now.translation() - plan.contact_m + before_m * plan.direction).norm(), 0, 1e-5) << plan.site;
+    }
+  }
+}
+
 TEST(LabRobot, SlipEndsThePush) {
   LabOptions options = quick();
   options.slip_at_m = 0.004;
