@@ -43,7 +43,8 @@ class Robot {
  public:
   virtual ~Robot() = default;
   virtual RobotState read() = 0;
-  /// Moves the tip on a straight line; returns when it stands. Long ways come in short motions: between them the user may stop it.
+  /// Moves the tip on a straight line; returns when it stands. Where only the way is asked for, the tip keeps its whole orientation,
+  /// also about its own axis: what a wrist sensor errs by turns with it (PushReport::turned_rad). Long ways come in short motions: between them the user may stop it.
   virtual Motion move(const Pose& T_base_tip, double speed_m_s) = 0;
   /// Brings the arm to rest where it is.
   virtual void stop() = 0;
