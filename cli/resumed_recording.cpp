@@ -96,6 +96,8 @@ void compare_support(const Comparison& as, const Support& there, const Support& 
   as.same(support + ": kind", io::name_of(io::support_names, there.kind), io::name_of(io::support_names, now.kind));
   as.same(support + ": contact", io::name_of(io::contact_names, there.contact), io::name_of(io::contact_names, now.contact));
   as.same(support + ": friction_coefficient", there.friction_coefficient, now.friction_coefficient);
+  as.same(support + ": compliance_m_per_n", there.compliance_m_per_n, now.compliance_m_per_n);
+  as.same(support + ": compliance_std_m_per_n", there.compliance_std_m_per_n, now.compliance_std_m_per_n);
   as.same(support + ": point_m", there.plane.point_m, now.plane.point_m);
   as.same(support + ": normal", there.plane.normal, now.plane.normal);
   as.same(support + ": min_m", there.box_min_m, now.box_min_m);

@@ -59,6 +59,8 @@ struct Support {
   double pose_std_m = 0.0;                     ///< clamp: prior on its translation; 0 = exactly known
   double pose_std_rad = 0.0;                   ///< clamp: prior on its rotation; 0 = exactly known
   double spread_std_m = 0.0;                   ///< flat and bonded: prior on how far its rim slides outwards at the highest load
+  double compliance_m_per_n = 0.0;      ///< how far it gives way as a whole, with what it holds, per newton of the loads
+  double compliance_std_m_per_n = 0.0;  ///< its prior standard deviation; 0 = exactly known
   PoseVaries pose_varies = PoseVaries::never;  ///< clamp: one pose in the recording, or one a push, or one a step
   std::string name;
   std::string source;  ///< file and line, for messages

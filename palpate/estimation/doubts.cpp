@@ -63,6 +63,12 @@ Doubted doubted(const Recording& recording, const TetMesh& mesh) {
     ask(Doubt::About::support, support.name, rim_m, {"support_spread[" + support.name + "]"});
     support.spread_std_m = rim_m;
   }
+  if (!recording.free && out.recording.supports.size() == 1 && out.recording.supports[0].compliance_std_m_per_n == 0) {
+    constexpr double any_m_per_n = 1e-3;
+    Support& support = out.recording.supports[0];
+    ask(Doubt::About::support_compliance, support.name, support.compliance_m_per_n, {"support_compliance[" + support.name + "]"});
+    support.compliance_std_m_per_n = any_m_per_n;
+  }
   return out;
 }
 

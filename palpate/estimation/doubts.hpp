@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a recording states as exactly known and the residuals may speak against: where and how wide a tool touches, whether the
-// foot holds, that the object is the same everywhere.
+// foot holds and its support stands firm, that the object is the same everywhere.
 #pragma once
 
 #include <optional>
@@ -19,12 +19,13 @@ inline constexpr double rare = 0.01, very_rare = 0.001;
 
 /// Another value that the residuals ask for, all else of the fit free under its priors (the score test of one added unknown).
 struct Doubt {
-  enum class About { contact, tool_radius, support };
+  enum class About { contact, tool_radius, support, support_compliance };
   About about = About::contact;
   std::string name;    ///< of the push, the tool or the support
   std::vector<int> unknowns;  ///< of the wider model that asked
-  double size_m = 0;   ///< contact: how far aside; tool: wider (below zero: narrower); support: how far its rim slides outwards
-  double scale_m = 0;  ///< contact and tool: the tool's radius; support: radius of its rim
+  double size_m = 0;   ///< contact: how far aside; tool: wider (below zero: narrower); support: how far its rim slides outwards;
+                       ///< support_compliance: how much more it gives way than stated, m/N
+  double scale_m = 0;  ///< contact and tool: the tool's radius; support: radius of its rim; compliance: as stated, m/N
   double chi2 = 0;     ///< by how much it would fall
   double p_value = 1;  ///< chance of asking for as much where everything is as stated, over all that was asked
   double log_young = 0, poisson = 0;  ///< what it would do to log E and nu

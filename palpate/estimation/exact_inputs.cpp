@@ -129,6 +129,13 @@ class Exact {
       more_.time_offset_std_s = errors_.time_s;
       add("time_offset", fmt::format("{:g} ms", 1e3 * errors_.time_s), "time_offset_std_s", {{"time_offset"}, errors_.time_s});
     }
+    if (stated_.supports.size() == 1 && !stated_.free && stated_.supports[0].compliance_std_m_per_n == 0) {
+      const Support& support = stated_.supports[0];
+      const double size = std::max(errors_.support_m_per_n, 0.1 * support.compliance_m_per_n);
+      if (more_.supports[0].compliance_std_m_per_n == 0) more_.supports[0].compliance_std_m_per_n = size;
+      add("support_compliance", fmt::format("{:.2g} mm/N", 1e3 * size), "compliance_std_m_per_n",
+          {{"support_compliance[" + support.name + "]"}, size});
+    }
     for (std::size_t k = 0; k < stated_.supports.size() && !stated_.free; ++k) {
       const Support& support = stated_.supports[k];
       if (support.contact != ContactLaw::bonded || support.spread_std_m > 0) continue;

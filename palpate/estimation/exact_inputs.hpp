@@ -20,6 +20,7 @@ struct TypicalErrors {
   double compliance_m_per_n = 1e-5;  ///< or a tenth of what is stated, if that is more
   double density_share = 0.05;
   double time_s = 0.01;
+  double support_m_per_n = 1e-5;  ///< or a tenth of what is stated, if that is more
   double spread_share = 0.01;  ///< of the rim's radius
   double camera_m = 1e-3, camera_rad = 0.2 * M_PI / 180;
   double depth_m = 1e-3;

@@ -184,6 +184,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     }
   }
   if (steps_.empty()) throw Error("holds no step: there is nothing to learn from", "pushes");
+  prepare_yielding_support(unknowns);
   effort_ = efforts(recording);
   memory_.resize(steps_.size());
   followed_.assign(steps_.size(), 0);

@@ -246,7 +246,19 @@ class ForwardModel {
   /// Of a patch, weighted with its pressure.
   static Vec3 mean_motion(const std::vector<LoadPart>& parts, const fem::ResponseState& at);
   std::vector<LoadPart> load_parts(std::size_t s, std::size_t l, const Body& body, const VectorX& unknowns) const;
+  RigidOffset clamp_pose(std::size_t s, const VectorX& unknowns) const;
+  /// Where the object stands as a whole: its clamp's pose, and how far its support has given way.
   RigidOffset clamp_offset(std::size_t s, const VectorX& unknowns) const;
+  bool moves_as_a_whole(std::size_t s) const { return clamp_[s] >= 0 || !given_way_.empty(); }
+  using RigidMotion = Eigen::Matrix<double, 6, 1>;  // translation of the pivot, rotation vector
+  struct WholeMotion {
+    int unknown;
+    RigidMotion along;
+  };
+  std::vector<WholeMotion> whole_motions(std::size_t s) const;  // derivatives of clamp_offset
+  void prepare_yielding_support(Unknowns& unknowns);
+  double given_way_along(std::size_t s, const Load& load) const;
+  double support_compliance(const VectorX& unknowns) const;
 
   const Recording* recording_;
   SimulatedObject object_;
@@ -269,6 +281,9 @@ class ForwardModel {
   std::vector<std::vector<int>> contact_shift_;  // a step and load: first of two unknowns, or -1
   std::map<int, Vec3> shift_direction_;          // of the push that such two unknowns are across
   std::vector<std::vector<int>> patch_radius_;   // a step and load: the unknown, or -1
+  std::vector<RigidMotion> given_way_;           // a step: how the support moves per m/N that it yields; empty: it does not
+  double support_compliance_m_per_n_ = 0;        // as stated
+  int support_compliance_unknown_ = -1;          // what it is more than stated, or -1
   std::vector<int> spread_;                      // a support that spreads: the unknown
   std::vector<double> effort_;                   // a step: its load as a share of the highest
   std::vector<int> tare_, travel_offset_;        // a push: first of three, the one; or -1

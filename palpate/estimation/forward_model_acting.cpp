@@ -44,8 +44,9 @@ std::optional<ActingForce> ForwardModel::acting_force(std::size_t s, std::size_t
   out.force_n = force.force_n;
   const Vec3 along = load.direction.normalized();
   const auto across = [&](const Vec3& x) { return Vec3(x - along.dot(x) * along); };
-  // The tool is where the arm has it; a clamp has moved the object, and the patch on it, under the tool.
-  const RigidOffset clamp = clamp_offset(s, unknowns);
+  // The tool is where the arm has it; a clamp has moved the object, and the patch on it, under the tool. A support that gives way
+  // takes the tool along.
+  const RigidOffset clamp = clamp_pose(s, unknowns);
   const Mat3 rotation = clamp.rotation();
   Vec3 place_m = Vec3::Zero();  // in the object's frame
   std::vector<std::pair<int, Vec3>> moves;

@@ -181,16 +181,6 @@ const ForwardModel::Body& ForwardModel::body_of(std::size_t s) const {
   return *solved_->bodies[linear_ ? 0 : worker_of(s)].at(body_key(push(s)));
 }
 
-RigidOffset ForwardModel::clamp_offset(std::size_t s, const VectorX& unknowns) const {
-  RigidOffset offset;
-  offset.pivot_m = clamp_pivot_m_;
-  if (clamp_[s] >= 0) {
-    offset.translation_m = unknowns.segment<3>(clamp_[s]);
-    offset.rotation_rad = unknowns.segment<3>(clamp_[s] + 3);
-  }
-  return offset;
-}
-
 Vec3 ForwardModel::contact_found_m(std::size_t s, std::size_t l, const VectorX& unknowns) const {
   const int shift = contact_shift_[s][l];
   if (shift < 0) return Vec3::Zero();
@@ -258,14 +248,15 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     return it->second;
   };
   const RigidOffset clamp = clamp_offset(s, unknowns);
+  const std::vector<WholeMotion> whole = whole_motions(s);
   const Mat3 into_object = clamp.rotation().transpose();
   const auto add_vector = [&](int first, const Vec3& base) {
     c.force.segment<3>(first) += into_object * base;
-    if (clamp_[s] < 0) return;
+    if (whole.empty()) return;
     const Mat3 d = clamp.inverse_rotation_derivative(base);
-    for (int k = 0; k < 3; ++k) {
-      const int at = column(clamp_[s] + 3 + k);
-      c.d_force.block<3, 1>(first, at) += d.col(k);
+    for (const auto& [unknown, along] : whole) {
+      const int at = column(unknown);
+      c.d_force.block<3, 1>(first, at) += d * along.tail<3>();
     }
   };
 
@@ -280,6 +271,12 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
       if (const int yields = compliance_unknown(load.tool); yields >= 0) {
         c.motion(at) -= unknowns(yields) * read_n;
         c.d_motion(at, column(yields)) = -read_n;
+      }
+      const double given_way = given_way_along(s, load);
+      c.motion(at) -= support_compliance(unknowns) * given_way;
+      if (support_compliance_unknown_ >= 0) {
+        const int place = column(support_compliance_unknown_);
+        c.d_motion(at, place) = -given_way;
       }
       for (const int off : {travel_offset_[p], force_error_[s][l]}) {
         if (off < 0) continue;
@@ -338,9 +335,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
   }
   for (Index k = 0; s < slide_.size() && slide_[s] >= 0 && k < body.slide.cols(); ++k) column(slide_[s] + static_cast<int>(k));
   // The clamp moves the surface, whether or not a load depends on it.
-  if (clamp_[s] >= 0) {
-    for (int k = 0; k < 6; ++k) column(clamp_[s] + k);
-  }
+  for (const WholeMotion& one : whole) column(one.unknown);
   drop_what_nothing_holds(s, body, unknowns, c);
   return c;
 }

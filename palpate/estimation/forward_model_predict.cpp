@@ -10,7 +10,7 @@ namespace palpate::estimation {
 void ForwardModel::place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const {
   const RigidOffset clamp = clamp_offset(s, unknowns);
   out.surface_m = object_.surface.rest().vertices_m + Eigen::Map<const Points>(moved_m.data(), object_.surface.vertex_count(), 3);
-  if (clamp_[s] >= 0) {
+  if (moves_as_a_whole(s)) {
     const RigidMap moved(clamp);
     for (Index v = 0; v < out.surface_m.rows(); ++v) out.surface_m.row(v) = moved.apply(out.surface_m.row(v));
   }
@@ -69,14 +69,16 @@ void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficie
     double& travel_m = out.travel_m(static_cast<Index>(l));
     if (load.travel_m) {
       const int m = body.motion_column.at(load.tool);
-      travel_m = c.motion(m);
+      travel_m = c.motion(m) + support_compliance(unknowns) * given_way_along(s, load);
       out.force_n[l] = scale * at.reaction_n(m) * direction;
       if (tare < 0) continue;
       out.force_n[l] += tare_axis.norm() > 0 ? Vec3(unknowns(tare) * tare_axis) : Vec3(unknowns.segment<3>(tare));
     } else {
       out.force_n[l] = load.force_n.value_or(Vec3::Zero());
       const std::vector<LoadPart> parts = load_parts(s, l, body, unknowns);
-      if (!parts.empty()) travel_m = (clamp_offset(s, unknowns).rotation().transpose() * direction).dot(mean_motion(parts, at));
+      if (!parts.empty())
+        travel_m = (clamp_offset(s, unknowns).rotation().transpose() * direction).dot(mean_motion(parts, at)) +
+                   support_compliance(unknowns) * given_way_along(s, load);
     }
   }
 }
@@ -124,17 +126,17 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   const RigidOffset clamp = clamp_offset(s, unknowns);
   const Mat3 rotation = clamp.rotation();
   out.d_surface = std::move(at.d_watched);
-  if (clamp_[s] >= 0) {
+  std::vector<std::pair<Index, RigidMotion>> whole;  // by column
+  for (const auto& [unknown, along] : whole_motions(s))
+    whole.emplace_back(std::find(out.columns.begin() + parameters_, out.columns.end(), unknown) - out.columns.begin(), along);
+  if (moves_as_a_whole(s)) {
     for (Index v = 0; v < out.surface_m.rows(); ++v) {
       out.d_surface.middleRows<3>(3 * v) = (rotation * out.d_surface.middleRows<3>(3 * v)).eval();
     }
     const auto add_rigid = [&](const Points& at_m, MatrixX& derivative) {
       for (Index v = 0; v < at_m.rows(); ++v) {
         const auto rigid = clamp.derivative(clamp.apply_inverse(at_m.row(v)));
-        for (Index k = parameters_; k < count; ++k) {
-          const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s];
-          if (component >= 0 && component < 6) derivative.block<3, 1>(3 * v, k) += rigid.col(component);
-        }
+        for (const auto& [k, along] : whole) derivative.block<3, 1>(3 * v, k) += rigid * along;
       }
     };
     if (field_) {
@@ -162,6 +164,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
       for (Index k = parameters_; k < count; ++k) {
         if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += at.reaction_n(m) * direction;
         out.d_travel(l, k) = c.d_motion(m, k - parameters_);
+        if (out.columns[static_cast<std::size_t>(k)] == support_compliance_unknown_) out.d_travel(l, k) += given_way_along(s, load);
       }
     } else {
       const std::vector<LoadPart> parts = load_parts(s, at_load, body, unknowns);
@@ -173,13 +176,13 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
         const auto own = std::find(out.columns.begin(), out.columns.end(), part.unknown);
         out.d_travel(l, own - out.columns.begin()) += direction.dot(at.conjugate_m.segment<3>(part.first));
       }
-      if (clamp_[s] < 0) continue;
+      if (whole.empty()) continue;
       // A turned clamp turns the object under the tool's direction.
       const Vec3 mean_motion_m = mean_motion(parts, at);
       const Mat3 turn = clamp.inverse_rotation_derivative(load.direction.normalized());
-      for (Index k = parameters_; k < count; ++k) {
-        const int component = out.columns[static_cast<std::size_t>(k)] - clamp_[s] - 3;
-        if (component >= 0 && component < 3) out.d_travel(l, k) += mean_motion_m.dot(turn.col(component));
+      for (const auto& [k, along] : whole) {
+        out.d_travel(l, k) += mean_motion_m.dot(turn * along.tail<3>());
+        if (out.columns[static_cast<std::size_t>(k)] == support_compliance_unknown_) out.d_travel(l, k) += given_way_along(s, load);
       }
     }
   }

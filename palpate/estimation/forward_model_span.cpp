@@ -31,7 +31,7 @@ double SpanPlace::at_most_from_m(const VectorX& other) const {
 /// Nothing where the surface is not such a sum: a clamp turns it, or it slides.
 std::optional<SpanPlace> ForwardModel::place_in_span(std::size_t s, const Body& body, const Coefficients& c,
                                                      const VectorX& unknowns) const {
-  if (clamp_[s] >= 0 || slide_[s] >= 0) return std::nullopt;
+  if (moves_as_a_whole(s) || slide_[s] >= 0) return std::nullopt;
   SpanPlace out;
   out.span = body.response->span(unknowns(poisson));
   if (!out.span) return std::nullopt;

@@ -233,7 +233,9 @@ void judge_doubts(const VerdictInput& in, bool slipped, std::vector<Verdict>& ou
   for (const Doubt& doubt : in.doubts.all) {
     if (doubt.p_value >= very_rare || (slipped && doubt.about == Doubt::About::contact)) continue;
     if (std::abs(doubt.log_young) < matters * young_std && std::abs(doubt.poisson) < matters * poisson_std) continue;
-    if (doubt.about != Doubt::About::support && std::abs(doubt.size_m) < least_share * doubt.scale_m) continue;
+    const bool of_foot = doubt.about == Doubt::About::support || doubt.about == Doubt::About::support_compliance;
+    if (doubt.about == Doubt::About::support_compliance && doubt.scale_m + doubt.size_m < 0) continue;  // nothing comes towards a push
+    if (!of_foot && std::abs(doubt.size_m) < least_share * doubt.scale_m) continue;
     const std::string size = number(1e3 * std::abs(doubt.size_m), "{:.2g}") + " mm";
     // One linear step says how far off the answer is only where that is not far.
     const bool near = std::abs(doubt.log_young) < 0.5 && std::abs(doubt.poisson) < 0.25;
@@ -260,6 +262,13 @@ void judge_doubts(const VerdictInput& in, bool slipped, std::vector<Verdict>& ou
                            size + (doubt.size_m > 0 ? " outwards" : " inwards") + " under the highest load" + change +
                            ". If it is not glued, say how it lies (kind: table, contact: friction or "
                            "frictionless), or give spread_std_m."});
+        return;
+      case Doubt::About::support_compliance:
+        out.push_back({"support_gives_way",
+                       "The residuals ask for a support that gives way as a whole: '" + doubt.name + "' by " + size +
+                           " a newton" + (doubt.size_m > 0 ? " more" : " less") + " than stated, the object with it" + change +
+                           ". Fix it, or measure how far it gives way where you press on it and give compliance_m_per_n; or let "
+                           "the fit find it: give compliance_std_m_per_n (of the support)."});
         return;
     }
   }

@@ -218,6 +218,8 @@ void read_supports(const YamlField& field, RecordingContext& context) {
       if (support.contact != ContactLaw::bonded && support.spread_std_m > 0)
         spread->fail("is for a support that is bonded; one that is not slides by itself");
     }
+    support.compliance_m_per_n = keys.within_or("compliance_m_per_n", 0, ranges::compliance);
+    support.compliance_std_m_per_n = keys.within_or("compliance_std_m_per_n", 0, ranges::compliance);
     if (clamp) {
       support.pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std);
       support.pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);

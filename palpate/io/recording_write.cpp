@@ -205,7 +205,9 @@ std::string RecordingWriter::Pages::support_text(const Support& support, std::si
         .number("tolerance_m", support.tolerance_m);
   }
   if (half_space || support.contact != ContactLaw::bonded) put_contact(line, support.contact, support.friction_coefficient);
-  line.number_unless(0, "spread_std_m", support.spread_std_m);
+  line.number_unless(0, "spread_std_m", support.spread_std_m)
+      .number_unless(0, "compliance_m_per_n", support.compliance_m_per_n)
+      .number_unless(0, "compliance_std_m_per_n", support.compliance_std_m_per_n);
   if (support.kind == SupportKind::clamp) {
     line.number("pose_std_m", support.pose_std_m).number("pose_std_rad", support.pose_std_rad);
     line.put("pose_varies", name_of(pose_varies_names, support.pose_varies));

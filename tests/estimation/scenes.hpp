@@ -99,6 +99,8 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
   clamp.pose_std_rad = 0.02;
   clamp.pose_varies = PoseVaries::push;
   clamp.spread_std_m = 2e-4;
+  clamp.compliance_m_per_n = 6e-5;
+  clamp.compliance_std_m_per_n = 4e-5;
   recording.supports.push_back(clamp);
   if (weight) {
     recording.environment.gravity_m_s2 = Vec3(0, 0, -9.81);

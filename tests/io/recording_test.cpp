@@ -48,7 +48,7 @@ rest:
   surface_std_m: 0.0005
   surface_correlation_m: 0.03
 supports:
-  - {kind: clamp, name: base, point_m: [0, 0, 0], normal: [0, 0, 1], pose_std_m: 0.003, pose_std_rad: 0.03, pose_varies: push, spread_std_m: 0.001}
+  - {kind: clamp, name: base, point_m: [0, 0, 0], normal: [0, 0, 1], pose_std_m: 0.003, pose_std_rad: 0.03, pose_varies: push, spread_std_m: 0.001, compliance_m_per_n: 0.0002, compliance_std_m_per_n: 0.00005}
   - {kind: box, min_m: [-1, -1, -1], max_m: [1, 1, 0.001], contact: frictionless}
   - {kind: table, point_m: [0, 0, 0], normal: [0, 0, 1], contact: friction, friction_coefficient: 0.5}
 regions:
@@ -162,6 +162,8 @@ TEST(ReadRecording, EveryKindOfKey) {
   EXPECT_EQ(recording.supports[0].select, NodeSelection::plane);
   EXPECT_EQ(recording.supports[0].pose_varies, PoseVaries::push);
   EXPECT_EQ(recording.supports[0].spread_std_m, 0.001);
+  EXPECT_EQ(recording.supports[0].compliance_m_per_n, 0.0002);
+  EXPECT_EQ(recording.supports[0].compliance_std_m_per_n, 0.00005);
   EXPECT_EQ(recording.tools.at(0).radius_std_m, 0.002);
   EXPECT_EQ(recording.tools[0].compliance_std_m_per_n, 0.00002);
   EXPECT_EQ(recording.time_offset_std_s, 0.004);
@@ -223,6 +225,8 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
   EXPECT_EQ(back.supports.size(), recording.supports.size());
   EXPECT_EQ(back.supports[0].pose_std_rad, recording.supports[0].pose_std_rad);
   EXPECT_EQ(back.supports[0].spread_std_m, recording.supports[0].spread_std_m);
+  EXPECT_EQ(back.supports[0].compliance_m_per_n, recording.supports[0].compliance_m_per_n);
+  EXPECT_EQ(back.supports[0].compliance_std_m_per_n, recording.supports[0].compliance_std_m_per_n);
   EXPECT_EQ(back.tools[0].radius_std_m, recording.tools[0].radius_std_m);
   EXPECT_EQ(back.tools[0].compliance_std_m_per_n, recording.tools[0].compliance_std_m_per_n);
   EXPECT_EQ(back.time_offset_std_s, recording.time_offset_std_s);

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Seeded labs, each estimated as a user would: how often the intervals hold the truth, and how far off the answers are. A few
 // labs by default; PALPATE_LABS=50 lab_coverage_test for figures that mean something, PALPATE_FIRST_SEED to go on elsewhere,
-// PALPATE_THROUGH=folder or mcap to estimate what was written there and read again (read_back_test.cpp: the same to rounding).
+// PALPATE_THROUGH=folder or mcap to estimate what was written there and read again (read_back_test.cpp: the same to rounding),
+// PALPATE_CAMERA=hand for a camera that the hand carries.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -128,6 +129,8 @@ Lab pushed(const std::string& name, std::uint64_t seed, double region_ratio = 1)
   truth.region_ratio = region_ratio;
   LabOptions options;
   options.seed = seed;
+  const char* camera = std::getenv("PALPATE_CAMERA");
+  options.camera_on_hand = camera && std::string(camera) == "hand";
   LabRobot robot(options, make_object(name, truth));
   acquisition::PushOptions protocol;
   protocol.travel_limit_m = robot.object().travel_limit_m;

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the object moves as a whole: its clamp's pose is not exactly known, and what it stands on gives way under the loads.
+#include <Eigen/QR>
+#include <algorithm>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/forward_model_parts.hpp"
+#include "palpate/fem/boundary.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+/// Middle of what a support holds, and mean of |r|^2 I - r r' about it: by area where whole faces are held, else by node.
+struct HeldPatch {
+  Vec3 middle_m = Vec3::Zero();
+  Mat3 turning_m2 = Mat3::Zero();
+
+  HeldPatch(const TetMesh& mesh, const Support& support) {
+    const std::vector<Index> nodes = fem::support_nodes(mesh, support);
+    std::vector<char> held(static_cast<std::size_t>(mesh.nodes_m.rows()), 0);
+    for (const Index node : nodes) held[static_cast<std::size_t>(node)] = 1;
+    std::vector<std::pair<Vec3, double>> points;  // of an integral that is exact for squares
+    const Triangles faces = fem::boundary_triangles(mesh);
+    for (Index t = 0; t < faces.rows(); ++t) {
+      const auto corner = [&](int k) { return Vec3(mesh.nodes_m.row(faces(t, k % 3))); };
+      const auto is_held = [&](int k) { return held[static_cast<std::size_t>(faces(t, k))] != 0; };
+      if (!is_held(0) || !is_held(1) || !is_held(2)) continue;
+      const double third_m2 = (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm() / 6;
+      for (int k = 0; k < 3; ++k) points.emplace_back(0.5 * (corner(k) + corner(k + 1)), third_m2);
+    }
+    if (points.empty())
+      for (const Index node : nodes) points.emplace_back(mesh.nodes_m.row(node), 1);
+    double sum = 0;
+    for (const auto& [at_m, weight] : points) sum += weight, middle_m += weight * at_m;
+    middle_m /= sum;
+    for (const auto& [at_m, weight] : points) {
+      const Vec3 r = at_m - middle_m;
+      turning_m2 += weight / sum * (r.squaredNorm() * Mat3::Identity() - r * r.transpose());
+    }
+  }
+};
+
+/// Force on the object as it was read: the load's own, or a sensor's where the motion is imposed.
+Vec3 read_force(const Step& step, const Load& load) {
+  if (load.force_n) return *load.force_n;
+  for (const auto& observation : step.observations) {
+    const auto* wrench = std::get_if<Wrench>(&observation);
+    if (wrench != nullptr && (wrench->tool.empty() || wrench->tool == load.tool)) return wrench->force_n;
+  }
+  return Vec3::Zero();
+}
+
+}  // namespace
+
+void ForwardModel::prepare_yielding_support(Unknowns& unknowns) {
+  const auto yields = [](const Support& one) { return one.compliance_m_per_n > 0 || one.compliance_std_m_per_n > 0; };
+  const auto found = std::find_if(recording_->supports.begin(), recording_->supports.end(), yields);
+  if (recording_->free || found == recording_->supports.end()) return;
+  const Support& support = *found;
+  if (recording_->supports.size() > 1)
+    throw Error("gives way under the whole load, so it must be the only support; here are " + std::to_string(recording_->supports.size()) +
+                    ". Say how far the others give way with it by leaving them out, or state no compliance_m_per_n",
+                support.source.empty() ? "supports." + support.name : support.source);
+  support_compliance_m_per_n_ = support.compliance_m_per_n;
+  support_compliance_unknown_ =
+      unknowns.add_block("support_compliance[" + support.name + "]", "m/N", support.compliance_std_m_per_n, {""});
+  const HeldPatch patch(object_.mesh, support);
+  const bool turns_about_clamp = std::any_of(clamp_.begin(), clamp_.end(), [](int first) { return first >= 0; });
+  if (!turns_about_clamp) clamp_pivot_m_ = patch.middle_m;
+  // Along an axis that a narrow support does not hold it against turning, it does not turn.
+  const Eigen::CompleteOrthogonalDecomposition<Mat3> turning(patch.turning_m2);
+  given_way_.assign(steps_.size(), RigidMotion::Zero());
+  for (std::size_t s = 0; s < steps_.size(); ++s) {
+    Vec3 force_n = Vec3::Zero(), torque_nm = Vec3::Zero();
+    for (const Load& load : step(s).loads) {
+      const Vec3 of_load_n = read_force(step(s), load);
+      force_n += of_load_n;
+      if (has_place(*recording_, load)) torque_nm += (load.contact_m + load.contact_found_m - patch.middle_m).cross(of_load_n);
+    }
+    const Vec3 turned = turning.solve(torque_nm);
+    given_way_[s].tail<3>() = turned;
+    given_way_[s].head<3>() = force_n + turned.cross(clamp_pivot_m_ - patch.middle_m);
+  }
+}
+
+double ForwardModel::support_compliance(const VectorX& unknowns) const {
+  return support_compliance_m_per_n_ + (support_compliance_unknown_ >= 0 ? unknowns(support_compliance_unknown_) : 0);
+}
+
+/// Along a load, of where it acts: per m/N of the support.
+double ForwardModel::given_way_along(std::size_t s, const Load& load) const {
+  if (given_way_.empty()) return 0;
+  const Vec3 arm_m = has_place(*recording_, load) ? Vec3(load.contact_m + load.contact_found_m - clamp_pivot_m_) : Vec3(Vec3::Zero());
+  return load.direction.normalized().dot(given_way_[s].head<3>() + given_way_[s].tail<3>().cross(arm_m));
+}
+
+RigidOffset ForwardModel::clamp_pose(std::size_t s, const VectorX& unknowns) const {
+  RigidOffset offset;
+  offset.pivot_m = clamp_pivot_m_;
+  if (clamp_[s] >= 0) {
+    offset.translation_m = unknowns.segment<3>(clamp_[s]);
+    offset.rotation_rad = unknowns.segment<3>(clamp_[s] + 3);
+  }
+  return offset;
+}
+
+RigidOffset ForwardModel::clamp_offset(std::size_t s, const VectorX& unknowns) const {
+  RigidOffset offset = clamp_pose(s, unknowns);
+  if (!given_way_.empty()) {
+    offset.translation_m += support_compliance(unknowns) * given_way_[s].head<3>();
+    offset.rotation_rad += support_compliance(unknowns) * given_way_[s].tail<3>();
+  }
+  return offset;
+}
+
+std::vector<ForwardModel::WholeMotion> ForwardModel::whole_motions(std::size_t s) const {
+  std::vector<WholeMotion> motions;
+  for (int k = 0; clamp_[s] >= 0 && k < 6; ++k) motions.push_back({clamp_[s] + k, RigidMotion::Unit(k)});
+  if (support_compliance_unknown_ >= 0) motions.push_back({support_compliance_unknown_, given_way_[s]});
+  return motions;
+}
+
+}  // namespace palpate::estimation
