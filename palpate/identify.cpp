@@ -10,6 +10,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/version.hpp"
+#include "palpate/estimation/contacts_on_surface.hpp"
 #include "palpate/estimation/deep_loads.hpp"
 #include "palpate/estimation/fit_on_fine_mesh.hpp"
 #include "palpate/estimation/paper_method.hpp"
@@ -280,6 +281,7 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
     object.mesh = given.tetrahedra.cols() == 10 ? given : fem::to_quadratic(given);
   }
   recording.model.element = quadratic ? "tet10" : "tet4";
+  estimation::put_contacts_on_surface(recording, object.mesh);
   if (recording.regions.size() > 1) {
     object.region = fem::regions_of(object.mesh, recording.regions, &given);
     for (const Region& region : recording.regions) object.region_names.push_back(region.name);
@@ -423,6 +425,7 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
     doubt->effect->better.reset();
     fit(reconstruction::Completion::planar);  // the only alternative that is as likely
   }
+  for (Verdict& verdict : estimation::contacts_off_surface(as_given, recording)) out.answer.verdicts.push_back(std::move(verdict));
   masked_m = estimation::first_steps(masked_m, as_given, fitted);
   for (std::size_t s = 0; s < out.answer.steps.size() && s < masked_m.size(); ++s) {
     out.answer.steps[s].masked_m = std::move(masked_m[s]);

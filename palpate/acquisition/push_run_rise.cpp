@@ -14,7 +14,7 @@
 namespace palpate::acquisition {
 
 void PushRun::approach() {
-  std::vector<sensing::ContactSample> samples;
+  std::vector<sensing::ContactSample> samples = std::move(approach_);  // of a touch that was lost again: what was felt before it
   double motion_m = options_.increment_m, fine_until_m = -options_.start_distance_m;
   while (at_m_ < options_.search_distance_m) {
     if (at_m_ > fine_until_m) motion_m = options_.increment_m;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Traction over a patch of the boundary, with consistent nodal forces.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -128,9 +130,9 @@ Eigen::SparseMatrix<double> spread_over_patch(const TetMesh& mesh, const Contact
     }
   }
   if (nearest < 0)
-    throw Error(
-        "no boundary face lies within " + std::to_string(radius_m) + " m of the contact point: is it in the mesh's frame?",
-        "contact_m");
+    throw Error(fmt::format("no boundary face lies within {:.4g} m of the contact point ({:.5g}, {:.5g}, {:.5g}): is it in the mesh's frame?",
+                            radius_m, where.centre_m.x(), where.centre_m.y(), where.centre_m.z()),
+                "contact_m");
 
   // Walk over shared edges from the nearest face.
   std::map<std::pair<Index, Index>, std::vector<Index>> by_edge;

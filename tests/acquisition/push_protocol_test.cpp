@@ -188,6 +188,27 @@ TEST(PushProtocol, GoesOnWhereTheFirstTouchWasHardlyOne) {
   EXPECT_NEAR(result.report.contact_m.z(), 0.1, 1.5e-3);
 }
 
+// What was felt in the air before a touch that was lost again still says that nothing was there: the force's rise is not traced back
+// past it, and a push is not over by a travel that never was.
+TEST(PushProtocol, AfterALostTouchContactIsStillWhereItWasFelt) {
+  int lost = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    SpringRobot robot;
+    robot.generator.seed(seed);
+    robot.stiffness_n_m = 5e3;
+    robot.repeat_std_m = 1.5e-4;
+    robot.errs_after_touch = 1;
+    PushOptions o = options();
+    o.travel_limit_m = 0.01;
+    const Result result = run(robot, o);
+    EXPECT_EQ(robot.errs_after_touch, 0);
+    EXPECT_NEAR(result.report.contact_m.z(), 0.1, 1.5e-3) << seed;
+    if (result.report.stop == StopReason::contact_lost && ++lost) continue;  // an error of a motion is 0.75 N: lost again and again, and said
+    EXPECT_EQ(result.report.stop, StopReason::force_limit) << seed << ": " << result.report.message;
+  }
+  EXPECT_LT(lost, 50);
+}
+
 TEST(PushProtocol, GivesUpWhereNothingIsTouched) {
   SpringRobot robot;
   robot.surface_m = 0.0;

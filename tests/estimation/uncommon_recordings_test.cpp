@@ -100,6 +100,29 @@ TEST(UncommonRecordings, ANodeOfNoElementNeedsNoSupport) {
   EXPECT_NEAR(identify(recording).answer.parameters.at(0).value, plain, 1e-6 * plain);
 }
 
+/// The patch under a contact beside the surface would be a smaller one.
+TEST(UncommonRecordings, AContactOffTheSurfaceIsPutThere) {
+  Recording recording = block_with_clouds("linear");
+  const Identification right = identify(recording).answer;
+  const auto raised = [&](double z_m) {
+    Recording off = recording;
+    for (Step& step : off.pushes[0].steps) step.loads[0].contact_m.z() += z_m;
+    return off;
+  };
+  const auto says = [](const Identification& answer) {
+    return std::any_of(answer.verdicts.begin(), answer.verdicts.end(), [](const Verdict& one) { return one.code == "contact_off_surface"; });
+  };
+  EXPECT_FALSE(says(right));
+  for (const double z_m : {8e-3, -8e-3}) {
+    const Identification moved = identify(raised(z_m)).answer;
+    EXPECT_TRUE(says(moved)) << z_m;
+    EXPECT_NEAR(moved.parameters.at(0).value, right.parameters.at(0).value, 1e-6 * right.parameters.at(0).value) << z_m;
+  }
+  Recording far = raised(13e-3);
+  far.pushes[0].steps[0].source = "recording.yaml:7";
+  EXPECT_THAT(complaint(far), AllOf(HasSubstr("recording.yaml:7"), HasSubstr("contact_m"), HasSubstr("13 mm"), HasSubstr("finger")));
+}
+
 TEST(UncommonRecordings, AnUnknownMethodIsRefused) {
   IdentifyOptions options;
   options.method = "papre";
