@@ -26,18 +26,15 @@ std::string body_key(const Push& push) {
   return key;
 }
 
-/// Force on the object along the push that a sensor read in this step; 0 where none did.
-double read_force_n(const Step& step, const Load& load) {
+}  // namespace
+
+Vec3 read_force_n(const Step& step, const Load& load) {
   for (const auto& observation : step.observations) {
     const auto* wrench = std::get_if<Wrench>(&observation);
-    if (wrench != nullptr && (wrench->tool.empty() || wrench->tool == load.tool)) {
-      return wrench->force_n.dot(load.direction.normalized());
-    }
+    if (wrench != nullptr && (wrench->tool.empty() || wrench->tool == load.tool)) return wrench->force_n;
   }
-  return 0;
+  return Vec3::Zero();
 }
-
-}  // namespace
 
 std::string key_of(const Load& load) {
   std::string key = load.tool;
@@ -266,7 +263,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     const Load& load = now.loads[l];
     if (load.travel_m) {
       const int at = body.motion_column.at(load.tool);
-      const double read_n = read_force_n(now, load);
+      const double read_n = read_force_n(now, load).dot(load.direction.normalized());
       c.motion(at) = *load.travel_m - tool(load.tool).compliance_m_per_n * read_n;
       if (const int yields = compliance_unknown(load.tool); yields >= 0) {
         c.motion(at) -= unknowns(yields) * read_n;

@@ -47,6 +47,9 @@ struct ForwardModel::SolvedAt {
   VectorX displacement_at(const VectorX& there) const;
 };
 
+/// Force on the object that a sensor read in this step under the load's tool; zero where none did.
+Vec3 read_force_n(const Step& step, const Load& load);
+
 /// True for a load that acts by columns of force.
 bool has_columns(const Load& load);
 

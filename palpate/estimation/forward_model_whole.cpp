@@ -40,16 +40,6 @@ struct HeldPatch {
   }
 };
 
-/// Force on the object as it was read: the load's own, or a sensor's where the motion is imposed.
-Vec3 read_force(const Step& step, const Load& load) {
-  if (load.force_n) return *load.force_n;
-  for (const auto& observation : step.observations) {
-    const auto* wrench = std::get_if<Wrench>(&observation);
-    if (wrench != nullptr && (wrench->tool.empty() || wrench->tool == load.tool)) return wrench->force_n;
-  }
-  return Vec3::Zero();
-}
-
 }  // namespace
 
 void ForwardModel::prepare_yielding_support(Unknowns& unknowns) {
@@ -73,7 +63,7 @@ void ForwardModel::prepare_yielding_support(Unknowns& unknowns) {
   for (std::size_t s = 0; s < steps_.size(); ++s) {
     Vec3 force_n = Vec3::Zero(), torque_nm = Vec3::Zero();
     for (const Load& load : step(s).loads) {
-      const Vec3 of_load_n = read_force(step(s), load);
+      const Vec3 of_load_n = load.force_n ? *load.force_n : read_force_n(step(s), load);
       force_n += of_load_n;
       if (has_place(*recording_, load)) torque_nm += (load.contact_m + load.contact_found_m - patch.middle_m).cross(of_load_n);
     }
