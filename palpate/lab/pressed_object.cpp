@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/stand_on.hpp"
+#include "palpate/geometry/subdivide.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
@@ -102,6 +104,19 @@ void curve_boundary(TetMesh& mesh, const TriMesh& surface, const std::vector<cha
       }
     }
   }
+}
+
+// The surface bends within millimetres at a pad's rim, where facets of a quarter of its radius cut the corner: a fifteenth there.
+TriMesh bends_at_rims(const TriMesh& surface, const std::vector<Vec3>& pads_m, double radius_m) {
+  constexpr double finest = 1.0 / 15, growth = 0.3;  // of the radius; with the distance from where the rim is
+  return geometry::subdivided(surface, [&](const Vec3& at_m) {
+    double longest_m = std::numeric_limits<double>::infinity();
+    for (const Vec3& pad_m : pads_m) {
+      const double from_rim_m = std::max(0.0, std::abs((at_m - pad_m).norm() - radius_m) - 0.25 * radius_m);
+      longest_m = std::min(longest_m, finest * radius_m + growth * from_rim_m);
+    }
+    return longest_m;
+  });
 }
 
 bool flat(const Support& support) { return support.kind != SupportKind::box; }
@@ -224,7 +239,10 @@ struct PressedObject::Impl {
       resting = std::make_unique<fem::ContactStatics>(mesh, options.material, std::move(boundary), std::move(contacts), contact_options);
     }
     TetMesh corners{mesh.nodes_m, mesh.tetrahedra.leftCols(4)};
-    embedding = geometry::embed(options.surface.vertices_m, corners);
+    std::vector<Vec3> pads_m{options.contact_m};
+    if (options.opposed_m) pads_m.push_back(*options.opposed_m);
+    shown = bends_at_rims(options.surface, pads_m, options.pad_radius_m);
+    embedding = geometry::embed(shown.vertices_m, corners);
   }
 
   // Of a patch's force, a node.
@@ -275,7 +293,7 @@ struct PressedObject::Impl {
   double travel_m() const { return punch ? punch_travel_m : moved_m(share) - moved_m(opposed_share); }
 
   TriMesh surface() const {
-    TriMesh moved = options.surface;
+    TriMesh moved = shown;
     if (displacement_m.size() == 0) return moved;
     for (Eigen::Index v = 0; v < moved.vertices_m.rows(); ++v) {
       const Index e = embedding.element(v);
@@ -292,6 +310,7 @@ struct PressedObject::Impl {
 
   PressedObjectOptions options;
   TetMesh mesh;
+  TriMesh shown;  // at rest
   VectorX share, opposed_share;  // of the pads' forces, a node; the second one empty: none
   VectorX displacement_m;  // empty = at rest
   double at_n = 0;

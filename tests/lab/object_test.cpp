@@ -11,6 +11,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/lab/box_surface.hpp"
 #include "palpate/lab/implicit_surface.hpp"
 #include "palpate/lab/robot.hpp"
 
@@ -294,6 +295,23 @@ TEST(Object, AFoamTruthSoftens) {
   const double deep_n = 4 * make_object("cube", options).force_step_n, touch_n = 1e-3 * deep_n;
   EXPECT_NEAR(travel_m("foam", touch_n) / travel_m("linear", touch_n), 1, 2e-3);
   EXPECT_GT(travel_m("foam", deep_n) / travel_m("neo_hookean", deep_n), 1.02);
+}
+
+// Cameras see the dent, not the facets that a file happens to have.
+TEST(Object, ABoxOfTwelveTrianglesIsDentedInTheMiddleOfAFace) {
+  ObjectOptions options;
+  options.material = "linear";
+  options.tetrahedra = 2000;
+  options.cells_in_radius = 2;
+  const LabObject box = object_from_surface(box_surface({-0.05, -0.05, 0}, {0.05, 0.05, 0.1}, 1), "box", options);
+  const PushSite& top = box.sites.at(0);
+  const auto pressed = box.press(top);
+  pressed->press(1);
+  const geometry::TriangleTree seen(pressed->surface());
+  const auto down_m = [&](double aside_m) { return seen.cast(top.contact_m + Vec3(aside_m, 0, 0.02), -Vec3::UnitZ())->range_m - 0.02; };
+  EXPECT_NEAR(down_m(0), pressed->travel_m(), 0.25 * pressed->travel_m());  // the middle of a patch goes deepest
+  EXPECT_GT(down_m(0), pressed->travel_m());
+  EXPECT_LT(down_m(2 * box.pad_radius_m), 0.5 * down_m(0)) << "and what is not under it stays behind";
 }
 
 TEST(Object, AnySurfaceOfAUserStandsOnTheTable) {
