@@ -23,16 +23,27 @@ std::int64_t stamp_of(double time_s) { return begin_ns + std::llround(time_s * 1
 
 }  // namespace
 
-io::BagFolder earlier_raw_bag(const std::filesystem::path& folder) {
-  io::BagFolder bag;
+EarlierRawBag earlier_raw_bag(const std::filesystem::path& folder) {
+  EarlierRawBag earlier;
   std::error_code code;
-  if (std::filesystem::exists(folder / "mapping.yaml", code) && io::is_bag(folder)) bag.put_all(folder);
-  return bag;
+  if (!std::filesystem::exists(folder / "mapping.yaml", code) || !io::is_bag(folder)) return earlier;
+  const io::MessageSource bag = io::read_bag(folder);
+  earlier.frames = io::frames_said(bag);
+  earlier.bag.put_all(bag, "/tf_static");  // a camera that stood may move from now on
+  return earlier;
 }
 
-double not_before_s(const io::BagFolder& bag) {
+double not_before_s(const EarlierRawBag& earlier) {
   constexpr double pause_s = 1;
-  return bag.last_ns() > begin_ns ? double(bag.last_ns() - begin_ns) * 1e-9 + pause_s : 0;
+  return earlier.bag.last_ns() > begin_ns ? double(earlier.bag.last_ns() - begin_ns) * 1e-9 + pause_s : 0;
+}
+
+io::BagFrames& LoggedRobot::frames(bool joints_told) {
+  if (!frames_) {
+    frames_.emplace(scene_.robot, joints_told ? scene_.joint_names : std::vector<std::string>());
+    frames_->go_on(said_);
+  }
+  return *frames_;
 }
 
 void LoggedRobot::put(const std::string& topic, const std::string& type, double time_s, const std::string& data) {
@@ -42,12 +53,15 @@ void LoggedRobot::put(const std::string& topic, const std::string& type, double 
 acquisition::RobotState LoggedRobot::read() {
   acquisition::RobotState state = robot_.read();
   const std::int64_t stamp = stamp_of(state.time_s);
+  if (stamp == read_ns_) return state;  // nobody could tell the two apart
+  read_ns_ = stamp;
+  const bool joints_told = !state.joints_rad.empty() && scene_.joint_names.size() == state.joints_rad.size();
+  io::BagFrames& frames = this->frames(joints_told);
   // About the origin of the frame that it is given in, as ROS has it.
   const Vec3 tip_m = state.T_base_tip.translation(), torque_nm = state.torque_nm.value_or(Vec3::Zero()) + tip_m.cross(state.force_n);
-  put("/wrench", "geometry_msgs/msg/WrenchStamped", state.time_s, io::encode(io::RosWrench{{stamp, "base"}, state.force_n, torque_nm}));
-  put("/tf", "tf2_msgs/msg/TFMessage", state.time_s,
-      io::encode(std::vector<io::RosTransform>{{{stamp, "base"}, "tip", state.T_base_tip}}));
-  if (scene_.joint_names.size() == state.joints_rad.size())
+  put("/wrench", "geometry_msgs/msg/WrenchStamped", state.time_s, io::encode(io::RosWrench{{stamp, frames.base()}, state.force_n, torque_nm}));
+  frames.robot_at(stamp, joints_told ? state.joints_rad : std::vector<double>(), state.T_base_tip, bag_);
+  if (joints_told)
     put("/joint_states", "sensor_msgs/msg/JointState", state.time_s,
         io::encode(io::RosJointState{{stamp, ""}, scene_.joint_names, state.joints_rad}));
   return state;
@@ -62,24 +76,24 @@ double LoggedRobot::travel_sigma_m() const {
 DepthFrame LoggedRobot::take_depth_image() {
   DepthFrame frame = robot_.take_depth_image();
   const std::int64_t stamp = stamp_of(frame.time_s);
-  put("/tf", "tf2_msgs/msg/TFMessage", frame.time_s,
-      io::encode(std::vector<io::RosTransform>{{{stamp, "base"}, "camera", frame.T_base_camera}}));
+  const std::string name = frames(false).camera(0);
+  frames_->camera_at(stamp, name, frame.T_base_camera, bag_);
   put("/camera/depth/camera_info", "sensor_msgs/msg/CameraInfo", frame.time_s,
-      io::encode(io::RosCameraInfo{{stamp, "camera"}, frame.camera}));
+      io::encode(io::RosCameraInfo{{stamp, name}, frame.camera}));
   put("/camera/depth/image", "sensor_msgs/msg/Image", frame.time_s,
-      io::encode(io::RosImage{{stamp, "camera"}, frame.depth_m}));
+      io::encode(io::RosImage{{stamp, name}, frame.depth_m}));
   masked_ = masked_ && frame.mask.size() > 0;
   if (frame.mask.size() > 0)
-    put("/camera/mask", "sensor_msgs/msg/Image", frame.time_s, io::encode(io::RosHeader{stamp, "camera"}, frame.mask));
+    put("/camera/mask", "sensor_msgs/msg/Image", frame.time_s, io::encode(io::RosHeader{stamp, name}, frame.mask));
   camera_ = frame;
   camera_.depth_m.resize(0, 0);
   return frame;
 }
 
-std::string LoggedRobot::mapping_text(const std::filesystem::path& folder, const acquisition::PushOptions& protocol) const {
+std::string LoggedRobot::mapping_text(const std::filesystem::path& folder, const acquisition::PushOptions& protocol) {
   std::string mapping = "format: palpate-mapping/1\n" + io::object_text(scene_, folder);
   mapping += "topics:\n  wrench: /wrench\n";
-  if (scene_.robot && !scene_.joint_names.empty()) mapping += "  joints: /joint_states\n";
+  if (scene_.robot && bag_.has("/joint_states")) mapping += "  joints: /joint_states\n";
   if (camera_.camera.width_px > 0) {
     io::YamlLine line;
     line.put("image", "/camera/depth/image").put("info", "/camera/depth/camera_info");
@@ -90,9 +104,9 @@ std::string LoggedRobot::mapping_text(const std::filesystem::path& folder, const
     mapping += "  depth:\n    - " + line.str() + "\n";
   }
   return mapping + fmt::format(
-                       "frames: {{base: base, tip: tip}}\nwrench: {{reports: force_on_object}}   # not tared: the mean before each "
+                       "{}wrench: {{reports: force_on_object}}   # not tared: the mean before each "
                        "contact is taken off\nsteps: {{by: detection, travel_sigma_m: {}, travel_offset_std_m: {}}}\n",
-                       largest_sigma_m_, acquisition::travel_offset_std_m(protocol, largest_sigma_m_));
+                       frames(false).mapping_text(), largest_sigma_m_, acquisition::travel_offset_std_m(protocol, largest_sigma_m_));
 }
 
 void LoggedRobot::write_bag(const std::filesystem::path& given, const acquisition::PushOptions& protocol) {
@@ -102,7 +116,9 @@ void LoggedRobot::write_bag(const std::filesystem::path& given, const acquisitio
   if (scene_.robot && !bag_.has("/robot_description"))
     bag_.put("/robot_description", "std_msgs/msg/String", bag_.first_ns(), io::encode(io::urdf_for_viewers(*scene_.robot, folder)));
   io::write_file(folder / "mapping.yaml", mapping_text(folder, protocol));
-  bag_.write(folder);
+  io::BagFolder whole = bag_;
+  if (frames_) frames_->put_rest(whole);
+  whole.write(folder);
 }
 
 void LoggedRobot::write_bag_if_small(const std::filesystem::path& folder, const acquisition::PushOptions& protocol) {

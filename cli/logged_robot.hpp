@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,22 +11,26 @@
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/acquisition/robot.hpp"
 #include "palpate/io/bag_folder.hpp"
+#include "palpate/io/bag_frames.hpp"
 
 namespace palpate::cli {
 
-/// What an earlier run left of a raw bag, to be gone on with; empty where the folder holds none.
-io::BagFolder earlier_raw_bag(const std::filesystem::path& folder);
+/// What an earlier run left of a raw bag, to be gone on with; empty where there is none.
+struct EarlierRawBag {
+  io::BagFolder bag;
+  io::FramesSaid frames;
+};
+EarlierRawBag earlier_raw_bag(const std::filesystem::path& folder);
 /// When a robot's clock may go on after what is in the bag, s; 0 where it is empty.
-double not_before_s(const io::BagFolder& bag);
+double not_before_s(const EarlierRawBag& earlier);
 
 /// A robot whose every reading is kept as a recorder of ROS would keep it: joint states, forces as the sensor says them (not
-/// tared), poses of tip and camera, depth images, the robot's description. Nothing in the bag says what a push or a step is.
+/// tared), poses of links, tip and camera, depth images, the robot's description. Nothing in the bag says what a push or a step is.
 class LoggedRobot : public acquisition::Robot {
  public:
   /// @param scene  object, supports, tools and robot, as they are recorded; its pushes have no say
-  /// @param bag  of an earlier run, or empty
-  LoggedRobot(acquisition::Robot& robot, Recording scene, io::BagFolder bag)
-      : robot_(robot), bag_(std::move(bag)), scene_(std::move(scene)) {}
+  LoggedRobot(acquisition::Robot& robot, Recording scene, EarlierRawBag earlier)
+      : robot_(robot), bag_(std::move(earlier.bag)), said_(std::move(earlier.frames)), scene_(std::move(scene)) {}
 
   acquisition::RobotState read() override;
   acquisition::Motion move(const Pose& T_base_tip, double speed_m_s) override { return robot_.move(T_base_tip, speed_m_s); }
@@ -44,11 +50,16 @@ class LoggedRobot : public acquisition::Robot {
 
  private:
   void put(const std::string& topic, const std::string& type, double time_s, const std::string& data);
-  std::string mapping_text(const std::filesystem::path& folder, const acquisition::PushOptions& protocol) const;
+  /// @param joints_told  by the first reading: what it says of the links decides how frames hang together
+  io::BagFrames& frames(bool joints_told);
+  std::string mapping_text(const std::filesystem::path& folder, const acquisition::PushOptions& protocol);
 
   acquisition::Robot& robot_;
   io::BagFolder bag_;
+  io::FramesSaid said_;
+  std::optional<io::BagFrames> frames_;
   Recording scene_;
+  std::int64_t read_ns_ = 0;  ///< stamp of the last reading
   mutable double largest_sigma_m_ = 0;  ///< of the travel: an arm's changes with its pose, a mapping states one
   DepthFrame camera_;  ///< of the last image, without its pixels
   bool masked_ = true;  ///< every image so far said which of its pixels show the robot

@@ -142,9 +142,9 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   robot->go_on_after(steps_before);
   NewFolder made_here(folder);
   io::RecordingWriter writer(folder, recording);
-  io::BagFolder so_far_said;
+  EarlierRawBag so_far_said;
   if (arguments.resume && !arguments.raw_bag.empty()) so_far_said = earlier_raw_bag(arguments.raw_bag);
-  if (!arguments.raw_bag.empty() && !recorded.empty() && so_far_said.last_ns() == 0)
+  if (!arguments.raw_bag.empty() && !recorded.empty() && so_far_said.bag.last_ns() == 0)
     session.warn("--raw-bag: holds only what the sensors say from now on: the run that began this recording left no such bag there");
   LaterRobot later(robot->robot(), std::max(not_before_s(recorded), not_before_s(so_far_said)));
   Recording scene = recording;

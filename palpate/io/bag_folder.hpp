@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "palpate/io/mcap.hpp"
+#include "palpate/io/message_source.hpp"
 
 namespace palpate::io {
 
@@ -18,8 +19,8 @@ class BagFolder {
   /// @param type  one of ros_types()
   void put(const std::string& topic, const std::string& type, std::int64_t time_ns, std::string_view data);
   bool has(const std::string& topic) const { return topics_.contains(topic); }
-  /// Puts everything that a bag in this folder holds, of an earlier run. @throws Error when it is none.
-  void put_all(const std::filesystem::path& folder);
+  /// Puts everything that a bag of an earlier run holds, but for one topic.
+  void put_all(const MessageSource& bag, const std::string& but);
   /// Earliest and latest time so far; 0 without a message.
   std::int64_t first_ns() const { return topics_.empty() ? 0 : first_ns_; }
   std::int64_t last_ns() const { return last_ns_; }

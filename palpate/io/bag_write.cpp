@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_folder.hpp"
+#include "palpate/io/bag_frames.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/recording_writer.hpp"
 #include "palpate/io/ros_messages.hpp"
@@ -21,18 +23,49 @@ namespace fs = std::filesystem;
 constexpr std::int64_t second_ns = 1'000'000'000;
 constexpr std::int64_t sample_gap_ns = second_ns / 50;  // between the two samples of a force
 
+/// What a mapping says alike of all its images.
 struct BagCamera {
   DepthFrame like;
-  std::string name;
+  std::string topics, frame;
   bool has_mask = false;
 };
 
-bool same_camera(const DepthFrame& a, const DepthFrame& b) {
+bool same_device(const DepthFrame& a, const DepthFrame& b) {
   return a.camera.width_px == b.camera.width_px && a.camera.height_px == b.camera.height_px &&
          a.camera.fx_px == b.camera.fx_px && a.camera.fy_px == b.camera.fy_px && a.camera.cx_px == b.camera.cx_px &&
          a.camera.cy_px == b.camera.cy_px && a.camera.distortion == b.camera.distortion &&
-         a.camera.distortion_coefficients == b.camera.distortion_coefficients && a.noise == b.noise &&
-         a.pose_std_m == b.pose_std_m && a.pose_std_rad == b.pose_std_rad;
+         a.camera.distortion_coefficients == b.camera.distortion_coefficients && a.noise == b.noise;
+}
+bool same_camera(const DepthFrame& a, const DepthFrame& b) {
+  return same_device(a, b) && a.pose_std_m == b.pose_std_m && a.pose_std_rad == b.pose_std_rad;
+}
+
+std::vector<const DepthFrame*> images_of(const Step& step) {
+  std::vector<const DepthFrame*> images;
+  for (const Observation& one : step.observations)
+    if (const auto* image = std::get_if<DepthFrame>(&one)) images.push_back(image);
+  return images;
+}
+
+/// Joints of some steps only would leave the others' links nowhere.
+std::vector<std::string> joints_of_all_steps(const Recording& recording) {
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps)
+      if (step.joints_rad.size() != recording.joint_names.size()) return {};
+  return recording.joint_names;
+}
+
+/// How well its pose is known may change from image to image, as of a camera on the hand: it is one device all the same, unless
+/// two of a kind look on at once.
+bool looks_alone(const Recording& recording) {
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps) {
+      const std::vector<const DepthFrame*> images = images_of(step);
+      for (std::size_t a = 0; a < images.size(); ++a)
+        for (std::size_t b = 0; b < a; ++b)
+          if (same_device(*images[a], *images[b])) return false;
+    }
+  return true;
 }
 
 [[noreturn]] void refuse(const std::string& what, const Step& step) {
@@ -41,7 +74,10 @@ bool same_camera(const DepthFrame& a, const DepthFrame& b) {
 
 class BagWriter {
  public:
-  explicit BagWriter(const Recording& recording) : recording_(recording) {}
+  explicit BagWriter(const Recording& recording)
+      : recording_(recording), frames_(recording.robot, joints_of_all_steps(recording)), looks_alone_(looks_alone(recording)) {
+    survey_cameras();
+  }
 
   void write(const fs::path& folder) {
     if (recording_.robot)
@@ -50,6 +86,7 @@ class BagWriter {
     for (const Push& push : recording_.pushes) add_push(push);
     const std::string head = "format: palpate-mapping/1\n" + object_text(recording_, folder);
     write_file(folder / "mapping.yaml", head + mapping_text());
+    frames_.put_rest(bag_);
     bag_.write(folder);
   }
 
@@ -57,11 +94,12 @@ class BagWriter {
   // A mapping names the topics of force and tip, and those must be there: pushes that never pressed have one reading before them.
   void put_free_air() {
     Pose tip = Pose::Identity();
+    std::vector<double> joints_rad;
     for (const Push& push : recording_.pushes)
       for (const Step& step : push.steps)
-        if (step.T_base_tip) tip = *step.T_base_tip;
-    put("/wrench", "geometry_msgs/msg/WrenchStamped", time_ns_, encode(RosWrench{header("base"), Vec3::Zero(), Vec3::Zero()}));
-    put("/tf", "tf2_msgs/msg/TFMessage", time_ns_, encode(std::vector<RosTransform>{{header("base"), "tip", tip}}));
+        if (step.T_base_tip) tip = *step.T_base_tip, joints_rad = step.joints_rad;
+    put("/wrench", "geometry_msgs/msg/WrenchStamped", time_ns_, encode(RosWrench{header(frames_.base()), Vec3::Zero(), Vec3::Zero()}));
+    frames_.robot_at(time_ns_, joints_rad, tip, bag_);
   }
   bool is_any_loaded() const {
     for (const Push& push : recording_.pushes)
@@ -92,7 +130,13 @@ class BagWriter {
         put("/joint_states", "sensor_msgs/msg/JointState", time_ns_,
             encode(RosJointState{header(""), recording_.joint_names, step.joints_rad}));
       std::optional<Pose> T_base_tip = step.T_base_tip;
-      const ToolTravel* travel = nullptr;
+      for (const Observation& observation : step.observations)
+        if (const auto* travel = std::get_if<ToolTravel>(&observation)) {
+          if (first == nullptr || step.loads.empty()) refuse("a travel without a load has no direction", step);
+          travel_sigma_m.push_back(travel->sigma_m);
+          T_base_tip = tip_at(*first, travel->travel_m, step.T_base_tip);
+        }
+      frames_.robot_at(time_ns_, step.joints_rad, T_base_tip, bag_);
       std::vector<std::size_t> seen;
       for (const Observation& observation : step.observations) {
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
@@ -101,8 +145,8 @@ class BagWriter {
           seen.push_back(camera);
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
           put_cloud(*cloud, step);
-        } else if (const auto* one = std::get_if<ToolTravel>(&observation)) {
-          travel = one;
+        } else if (std::holds_alternative<ToolTravel>(observation)) {
+          continue;  // the tip's place says it
         } else if (const auto* wrench = std::get_if<Wrench>(&observation); wrench && wrench->has_torque && !step.loads.empty()) {
           continue;  // the load's own torque, of which a reader of steps makes nothing
         } else {
@@ -110,17 +154,9 @@ class BagWriter {
         }
       }
       if (!step.loads.empty()) {
-        put_force(step, *first);
+        put_force(step, *first, T_base_tip);
         ++loaded;
       }
-      if (travel != nullptr) {
-        if (first == nullptr || step.loads.empty()) refuse("a travel without a load has no direction", step);
-        travel_sigma_m.push_back(travel->sigma_m);
-        T_base_tip = tip_at(*first, travel->travel_m, T_base_tip);
-      }
-      if (T_base_tip)
-        put("/tf", "tf2_msgs/msg/TFMessage", time_ns_,
-            encode(std::vector<RosTransform>{{header("base"), "tip", *T_base_tip}}));
     }
     if (!travel_sigma_m.empty() && travel_sigma_m.size() != loaded)
       refuse("some loaded steps have a travel and others have none", push.steps.front());
@@ -140,7 +176,7 @@ class BagWriter {
 
   RosHeader header(const std::string& frame) const { return {time_ns_, frame}; }
 
-  void put_force(const Step& step, const Load& first) {
+  void put_force(const Step& step, const Load& first, const std::optional<Pose>& T_base_tip) {
     const Load& load = step.loads.front();
     if (step.loads.size() != 1) refuse("has several loads", step);
     if (!load.force_n) refuse("the travel is imposed, not the force", step);
@@ -149,11 +185,12 @@ class BagWriter {
         load.force_relative_std != first.force_relative_std || load.contact_std_m != first.contact_std_m)
       refuse("tool, contact, direction or priors of the load differ from those of the push's first load", step);
     const Vec3 aside = Vec3::Constant(load.force_std_n);
+    const Vec3 acts_m = T_base_tip ? Vec3(T_base_tip->translation()) : load.contact_m;
     for (const double side : {1.0, -1.0}) {
       if (load.force_std_n == 0 && side > 0) continue;
       const std::int64_t at = time_ns_ - (side > 0 ? sample_gap_ns : 0);
-      put("/wrench", "geometry_msgs/msg/WrenchStamped", at,
-          encode(RosWrench{{at, "base"}, *load.force_n + side * aside, Vec3::Zero()}));
+      const Vec3 force_n = *load.force_n + side * aside;
+      put("/wrench", "geometry_msgs/msg/WrenchStamped", at, encode(RosWrench{{at, frames_.base()}, force_n, acts_m.cross(force_n)}));
     }
   }
 
@@ -170,24 +207,44 @@ class BagWriter {
     return pose;
   }
 
-  std::size_t put_image(const DepthFrame& frame) {
+  void survey_cameras() {
+    std::map<std::string, std::optional<Pose>> stands;  // by frame; empty: it moves
+    for (const Push& push : recording_.pushes)
+      for (const Step& step : push.steps)
+        for (const DepthFrame* image : images_of(step)) {
+          const auto [place, is_new] = stands.emplace(cameras_[camera_of(*image)].frame, image->T_base_camera);
+          if (place->second && place->second->matrix() != image->T_base_camera.matrix()) place->second.reset();
+        }
+    for (const auto& [frame, pose] : stands)
+      if (pose)
+        frames_.camera_stands(frame, *pose);
+      else
+        frames_.camera_moves(frame);
+  }
+
+  std::size_t camera_of(const DepthFrame& frame) {
     std::size_t camera = 0;
     while (camera < cameras_.size() && !same_camera(cameras_[camera].like, frame)) ++camera;
     if (camera == cameras_.size()) {
-      cameras_.push_back({frame, fmt::format("camera_{}", camera + 1), false});
+      std::size_t device = 0;
+      while (device < camera && !(looks_alone_ && same_device(cameras_[device].like, frame))) ++device;
+      cameras_.push_back({frame, camera == 0 ? "/camera" : fmt::format("/camera_{}", camera + 1), frames_.camera(device), false});
       cameras_.back().like.depth_m.resize(0, 0);
       cameras_.back().like.mask.resize(0, 0);
     }
+    return camera;
+  }
+
+  std::size_t put_image(const DepthFrame& frame) {
+    const std::size_t camera = camera_of(frame);
     BagCamera& known = cameras_[camera];
-    const std::string root = "/" + known.name;
-    put("/tf", "tf2_msgs/msg/TFMessage", time_ns_,
-        encode(std::vector<RosTransform>{{header("base"), known.name, frame.T_base_camera}}));
-    put(root + "/depth/camera_info", "sensor_msgs/msg/CameraInfo", time_ns_,
-        encode(RosCameraInfo{header(known.name), frame.camera}));
-    put(root + "/depth/image", "sensor_msgs/msg/Image", time_ns_, encode(RosImage{header(known.name), frame.depth_m}));
+    frames_.camera_at(time_ns_, known.frame, frame.T_base_camera, bag_);
+    put(known.topics + "/depth/camera_info", "sensor_msgs/msg/CameraInfo", time_ns_,
+        encode(RosCameraInfo{header(known.frame), frame.camera}));
+    put(known.topics + "/depth/image", "sensor_msgs/msg/Image", time_ns_, encode(RosImage{header(known.frame), frame.depth_m}));
     if (frame.mask.size() > 0) {
       known.has_mask = true;
-      put(root + "/mask", "sensor_msgs/msg/Image", time_ns_, encode(header(known.name), frame.mask));
+      put(known.topics + "/mask", "sensor_msgs/msg/Image", time_ns_, encode(header(known.frame), frame.mask));
     }
     return camera;
   }
@@ -199,7 +256,7 @@ class BagWriter {
     if (cloud.sigma_m[0] != cloud_.sigma_m[0] || cloud.pose_std_m != cloud_.pose_std_m ||
         cloud.pose_std_rad != cloud_.pose_std_rad)
       refuse("clouds differ in their standard deviations", step);
-    put("/points", "sensor_msgs/msg/PointCloud2", time_ns_, encode(RosPointCloud{header("base"), cloud}));
+    put("/points", "sensor_msgs/msg/PointCloud2", time_ns_, encode(RosPointCloud{header(frames_.base()), cloud}));
   }
 
   std::string mapping_text() const {
@@ -208,8 +265,8 @@ class BagWriter {
     if (!cameras_.empty()) text += "  depth:\n";
     for (const BagCamera& camera : cameras_) {
       YamlLine line;
-      line.put("image", "/" + camera.name + "/depth/image").put("info", "/" + camera.name + "/depth/camera_info");
-      if (camera.has_mask) line.put("mask", "/" + camera.name + "/mask");
+      line.put("image", camera.topics + "/depth/image").put("info", camera.topics + "/depth/camera_info");
+      if (camera.has_mask) line.put("mask", camera.topics + "/mask");
       line.put("noise", depth_noise_yaml(camera.like.noise));
       line.number_unless(0, "pose_std_m", camera.like.pose_std_m).number_unless(0, "pose_std_rad", camera.like.pose_std_rad);
       text += "    - " + line.str() + "\n";
@@ -220,7 +277,7 @@ class BagWriter {
       line.number_unless(0, "pose_std_m", cloud_.pose_std_m).number_unless(0, "pose_std_rad", cloud_.pose_std_rad);
       text += "  clouds:\n    - " + line.str() + "\n";
     }
-    text += "frames: {base: base, tip: tip}\nwrench: {reports: force_on_object, tare: none}\n";
+    text += frames_.mapping_text() + "wrench: {reports: force_on_object, tare: none}\n";
     // Every step has its own samples and image, at its own time.
     text += "steps:\n  by: marks\n  window_s: 0.03\n  image_gap_s: 0.01\n";
     if (recording_.tools.size() > 1) text += "  tool: " + yaml_word(recording_.tools.front().name) + "\n";
@@ -229,6 +286,8 @@ class BagWriter {
 
   const Recording& recording_;
   BagFolder bag_;
+  BagFrames frames_;
+  bool looks_alone_;
   std::vector<BagCamera> cameras_;
   PointCloud cloud_;
   std::string pushes_;

@@ -26,6 +26,8 @@ enum Opcode : std::uint8_t {
   op_message_index = 0x07,
   op_chunk_index = 0x08,
   op_statistics = 0x0B,
+  op_metadata = 0x0C,
+  op_metadata_index = 0x0D,
   op_summary_offset = 0x0E,
   op_data_end = 0x0F
 };
@@ -40,6 +42,15 @@ void record(std::string& out, Opcode opcode, std::string_view content) {
   out += static_cast<char>(opcode);
   store(out, static_cast<std::uint64_t>(content.size()));
   out += content;
+}
+
+void notes_field(std::string& out, const McapWriter::Notes& notes) {
+  std::string entries;
+  for (const auto& [key, value] : notes) {
+    text_field(entries, key);
+    text_field(entries, value);
+  }
+  text_field(out, entries);
 }
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -201,7 +212,7 @@ McapWriter::McapWriter(std::string profile, Compression compression) : compressi
 
 std::uint16_t McapWriter::add_channel(const std::string& topic, const std::string& schema_name,
                                       const std::string& schema_text, const std::string& schema_encoding,
-                                      const std::string& message_encoding) {
+                                      const std::string& message_encoding, const Notes& notes) {
   const auto [schema, is_new] = schema_ids_.try_emplace(schema_name, static_cast<std::uint16_t>(schema_ids_.size() + 1));
   if (is_new) {
     std::string content;
@@ -218,11 +229,25 @@ std::uint16_t McapWriter::add_channel(const std::string& topic, const std::strin
   store(content, schema->second);
   text_field(content, topic);
   text_field(content, message_encoding);
-  store(content, std::uint32_t{0});  // metadata
+  notes_field(content, notes);
   record(channels_, op_channel, content);
   record(chunk_, op_channel, content);
   counts_[id] = 0;
   return id;
+}
+
+void McapWriter::add_metadata(const std::string& name, const Notes& notes) {
+  close_chunk();
+  std::string content;
+  text_field(content, name);
+  notes_field(content, notes);
+  std::string index;
+  store(index, static_cast<std::uint64_t>(out_.size()));
+  record(out_, op_metadata, content);
+  store(index, static_cast<std::uint64_t>(content.size() + 9));
+  text_field(index, name);
+  record(metadata_indices_, op_metadata_index, index);
+  ++metadata_;
 }
 
 void McapWriter::add_message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data) {
@@ -315,7 +340,7 @@ std::string McapWriter::finish() {
   store(statistics, static_cast<std::uint16_t>(schema_ids_.size()));
   store(statistics, static_cast<std::uint32_t>(counts_.size()));
   store(statistics, std::uint32_t{0});
-  store(statistics, std::uint32_t{0});
+  store(statistics, metadata_);
   store(statistics, static_cast<std::uint32_t>(indices_.size()));
   store(statistics, indices_.empty() ? 0 : start);
   store(statistics, end);
@@ -343,6 +368,7 @@ std::string McapWriter::finish() {
     record(chunk_indices, op_chunk_index, entry);
   }
   group(op_chunk_index, chunk_indices);
+  group(op_metadata_index, metadata_indices_);
   const std::uint64_t summary_offsets = out_.size();
   out_ += offsets;
   // The check sum runs over the summary, its offsets and the footer up to itself.

@@ -47,8 +47,13 @@ class McapWriter {
  public:
   enum class Compression { none, zstd };
   explicit McapWriter(std::string profile = "ros2", Compression compression = Compression::zstd);
+  using Notes = std::map<std::string, std::string>;
+  /// @param notes  what the format calls the channel's metadata
   std::uint16_t add_channel(const std::string& topic, const std::string& schema_name, const std::string& schema_text,
-                            const std::string& schema_encoding = "ros2msg", const std::string& message_encoding = "cdr");
+                            const std::string& schema_encoding = "ros2msg", const std::string& message_encoding = "cdr",
+                            const Notes& notes = {});
+  /// A record of metadata about the whole file.
+  void add_metadata(const std::string& name, const Notes& notes);
   /// Times need not come in order.
   void add_message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data);
   /// Of what was added so far, as it is packed; of the last chunk as it is.
@@ -66,6 +71,8 @@ class McapWriter {
   Compression compression_;
   std::string out_, chunk_;
   std::string schemas_, channels_;  ///< their records, repeated in the summary
+  std::string metadata_indices_;
+  std::uint32_t metadata_ = 0;
   std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> chunk_messages_;
   std::vector<ChunkIndex> indices_;
   std::map<std::uint16_t, std::uint64_t> counts_;

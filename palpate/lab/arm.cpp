@@ -71,9 +71,8 @@ RobotModel arm(const ArmOptions& o) {
     j.velocity = 0.5;
     robot.joints.push_back(j);
   };
-  const bool stands_elsewhere = !o.T_base_arm.matrix().isIdentity();
-  if (stands_elsewhere) link("stand", {});
-  link("base", {barrel(0.09, 0.15, 0.0, o)});
+  link("base", {});
+  link("arm_base", {barrel(0.09, 0.15, 0.0, o)});
   link("module_1", {barrel(0.065, 0.13, 0.0, o)});
   link("module_2", {barrel(0.06, 0.34, -0.05, o)});
   link("module_3", {barrel(0.055, 0.18, -0.05, o)});
@@ -85,9 +84,8 @@ RobotModel arm(const ArmOptions& o) {
   if (o.pad_radius_m > 0) tool.push_back(rod(o.pad_radius_m, 0.008, o.stick_length_m - 0.008));
   link("stick", tool);
   link("tip", {});
-  link("camera", {});
-  if (stands_elsewhere) joint("stand_mount", "stand", "base", o.T_base_arm, Vec3::UnitZ(), 0);
-  joint("joint_1", "base", "module_1", at(0, 0, 0.15), Vec3::UnitZ(), 2.9);
+  joint("arm_mount", "base", "arm_base", o.T_base_arm, Vec3::UnitZ(), 0);
+  joint("joint_1", "arm_base", "module_1", at(0, 0, 0.15), Vec3::UnitZ(), 2.9);
   joint("joint_2", "module_1", "module_2", at(0, 0, 0.14), Vec3::UnitY(), 2.1);
   joint("joint_3", "module_2", "module_3", at(0, 0, 0.33), Vec3::UnitY(), 2.4);
   joint("joint_4", "module_3", "module_4", at(0, 0, 0.13), Vec3::UnitZ(), 2.9);
@@ -96,6 +94,8 @@ RobotModel arm(const ArmOptions& o) {
   joint("tilt", "hand_pan", "hand_tilt", at(0, 0, 0.09), Vec3::UnitY(), 2.1);
   joint("stick_mount", "hand_tilt", "stick", at(0, 0, 0.06), Vec3::UnitZ(), 0);
   joint("tip_mount", "stick", "tip", at(0, 0, o.stick_length_m), Vec3::UnitZ(), 0);
+  if (!o.camera_on_hand) return robot;
+  link("camera", {});
   // Beside the hand, tilted towards the tip so that the contact is in view.
   Pose eye = at(0.10, 0, 0.02);
   eye.rotate(Eigen::AngleAxisd(-0.25, Vec3::UnitY()));

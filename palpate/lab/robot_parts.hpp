@@ -23,10 +23,11 @@
 
 namespace palpate::lab {
 
-inline ArmOptions arm_with_pad(const Pose& T_base_arm, double pad_radius_m) {
+inline ArmOptions arm_of(const LabOptions& lab, const LabObject& object) {
   ArmOptions options;
-  options.T_base_arm = T_base_arm;
-  options.pad_radius_m = pad_radius_m;
+  options.T_base_arm = lab.T_base_arm;
+  options.pad_radius_m = object.pad_radius_m;
+  options.camera_on_hand = lab.camera_on_hand;
   return options;
 }
 
@@ -41,10 +42,10 @@ struct LabRobot::Impl {
   Impl(const LabOptions& given, LabObject object_in)
       : options(given),
         object(std::move(object_in)),
-        mask(arm(arm_with_pad(given.T_base_arm, object.pad_radius_m))),
+        mask(arm(arm_of(given, object))),
         tip(mask.kinematics().link("tip")),
         hand(mask.kinematics().link("hand_tilt")),
-        hand_camera(mask.kinematics().link("camera")),
+        hand_camera(given.camera_on_hand ? mask.kinematics().link("camera") : hand),
         stick(mask.kinematics().link("stick")),
         joint_random(given.seed, 1),
         force_random(given.seed, 2),

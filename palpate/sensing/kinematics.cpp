@@ -6,6 +6,7 @@
 #include <map>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/joint_motion.hpp"
 
 namespace palpate::sensing {
 namespace {
@@ -114,10 +115,7 @@ std::vector<Pose> Kinematics::link_poses(const std::vector<std::string>& names, 
         throw Error("has no finite position of the joint '" +
                         (master < 0 ? joint.name : robot_.joints[std::size_t(master)].name) + "'",
                     where);
-      if (joint.kind == RobotJoint::Kind::prismatic)
-        motion.translation() = q * joint.axis;
-      else
-        motion.linear() = Eigen::AngleAxisd(q, joint.axis).toRotationMatrix();
+      motion = joint_motion(joint, q);
     }
     poses[std::size_t(child_[std::size_t(j)])] = poses[std::size_t(parent_[std::size_t(j)])] * joint.T_parent_joint * motion;
   }

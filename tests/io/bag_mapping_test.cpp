@@ -58,9 +58,9 @@ TEST_F(Mapping, ErrorsNameFileLineFieldAndCure) {
       {"wrench: /wrench", "wrench: /wrenhc", {"topics.wrench", "no topic '/wrenhc'", "did you mean '/wrench'"}},
       {"wrench: /wrench", "wrench: wrench", {"topics.wrench", "starts with '/'"}},
       {"wrench: /wrench", "wrench: /tf", {"topics.wrench", "tf2_msgs/msg/TFMessage", "geometry_msgs/msg/WrenchStamped"}},
-      {"image: /camera_1/depth/image",
-       "image: /camera_1/depth/imge",
-       {"topics.depth[0].image", "did you mean '/camera_1/depth/image'"}},
+      {"image: /camera/depth/image",
+       "image: /camera/depth/imge",
+       {"topics.depth[0].image", "did you mean '/camera/depth/image'"}},
       {"force_on_object", "force_on_objct", {"wrench.reports", "did you mean 'force_on_object'"}},
       {"tare: none", "tare: {from_s: 2, to_s: 1}", {"wrench.tare.to_s", "later"}},
       {"by: marks", "by: mark", {"steps.by", "did you mean 'marks'"}},
@@ -69,18 +69,18 @@ TEST_F(Mapping, ErrorsNameFileLineFieldAndCure) {
       {"window_s: 0.03", "window_s: -1", {"steps.window_s", "larger than 0"}},
       {"window_s: 0.03", "windw_s: 0.03", {"steps.windw_s", "did you mean 'window_s'"}},
       {"tool: \"stick\"", "tool: \"stik\"", {"steps.pushes[0].tool", "did you mean 'stick'"}},
-      {"tip: tip", "tip: tcp", {"mapping.yaml:", "frames.tip", "'tcp'", "is not connected", "camera_1"}},
+      {"tip: tip", "tip: tcp", {"mapping.yaml:", "frames.tip", "'tcp'", "is not connected", "camera"}},
       {"frames: {base: base",
        "frames: {base: bse",
-       {"mapping.yaml:", "frames.base", "no transform names the base frame 'bse'", "base, camera_1"}},
-      {"image: /camera_1/depth/image",
+       {"mapping.yaml:", "frames.base", "no transform names the base frame 'bse'", "base, camera"}},
+      {"image: /camera/depth/image",
        "image: /tf",
        {"topics.depth[0].image", "Image or sensor_msgs/msg/CompressedImage is expected"}},
-      {"image: /camera_1/depth/image",
-       "image: /camera_1/mask",
+      {"image: /camera/depth/image",
+       "image: /camera/mask",
        {"topics.depth[0].image", "encoding 'mono8'", "16UC1 or 32FC1", "Is it the mask?"}},
-      {"mask: /camera_1/mask",
-       "mask: /camera_1/depth/image",
+      {"mask: /camera/mask",
+       "mask: /camera/depth/image",
        {"topics.depth[0].mask", "encoding '32FC1'", "a mask is mono8"}},
       {"name: \"push 1\"", "name: \"psuh 1\"", {"steps.pushes[0]", "no mark names the push 'psuh 1'", "'push 1', 'push 2'"}},
       {"window_s: 0.03", "window_s: 1e9", {"steps.window_s", "0.001 to 60 s"}},
@@ -157,17 +157,17 @@ TEST_F(Mapping, ClocksThatDifferBySecondsAreBroughtTogether) {
 TEST_F(Mapping, RectifiedImagesAreNotUndistortedAgain) {
   const MessageSource bag = read_bag(folder.path() / "bag");
   const Camera taken{8, 6, 525, 526, 3, 2, DistortionModel::plumb_bob, {0.18, -0.4, 0, 0, 0}};
-  std::string info = encode(RosCameraInfo{{1, "camera_1"}, taken});
+  std::string info = encode(RosCameraInfo{{1, "camera"}, taken});
   const double fx = 525, fx_rectified = 540;
   info.replace(info.rfind(std::string(reinterpret_cast<const char*>(&fx), 8)), 8, reinterpret_cast<const char*>(&fx_rectified), 8);
   const auto camera_by = [&](const std::string& key, const std::string& topic, std::string* said = nullptr) {
     MessageSource changed = bag;
     for (Message& one : changed.messages)
-      if (changed.topics[one.topic].name == "/camera_1/depth/camera_info") one.data = info;
+      if (changed.topics[one.topic].name == "/camera/depth/camera_info") one.data = info;
     for (MessageTopic& one : changed.topics)
-      if (one.name == "/camera_1/depth/image") one.name = topic;
+      if (one.name == "/camera/depth/image") one.name = topic;
     std::string mapping_text = text;
-    const std::string image = "image: /camera_1/depth/image";
+    const std::string image = "image: /camera/depth/image";
     mapping_text.replace(mapping_text.find(image), image.size(), key + "image: " + topic);
     folder.put("bag/changed.yaml", mapping_text);
     BagMapping mapping = read_mapping(folder.path() / "bag/changed.yaml");
@@ -176,7 +176,7 @@ TEST_F(Mapping, RectifiedImagesAreNotUndistortedAgain) {
       for (const std::string& one : streams.warnings) *said += one;
     return streams.cameras.at(0).like.camera;
   };
-  const std::string plain = "/camera_1/depth/image", straight = "/camera_1/depth/image_rect";
+  const std::string plain = "/camera/depth/image", straight = "/camera/depth/image_rect";
   EXPECT_EQ(camera_by("rectified: true, ", plain).fx_px, 540);
   EXPECT_EQ(camera_by("rectified: true, ", plain).distortion, DistortionModel::none);
   EXPECT_EQ(camera_by("rectified: false, ", straight).fx_px, 525);
@@ -280,8 +280,8 @@ TEST_F(Mapping, WhatTheMappingLeavesAloneIsListed) {
   const std::size_t begin = blind.find("  depth:\n"), end = blind.find("  clouds:\n");
   ASSERT_LT(begin, end);
   blind.erase(begin, end - begin);
-  EXPECT_THAT(unused(blind), testing::ElementsAre("topics.depth /camera_1/depth/camera_info", "topics.depth /camera_1/depth/image",
-                                                  "topics.depth /camera_1/mask"));
+  EXPECT_THAT(unused(blind), testing::ElementsAre("topics.depth /camera/depth/camera_info", "topics.depth /camera/depth/image",
+                                                  "topics.depth /camera/mask"));
   std::string chosen = text;
   chosen.replace(chosen.find("  wrench: /wrench"), 17, "  transforms: [/tf_static]\n  wrench: /wrench");
   EXPECT_THAT(unused(chosen), testing::ElementsAre("topics.transforms /tf"));
@@ -291,15 +291,15 @@ TEST_F(Mapping, PicturesThatAreThereTwiceAreSuggestedOnce) {
   MessageSource bag = read_bag(folder.path() / "bag");
   const auto packed = [&](const std::string& name) {
     bag.topics.push_back({name, "sensor_msgs/msg/CompressedImage", MessageEncoding::cdr, 1});
-    static const std::string data = compressed_depth_message({1, "camera_1"}, DepthImage::Constant(6, 8, 0.5f));
+    static const std::string data = compressed_depth_message({1, "camera"}, DepthImage::Constant(6, 8, 0.5f));
     bag.messages.push_back({bag.topics.size() - 1, bag.messages.back().log_time_ns, data});
   };
-  packed("/camera_1/depth/image/compressedDepth");
+  packed("/camera/depth/image/compressedDepth");
   packed("/other/depth/compressedDepth");
   const BagSurvey found = survey(bag);
   EXPECT_EQ(found.topics.back().use, "depth images");
-  EXPECT_THAT(found.mapping, Not(HasSubstr("image: /camera_1/depth/image/compressedDepth")));
-  EXPECT_THAT(found.mapping, AllOf(HasSubstr("image: /camera_1/depth/image,"), HasSubstr("image: /other/depth/compressedDepth,")));
+  EXPECT_THAT(found.mapping, Not(HasSubstr("image: /camera/depth/image/compressedDepth")));
+  EXPECT_THAT(found.mapping, AllOf(HasSubstr("image: /camera/depth/image,"), HasSubstr("image: /other/depth/compressedDepth,")));
   BagMapping mapping = read_mapping(folder.path() / "bag/mapping.yaml");
   const auto unused = unused_topics(found, mapping);
   ASSERT_EQ(unused.size(), 1u);
@@ -312,7 +312,7 @@ TEST_F(Mapping, PackedDepthImagesAreTakenThroughAMapping) {
     MessageSource bag = read_bag(folder.path() / "bag");
     std::deque<std::string> data;
     for (MessageTopic& topic : bag.topics) {
-      if (topic.name != "/camera_1/depth/image") continue;
+      if (topic.name != "/camera/depth/image") continue;
       topic.name += "/compressedDepth";
       topic.type = "sensor_msgs/msg/CompressedImage";
       for (Message& one : bag.messages) {
@@ -323,7 +323,7 @@ TEST_F(Mapping, PackedDepthImagesAreTakenThroughAMapping) {
       }
     }
     std::string changed = text;
-    changed.insert(changed.find("/camera_1/depth/image") + 21, "/compressedDepth");
+    changed.insert(changed.find("/camera/depth/image") + 19, "/compressedDepth");
     folder.put("bag/changed.yaml", changed);
     BagMapping mapping = read_mapping(folder.path() / "bag/changed.yaml");
     const SensorStreams streams = read_streams(bag, mapping);
@@ -340,14 +340,14 @@ TEST_F(Mapping, PackedDepthImagesAreTakenThroughAMapping) {
   std::string jpeg = CdrWriter()
                          .number(std::int32_t{1})
                          .number(std::uint32_t{0})
-                         .text("camera_1")
+                         .text("camera")
                          .text("rgb8; jpeg compressed bgr8")
                          .octets("abc")
                          .take();
   for (MessageTopic& topic : colour.topics)
-    if (topic.name == "/camera_1/depth/image") topic.type = "sensor_msgs/msg/CompressedImage";
+    if (topic.name == "/camera/depth/image") topic.type = "sensor_msgs/msg/CompressedImage";
   for (Message& one : colour.messages)
-    if (colour.topics[one.topic].name == "/camera_1/depth/image") one.data = jpeg;
+    if (colour.topics[one.topic].name == "/camera/depth/image") one.data = jpeg;
   BagMapping mapping = read_mapping(folder.path() / "bag/mapping.yaml");
   try {
     read_streams(colour, mapping);
@@ -445,7 +445,7 @@ TEST_F(Mapping, ASurveySuggestsAMappingThatNamesWhatIsThere) {
   const BagSurvey found = survey(read_bag(folder.path() / "bag"));
   EXPECT_TRUE(found.missing.empty()) << found.missing.front();
   for (const char* part :
-       {"wrench: /wrench", "image: /camera_1/depth/image, info: /camera_1/depth/camera_info", "base: base, tip: tip"})
+       {"wrench: /wrench", "image: /camera/depth/image, info: /camera/depth/camera_info", "base: base, tip: tip"})
     EXPECT_THAT(found.mapping, HasSubstr(part));
   // Filled in, it is a mapping.
   std::string filled = found.mapping;

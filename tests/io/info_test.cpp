@@ -145,15 +145,15 @@ TEST(InfoOfABag, SaysWhatTheMappingLeavesAloneAndWhatItsClocksAre) {
   outcome = told_of(folder, "info", "bag");
   const nlohmann::json left_out = nlohmann::json::parse(outcome.out)["bag"]["left_out"];
   ASSERT_EQ(left_out.size(), 3u) << outcome.out;
-  EXPECT_EQ(left_out[1]["topic"], "/camera_1/depth/image");
+  EXPECT_EQ(left_out[1]["topic"], "/camera/depth/image");
   EXPECT_EQ(left_out[1]["key"], "topics.depth");
-  EXPECT_NE(outcome.err.find("left out   /camera_1/depth/image (depth images)"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("left out   /camera/depth/image (depth images)"), std::string::npos) << outcome.err;
   EXPECT_EQ(outcome.err.find("nothing is wrong with it"), std::string::npos) << outcome.err;
 
   folder.put("bag/mapping.yaml", text + "clocks: {camera_offset_s: estimate}\n");
   const nlohmann::json clocks = nlohmann::json::parse(told_of(folder, "info", "bag").out)["clocks"];
   ASSERT_EQ(clocks.size(), 1u);
-  EXPECT_EQ(clocks[0]["sensor"], "/camera_1/depth/image");
+  EXPECT_EQ(clocks[0]["sensor"], "/camera/depth/image");
   EXPECT_EQ(clocks[0]["usable"], false);
   EXPECT_EQ(clocks[0]["taken_off_s"], 0.0);
 
@@ -226,7 +226,7 @@ TEST(InfoOfABag, SuggestsMaskAndClouds) {
                               folder.path().string() + "/out' 2> '" + folder.path().string() + "/err'";
   ASSERT_EQ(std::system(command.c_str()), 0) << folder.get("err");
   const std::string mapping = nlohmann::json::parse(folder.get("out")).at("mapping");
-  EXPECT_NE(mapping.find("image: /camera_1/depth/image, info: /camera_1/depth/camera_info, mask: /camera_1/mask,"), std::string::npos) << mapping;
+  EXPECT_NE(mapping.find("image: /camera/depth/image, info: /camera/depth/camera_info, mask: /camera/mask,"), std::string::npos) << mapping;
   EXPECT_NE(mapping.find("  # clouds:\n  #   - {topic: /points,"), std::string::npos) << mapping;
 }
 

@@ -22,6 +22,7 @@ struct Rosbag2Metadata {
   std::string storage;
   std::size_t messages = 0;
   std::map<std::string, std::size_t> topics;
+  std::map<std::string, std::string> offers;  // qualities of service, by topic
   std::vector<std::string> paths;
   std::vector<Rosbag2File> files;
 };
@@ -45,9 +46,10 @@ inline Rosbag2Metadata rosbag2_metadata(const std::filesystem::path& folder) {
     YamlKeys about(topic.required("topic_metadata"));
     about.required("type").text();
     about.required("serialization_format").text();
-    if (out.version >= 4) about.required("offered_qos_profiles").text();
+    const std::string name = about.required("name").text();
+    if (out.version >= 4) out.offers[name] = about.required("offered_qos_profiles").text();
     if (out.version >= 7) about.required("type_description_hash").text();
-    out.topics[about.required("name").text()] = count(topic.required("message_count"));
+    out.topics[name] = count(topic.required("message_count"));
   }
   for (const YamlField& one : keys.required("relative_file_paths").items()) out.paths.push_back(one.text());
   if (out.version >= 3) keys.required("compression_format").text(), keys.required("compression_mode").text();

@@ -85,7 +85,7 @@ void expect_same(const json& told, const TestMessage& ours, const Recording& rec
     EXPECT_EQ(data["k"].get<std::vector<double>>(), (std::vector<double>{10, 0, 3.5, 0, 11, 2.5, 0, 0, 1}));
     EXPECT_EQ(data["distortion_model"], "plumb_bob");
     EXPECT_EQ(data["width"], 8);
-  } else if (type == "sensor_msgs/msg/Image" && ours.topic == "/camera_1/depth/image") {
+  } else if (type == "sensor_msgs/msg/Image" && ours.topic == "/camera/depth/image") {
     EXPECT_EQ(data["encoding"], "32FC1");
     EXPECT_EQ(data["step"], 8 * 4);
     std::string pixels;
@@ -125,8 +125,8 @@ void expect_all_same(const json& told, const std::vector<TestMessage>& ours, con
   EXPECT_EQ(told["messages"].size(), ours.size());
   EXPECT_EQ(number["/wrench"], 12u);
   EXPECT_EQ(number["/joint_states"], 8u);
-  EXPECT_EQ(number["/camera_1/depth/image"], 8u);
-  EXPECT_EQ(number["/camera_1/depth/camera_info"], 8u);
+  EXPECT_EQ(number["/camera/depth/image"], 8u);
+  EXPECT_EQ(number["/camera/depth/camera_info"], 8u);
   EXPECT_EQ(number["/points"], 8u);
 }
 

@@ -222,7 +222,7 @@ TEST(RobotSenses, AnArmThatStandsElsewhereMakesTheSamePush) {
   LabRobot robot = robot_with(moved);
   const sensing::Kinematics arm(*robot.scene().robot);
   const auto poses = arm.link_poses(robot.scene().joint_names, std::vector<double>(7, 0.1));
-  EXPECT_TRUE(poses[std::size_t(arm.link("base"))].isApprox(moved.T_base_arm, 1e-12)) << "a recording's robot stands there, too";
+  EXPECT_TRUE(poses[std::size_t(arm.link("arm_base"))].isApprox(moved.T_base_arm, 1e-12)) << "a recording's robot stands there, too";
 }
 
 TEST(RobotSenses, OptionsThatContradictAreRefused) {
