@@ -42,7 +42,8 @@ struct ObjectOptions {
   bool wall = false;
   bool punch = false;                                ///< a stiff flat face presses, not a soft pad: contact is solved for
   std::optional<double> albedo, texture;             ///< to a camera (Look); not given: as the object usually is
-  Index tetrahedra = 20000;                          ///< of the true mesh; a block's feet ask for more
+  Index tetrahedra = 20000;                          ///< of the true mesh; a block's feet ask for more, thin legs and a user's
+                                                     ///< shape for twice as many
   int cells_in_radius = 5;                           ///< edges across the pad's radius
 };
 

@@ -22,7 +22,6 @@ struct Case {
   std::string name, object;
   double most = 0.004;  ///< a fifth of what the estimator states of E (docs/uncertainty.md): 2 % unless said otherwise
   double region_ratio = 1;
-  double most_stds = 0.2;  ///< of the answer: a fifth of what it states
 };
 void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 
@@ -37,9 +36,11 @@ ObjectOptions truth_of(const Case& one) {
   return options;
 }
 
-ObjectOptions with_mesh(ObjectOptions options, Index tetrahedra, int cells_in_radius) {
-  options.tetrahedra = tetrahedra;
-  options.cells_in_radius = cells_in_radius;
+/// Every edge shorter by the same share, 0.7: a mesh that is finer under the pad alone has few elements left for the rest of the
+/// object, and may be the stiffer one.
+ObjectOptions finer_everywhere(ObjectOptions options) {
+  options.tetrahedra *= 3;
+  options.cells_in_radius = 7;
   return options;
 }
 
@@ -78,9 +79,9 @@ void change(DepthFrame& image, const Shown& from, const Shown& to) {
 }
 
 TEST_P(Refinement, MovesTheTruthLittle) {
-  ObjectOptions options = truth_of(GetParam());
-  const auto travel_of = [&](Index tetrahedra, int cells, std::size_t site) {
-    const LabObject object = make_object(GetParam().object, with_mesh(options, tetrahedra, cells));
+  const ObjectOptions options = truth_of(GetParam());
+  const auto travel_of = [&](const ObjectOptions& mesh, std::size_t site) {
+    const LabObject object = make_object(GetParam().object, mesh);
     const auto pressed = object.press(object.sites[site]);
     pressed->press(1.0);
     std::printf("%s %s: %d nodes, %.5f mm per N\n", GetParam().name.c_str(), object.sites[site].name.c_str(), int(pressed->nodes()),
@@ -88,16 +89,16 @@ TEST_P(Refinement, MovesTheTruthLittle) {
     return pressed->travel_m();
   };
   for (std::size_t site = 0; site < make_object(GetParam().object, options).sites.size(); ++site) {
-    const double usual = travel_of(ObjectOptions{}.tetrahedra, ObjectOptions{}.cells_in_radius, site),
-                 fine = travel_of(2 * ObjectOptions{}.tetrahedra, 8, site);
+    const double usual = travel_of(options, site), fine = travel_of(finer_everywhere(options), site);
     EXPECT_LT(std::abs(usual / fine - 1), GetParam().most) << "site " << site;
   }
 }
 
 // One recording of the usual truth, and the same one, noise and all, as a finer truth would have moved under the same forces.
 TEST_P(Refinement, MovesTheAnswerLittle) {
+  constexpr double most_stds = 0.2;  // a fifth of what the answer states
   const ObjectOptions options = truth_of(GetParam());
-  const LabObject fine = make_object(GetParam().object, with_mesh(options, 3 * options.tetrahedra, 9));
+  const LabObject fine = make_object(GetParam().object, finer_everywhere(options));
   LabOptions lab;
   LabRobot robot(lab, make_object(GetParam().object, options));
   Recording usual = robot.scene();
@@ -137,7 +138,7 @@ TEST_P(Refinement, MovesTheAnswerLittle) {
     const Parameter &p = answer.parameters[k], &q = other.parameters[k];
     std::printf("%s %s%s: %.5g +- %.2g, of the finer truth %+.2f standard deviations\n", GetParam().name.c_str(), p.name.c_str(),
                 p.region.empty() ? "" : (" of the " + p.region).c_str(), p.value, p.std, (q.value - p.value) / p.std);
-    EXPECT_LT(std::abs(q.value - p.value), GetParam().most_stds * p.std) << p.name << " " << p.region;
+    EXPECT_LT(std::abs(q.value - p.value), most_stds * p.std) << p.name << " " << p.region;
   }
 }
 
@@ -146,7 +147,7 @@ std::vector<Case> cases() {
   std::vector<Case> all;
   for (const BuiltInObject& row : built_in_objects())
     if (row.name != "balloon") all.push_back({std::string(row.name), std::string(row.name), row.name == "bar" ? 0.0023 : row.name == "cube" ? 0.003 : 0.004});
-  all.push_back({"bear_in_regions", "bear", 0.004, 1.4, 0.25});  // its belly is 0.22 off: five edges across the pad are few there
+  all.push_back({"bear_in_regions", "bear", 0.004, 1.4});
   return all;
 }
 INSTANTIATE_TEST_SUITE_P(Objects, Refinement, testing::ValuesIn(cases()), [](const auto& one) { return one.param.name; });
