@@ -33,7 +33,7 @@ struct Options {
   std::optional<double> poisson_ratio, young_start_pa;
   double mesh_tolerance = 0.01;
   int max_iterations = 60;
-  bool budget = false, compare_laws = false, all_loads = false;
+  bool budget = false, compare_laws = false, all_loads = false, no_slips = false;
   LiveOptions live;
 };
 
@@ -69,6 +69,7 @@ IdentifyOptions identify_options(const Options& given, const Session& session) {
   if (given.young_start_pa) options.fit.young_start_pa = *given.young_start_pa;
   options.mesh_tolerance = given.mesh_tolerance;
   options.all_loads = given.all_loads;
+  options.slips = !given.no_slips;
   options.fit.max_iterations = given.max_iterations;
   options.fit.compare_laws = given.compare_laws;
   options.fit.threads = session.thread_count();
@@ -227,6 +228,8 @@ Run verbs::estimate(CLI::App& app) {
                "fit linear, neo_hookean and foam to the same data and predict the highest loads from the lower ones, also where E does not drift with the load");
   app.add_flag("--all-loads", given->all_loads,
                "fit also loads whose mean pressure is above 0.4 E, which are left out by themselves (a simulated patch caves in there): slow, and far off");
+  app.add_flag("--no-slips", given->no_slips,
+               "take the tool to touch where the recording says all the time, also where the data say that it slid");
   app.add_flag("--budget", given->budget, "print what each input's uncertainty does to E and nu");
   given->live.add_to(app);
   return [given](Session& session) { return estimate(session, *given); };

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "palpate/estimation/paper_method.hpp"
+#include "palpate/estimation/slips.hpp"
 
 namespace palpate::cli {
 MethodAnswer no_answer() {
@@ -44,13 +45,32 @@ MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& optio
 MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
                         const OnProgress& progress, Identification* whole, estimation::StepCounts* fitted) {
   const Watch watch;
+  Prepared slipping = given;  // with the slips that are found
+  estimation::FitOptions fit_options = options;
   const auto fit = [&](const estimation::StepCounts& steps) {
-    const Prepared some = first_samples(given, steps);
-    Identification answer = estimation::fit(some.recording, some.object, some.inputs, options, progress, some.finer.get(), memory, some.doubt.get());
+    const Prepared some = first_samples(slipping, steps);
+    Identification answer = estimation::fit(some.recording, some.object, some.inputs, fit_options, progress, some.finer.get(), memory, some.doubt.get());
     if (given.doubt) given.doubt->effect = some.doubt->effect;
     return answer;
   };
-  Identification answer = estimation::fit_within_pressure(given.recording, given.object, given.inputs, options, fit, fitted);
+  estimation::StepCounts steps = estimation::all_steps(given.recording);
+  Identification answer = estimation::fit_with_slips(slipping.recording, [&](const Identification* before) {
+    if (before != nullptr) {
+      fit_options.young_start_pa = before->parameters[0].value;
+      fit_options.poisson_start = before->parameters[1].value;
+      if (slipping.finer) {
+        slipping.finer = std::make_shared<estimation::FinerModel>(*slipping.finer);
+        estimation::take_slips(slipping.recording, slipping.finer->recording);
+      }
+      if (slipping.doubt) {
+        slipping.doubt = std::make_shared<estimation::ShapeDoubt>(*slipping.doubt);
+        slipping.doubt->effect.reset();
+        for (estimation::AlternativeShape& shape : slipping.doubt->shapes) estimation::take_slips(slipping.recording, shape.recording);
+      }
+    }
+    return estimation::fit_within_pressure(slipping.recording, slipping.object, slipping.inputs, fit_options, fit, &steps);
+  });
+  if (fitted != nullptr) *fitted = steps;
   const MethodAnswer out = summary(answer, watch.seconds());
   if (whole != nullptr) *whole = std::move(answer);
   return out;

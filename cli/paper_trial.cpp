@@ -68,7 +68,7 @@ ErrorSurface error_surface(const Prepared& given, const MethodAnswer& found, dou
 
 void answer_samples(const Prepared& given, int every, const estimation::FitOptions& options, TrialAnswer& out, const OnProgress& progress) {
   estimation::FitOptions alone = options;
-  alone.cross_checks = alone.stresses = false;
+  alone.cross_checks = alone.stresses = alone.find_slips = false;  // of one sample there is no slip
   std::size_t count = 0, done = 0;
   for (const Push& push : given.recording.pushes) count += push.steps.size();
   for (std::size_t p = 0; p < given.recording.pushes.size(); ++p) {
@@ -142,6 +142,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   estimation::FitOptions fit;
   fit.threads = options.threads;
   fit.cross_checks = fit.stresses = false;  // the paper's method has none: neither side's solves count them
+  fit.find_slips = true;                    // changes the answer, and counts
 
   ModelChoice choice = choice_of(scene);
   const Watch model;

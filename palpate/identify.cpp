@@ -14,6 +14,7 @@
 #include "palpate/estimation/deep_loads.hpp"
 #include "palpate/estimation/fit_on_fine_mesh.hpp"
 #include "palpate/estimation/paper_method.hpp"
+#include "palpate/estimation/slips.hpp"
 #include "palpate/estimation/unseen_side.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/regions.hpp"
@@ -282,6 +283,7 @@ estimation::SimulatedObject build_simulated_object(Recording& recording, const O
   }
   recording.model.element = quadratic ? "tet10" : "tet4";
   estimation::put_contacts_on_surface(recording, object.mesh);
+  estimation::free_contacts_after_slips(recording);
   if (recording.regions.size() > 1) {
     object.region = fem::regions_of(object.mesh, recording.regions, &given);
     for (const Region& region : recording.regions) object.region_names.push_back(region.name);
@@ -404,21 +406,30 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
       out.answer = estimation::fit_as_in_paper(recording, object, observed, options.fit, progress);  // sec. VI: error function and its minimum
       return;
     }
-    const Recording whole = recording;
+    Recording whole = recording;
     const estimation::SimulatedObject filled = object;
     const std::optional<estimation::ShapeDoubt> unjudged = doubt;
+    estimation::FitOptions fit_options = options.fit;
     const auto fit_steps = [&](const estimation::StepCounts& steps) {
       recording = whole;
       object = filled;
       doubt = unjudged;
       estimation::keep_first_steps(recording, steps);
       if (doubt)
-        for (estimation::AlternativeShape& shape : doubt->shapes) estimation::keep_first_steps(shape.recording, steps);
-      return estimation::fit_on_fine_mesh(recording, object, estimation::first_steps(observed, whole, steps), options.fit,
+        for (estimation::AlternativeShape& shape : doubt->shapes) {
+          estimation::take_slips(whole, shape.recording);
+          estimation::keep_first_steps(shape.recording, steps);
+        }
+      return estimation::fit_on_fine_mesh(recording, object, estimation::first_steps(observed, whole, steps), fit_options,
                                           options.mesh_tolerance, doubt ? &*doubt : nullptr, progress, fill_anew(as_given, recording));
     };
-    out.answer = options.all_loads ? fit_steps(fitted)
-                                   : estimation::fit_within_pressure(whole, filled, observed, options.fit, fit_steps, &fitted);
+    const auto fit_loads = [&](const Identification* before) {
+      if (before == nullptr) fitted = estimation::all_steps(whole);  // else of no higher loads: E was wrong that would take them
+      else fit_options.young_start_pa = before->parameters[0].value, fit_options.poisson_start = before->parameters[1].value;
+      if (options.all_loads) return fit_steps(fitted);
+      return estimation::fit_within_pressure(whole, filled, observed, fit_options, fit_steps, &fitted);
+    };
+    out.answer = options.slips ? estimation::fit_with_slips(whole, fit_loads) : fit_loads(nullptr);
   };
   fit(reconstruction::Completion::mirrored);
   if (doubt && doubt->effect && doubt->effect->better) {

@@ -27,6 +27,7 @@ struct IdentifyOptions {
   /// With `refine: auto`: while what the mesh does to E is estimated to be more than this share, and more than a third of all
   /// else that is not known of E, the object is fitted again on a finer mesh.
   double mesh_tolerance = 0.01;
+  bool slips = true;       ///< fits again with a slip of the tool that was found (estimation/slips.hpp)
   bool all_loads = false;  ///< fits also loads under which a patch of even pressure caves in (estimation/deep_loads.hpp)
   estimation::FitOptions fit;
 };

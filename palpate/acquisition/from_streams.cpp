@@ -24,6 +24,7 @@ struct StepTime {
   double time_s = 0;
   std::optional<bool> loaded;     ///< not given: told by the force
   std::optional<bool> unloading;  ///< not given: told by force and travel
+  bool slipped = false;
 };
 struct PushTimes {
   PlannedPush plan;
@@ -106,9 +107,9 @@ class Assembly {
     return all;
   }
 
-  /// "NAME", "NAME; unloading", "NAME; unloaded", or both; without a name, one push.
+  /// "NAME", "NAME; unloading", "NAME; unloaded", "NAME; slipped", or several; without a name, one push.
   void marked(const MarkSample& mark, std::vector<PushTimes>& all) const {
-    StepTime step{mark.time_s, {}, {}};
+    StepTime step{mark.time_s, {}, {}, mark.text.find("; slipped") != std::string::npos};
     std::string name = mark.text.substr(0, mark.text.find(';'));
     while (!name.empty() && name.back() == ' ') name.pop_back();
     if (name.empty()) name = "push 1";
@@ -289,6 +290,7 @@ class Assembly {
       }
       Step step;
       step.time_s = at.time_s;
+      step.slipped = at.slipped;
       step.source = plan_.source + ": " + push.name + " at " + seconds_text(at.time_s);
       step.T_base_tip = tip;
       step.joints_rad = joints_of(at.time_s);

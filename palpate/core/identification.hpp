@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,14 @@ struct Nuisance {
   double value = 0, std = 0, lower_95 = 0, upper_95 = 0;
   double prior_std = 0;
   double pull = 0;  ///< (value - prior mean) / prior standard deviation
+};
+
+/// A slip of the tool that the recording does not tell and the residuals ask for: from a step of a push on the tool touches elsewhere.
+struct Slip {
+  std::size_t push = 0, step = 0;
+  double across_m = 0, deeper_m = 0;  ///< from before to after; 0 where nothing tells
+  double chi2 = 0;                    ///< by how much it would fall
+  double p_value = 1;                 ///< chance of asking for as much without one, over all places where it may be
 };
 
 enum class Termination { converged, max_iterations, cancelled, no_progress, failed };
@@ -140,6 +149,7 @@ struct Identification {
   std::vector<Nuisance> nuisances;
   MatrixX covariance;  ///< of (log E, nu, ...) in the order of `parameters`
   std::vector<Verdict> verdicts;
+  std::optional<Slip> slip;  ///< that is not in the recording the answer is of
   FitSummary fit;
   HeldOut prediction;
   std::vector<BudgetEntry> budget;

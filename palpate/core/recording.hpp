@@ -140,6 +140,7 @@ struct Step {
   std::vector<double> joints_rad;
   std::vector<Observation> observations;
   bool unloading = false;  ///< recorded while the tool was going back
+  bool slipped = false;    ///< since the step before, the tool slid over the object: it touches elsewhere from here on
   std::string source;      ///< file and line, for messages
 };
 

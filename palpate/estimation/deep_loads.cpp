@@ -131,11 +131,16 @@ Identification fit_within_pressure(const Recording& recording, const SimulatedOb
   constexpr int most_fits = 3;
   constexpr double roughly = 1.5;  // by how much E may be off that linear theory reads
   const StepCounts all = all_steps(recording);
-  StepCounts now = all;
+  const StepCounts most = fitted != nullptr && !fitted->empty() ? *fitted : all;
+  const auto at_most = [&](StepCounts counts) {
+    for (std::size_t p = 0; p < counts.size(); ++p) counts[p] = std::min(counts[p], most[p]);
+    return counts;
+  };
+  StepCounts now = most;
   const bool caves_in = !fem::material_law(object.material).is_linear() && steps_within_pressure(recording, 0, 0) != all;
   if (caves_in)
     if (const auto rough_pa = options.young_start_pa ? options.young_start_pa : rough_young_pa(recording, object, inputs, options)) {
-      const StepCounts near = steps_within_pressure(recording, *rough_pa, roughly * largest_pressure);
+      const StepCounts near = at_most(steps_within_pressure(recording, *rough_pa, roughly * largest_pressure));
       if (any_loaded(recording, near)) now = near;
     }
   Identification answer;
@@ -144,7 +149,7 @@ Identification fit_within_pressure(const Recording& recording, const SimulatedOb
     answer = fit(now);
     young_pa = young_of(answer);
     if (!caves_in || !young_pa || fits == most_fits) break;
-    const StepCounts within = steps_within_pressure(recording, *young_pa);
+    const StepCounts within = at_most(steps_within_pressure(recording, *young_pa));
     if (within == now || !any_loaded(recording, within)) break;
     now = within;
   }

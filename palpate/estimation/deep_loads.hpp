@@ -40,7 +40,7 @@ std::vector<Entry> first_steps(const std::vector<Entry>& all, const Recording& g
 /// changes which steps these are, they are fitted anew. With a linear law, which caves in under nothing, and where every load is
 /// far beyond, all steps are fitted.
 /// @param fit     of the first steps of each push; called once where no load is near the limit
-/// @param fitted  if given: the steps that the answer is of
+/// @param fitted  if given: the steps that the answer is of. Goes in as the most that are fitted (empty: all)
 Identification fit_within_pressure(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
                                    const FitOptions& options, const std::function<Identification(const StepCounts&)>& fit,
                                    StepCounts* fitted = nullptr);

@@ -34,6 +34,7 @@ struct Doubt {
 struct Doubts {
   std::vector<Doubt> all;          ///< the one that explains most first
   std::optional<StepChange> slip;  ///< of contacts that are stated as exactly known (see contact_slip)
+  std::optional<Slip> unrecorded_slip;  ///< that explains more than any of `all` (see find_slip)
   std::optional<SiteStiffness> sites;  ///< where several places were pushed and no regions are given
   std::vector<BudgetEntry> budget_if;  ///< what is stated as exactly known, were it off by a typical size
 };

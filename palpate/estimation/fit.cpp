@@ -388,11 +388,14 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   CrossChecks checks;
   Doubts doubts;
   std::optional<fem::Certificate> certificate;
+  if ((options.cross_checks || options.find_slips) && optimum.termination == Termination::converged) {
+    doubts = look_for_doubts(recording, objective, optimum, inputs, options, factor, std::max(1.0, summary.chi2_per_dof),
+                             progress);
+    if (doubts.unrecorded_slip && doubts.unrecorded_slip->p_value < very_rare) answer.slip = doubts.unrecorded_slip;
+  }
   if (options.cross_checks && optimum.termination == Termination::converged) {
     checks = cross_check(objective, optimum, loss, factor, progress);
     if (checks.cancelled) return stopped();
-    doubts = look_for_doubts(recording, objective, optimum, inputs, options, factor, std::max(1.0, summary.chi2_per_dof),
-                             progress);
     certificate = model.certify(optimum.unknowns);
     answer.budget_if = doubts.budget_if;
     answer.prediction = checks.held_out;

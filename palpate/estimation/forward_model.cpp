@@ -8,6 +8,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/slips.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/materials.hpp"
 
@@ -161,9 +162,9 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
       clamp_.push_back(clamp != nullptr && clamp->pose_varies == PoseVaries::step ? add_clamp(in_step) : push_clamp);
       std::vector<int> errors, shifts, radii;
       for (const auto& load : push.steps[s].loads) {
-        const std::string shift = in_push + key_of(load);
+        const std::string stretch = stretch_of(push, s), shift = stretch + key_of(load);
         if (load.contact_std_m > 0 && has_place(recording, load) && shift_of.count(shift) == 0) {
-          shift_of[shift] = unknowns.add_block("contact_shift" + in_push, "m", load.contact_std_m, {"_1", "_2"});
+          shift_of[shift] = unknowns.add_block("contact_shift" + stretch, "m", load.contact_std_m, {"_1", "_2"});
           shift_direction_[shift_of[shift]] = load.direction;
         }
         const auto known = shift_of.find(shift);

@@ -10,6 +10,7 @@
 
 #include "palpate/estimation/cell_sums.hpp"
 #include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/slips.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -115,7 +116,7 @@ std::optional<StepChange> contact_slip(const Objective& objective, const Optimum
   const ForwardModel& model = objective.model();
   std::map<std::size_t, std::vector<Told>> pushes;
   for (std::size_t s = 0; s < model.step_count(); ++s) {
-    const auto first = unknown_named(objective.unknowns(), "contact_shift" + in_push(model, s) + "_1");
+    const auto first = unknown_named(objective.unknowns(), "contact_shift" + stretch_of(model.push(s), model.index(s).step) + "_1");
     if (!first || !has_rows(objective, s) || !concerns(objective.last_rows()[s], *first)) continue;
     const auto asked = asked_by(objective, optimum, s, {*first, *first + 1}, factor);
     if (asked) pushes[model.index(s).push].push_back({s, asked->change, asked->covariance});

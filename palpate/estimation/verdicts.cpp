@@ -287,12 +287,19 @@ void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
   }
   auto slip = contact_slip(in.objective, in.optimum, factor);
   if (in.doubts.slip && (!slip || in.doubts.slip->p_value < slip->p_value)) slip = in.doubts.slip;
-  if (slip && slip->p_value < very_rare && slip->size > least_slip_m) {
+  const bool slipped = in.answer.slip || (slip && slip->p_value < very_rare);
+  if (in.answer.slip) {
+    const Slip& slid = *in.answer.slip;
+    out.push_back({"contact_slipped", "The tool seems to have slipped by " + millimetres(slid.across_m) + " across and " + millimetres(slid.deeper_m) +
+                                          " deeper at step " + std::to_string(slid.step) + " of push '" + in.recording.pushes[slid.push].name +
+                                          "': the steps from there on ask for another contact point and another zero of the travel than "
+                                          "those before. Leave them out, or push along the surface's normal."});
+  } else if (slipped && slip->size > least_slip_m) {
     out.push_back({"contact_slipped", "The tool seems to have slipped by " + millimetres(slip->size) + " at " + where(slip->step) +
                                           ": the steps from there on ask for another contact point than those before. Leave "
                                           "them out, or push along the surface's normal."});
   }
-  judge_doubts(in, slip && slip->p_value < very_rare, out);  // a slip looks like a contact elsewhere
+  judge_doubts(in, slipped, out);  // a slip looks like a contact elsewhere
   const auto settled = settling(in.objective, in.optimum, factor);
   if (settled && settled->p_value < very_rare && settled->size > least_settling) {
     out.push_back({"not_settled", "While the load stayed the same up to " + where(settled->step) + ", the object went on giving way: E fell by " +

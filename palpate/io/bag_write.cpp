@@ -125,6 +125,7 @@ class BagWriter {
       if (mark.find(';') != std::string::npos) refuse("the name of push '" + push.name + "' holds a semicolon", step);
       mark += step.loads.empty() ? "; unloaded" : "; loaded";
       if (step.unloading) mark += "; unloading";
+      if (step.slipped) mark += "; slipped";
       put("/palpate/marks", "std_msgs/msg/String", time_ns_, encode(mark));
       if (!step.joints_rad.empty())
         put("/joint_states", "sensor_msgs/msg/JointState", time_ns_,

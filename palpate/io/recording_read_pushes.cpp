@@ -32,6 +32,7 @@ void read_loads_and_observations(YamlKeys& keys, const TableRow* row, RecordingC
     }
   }
   step.unloading = keys.boolean_or("unloading", false);
+  step.slipped = keys.boolean_or("slipped", false);
   if (observations) {
     const auto items = observations->items();
     for (const YamlField& item : items) read_observation(item, row, is_alone(items, item), context, step);
@@ -91,6 +92,10 @@ void read_step_table(const YamlField& file, const YamlField& every_step, Push& p
       if (*unloading != 0 && *unloading != 1) throw Error("is neither 0 nor 1", row.where() + ": unloading");
       step.unloading = *unloading == 1;
     }
+    if (const auto slipped = row.number("slipped")) {
+      if (*slipped != 0 && *slipped != 1) throw Error("is neither 0 nor 1", row.where() + ": slipped");
+      step.slipped = *slipped == 1;
+    }
     if (const auto position = row.vector("tip", "_m")) {
       Eigen::Vector4d q;
       for (const auto& [k, letter] : {std::pair{0, 'x'}, {1, 'y'}, {2, 'z'}, {3, 'w'}}) {
@@ -125,6 +130,7 @@ void read_step_table(const YamlField& file, const YamlField& every_step, Push& p
                                       "observed_travel_m",
                                       "observed_force_n",
                                       "unloading",
+                                      "slipped",
                                       "tip_x_m",
                                       "contact_x_m",
                                       "observed_force_x_n",

@@ -383,6 +383,7 @@ void RecordingWriter::Pages::add_step(const Step& step) {
   if (push_count == 0) throw Error("a step was added before any push was begun", "RecordingWriter::add_step");
   text += fmt::format("      - time_s: {}\n", step.time_s);
   if (step.unloading) text += "        unloading: true\n";
+  if (step.slipped) text += "        slipped: true\n";
   if (!step.joints_rad.empty())
     text += "        joints_rad: " + yaml_list(step.joints_rad.data(), step.joints_rad.size()) + "\n";
   if (step.T_base_tip) text += "        T_base_tip: " + yaml_pose(*step.T_base_tip) + "\n";

@@ -64,6 +64,7 @@ TEST(BagWrite, ComesBackAsItWas) {
     for (std::size_t i = 0; i < is.steps.size(); ++i) {
       const Step &a = was.steps[i], &b = is.steps[i];
       EXPECT_EQ(b.unloading, a.unloading);
+      EXPECT_EQ(b.slipped, a.slipped);
       EXPECT_NEAR(b.time_s - is.steps[0].time_s, a.time_s - was.steps[0].time_s, 1e-9);
       ASSERT_EQ(b.loads.size(), a.loads.size()) << p << " " << i;
       if (!a.loads.empty()) {

@@ -35,6 +35,7 @@ inline Recording made_up() {
       Step step;
       step.time_s = 3.1 * i;  // both pushes begin at 0
       step.unloading = i == 3;
+      step.slipped = i == 2;
       Pose tip = Pose::Identity();
       tip.rotate(Eigen::AngleAxisd(3.0, Vec3(1, 0.1, 0).normalized()));
       tip.pretranslate(Vec3(0.05 + 0.01 * p, 0.05, 0.1 - 0.0031 * i));

@@ -95,6 +95,7 @@ pushes:
           - {kind: depth, camera: top, file: depth.png, mask: mask.png, pose_std_m: 0.002}
       - time_s: 1.5
         unloading: true
+        slipped: true
         joints_rad: [0.1, 0.2]
         T_base_tip: [[1, 0, 0, 0.05], [0, 1, 0, 0], [0, 0, 1, 0.1], [0, 0, 0, 1]]
         loads:
@@ -146,8 +147,8 @@ void put_everything(const TemporaryFolder& folder) {
   folder.put("two.csv",
              "time_s,ball.force_n,line.travel_m,left.cloud,right.cloud,observed_force_x_n,observed_force_y_n,observed_force_"
              "z_n,a.x_m,a.y_m,a.z_m,"
-             "elbow_rad,shoulder_rad,unloading\n0,1,0.001,l0.xyz,r0.xyz,0,0,-1,0,0,0.1,0.5,0.6,0\n1,2,0.002,,r1.xyz,0,0,-2,,"
-             ",,0.5,0.7,1\n");
+             "elbow_rad,shoulder_rad,unloading,slipped\n0,1,0.001,l0.xyz,r0.xyz,0,0,-1,0,0,0.1,0.5,0.6,0,0\n1,2,0.002,,r1.xyz,0,0,-2,,"
+             ",,0.5,0.7,1,1\n");
   folder.put("recording.yaml", everything);
 }
 
@@ -193,6 +194,7 @@ TEST(ReadRecording, EveryKindOfKey) {
 
   const Step& second = recording.pushes[0].steps.at(1);
   EXPECT_TRUE(second.unloading);
+  EXPECT_TRUE(second.slipped);
   EXPECT_EQ(*second.loads.at(0).force_n, Vec3(0, 0, -3));
   EXPECT_EQ(second.loads[0].force_rate_n_s, Vec3(0, 0.1, -2));
   EXPECT_EQ(*second.loads.at(1).travel_m, 0.002);
@@ -212,6 +214,8 @@ TEST(ReadRecording, EveryKindOfKey) {
   EXPECT_EQ(rows[1].observations.size(), 2u) << "an empty cell leaves an observation out";
   EXPECT_EQ(rows[1].joints_rad, (std::vector<double>{0.5, 0.7}));
   EXPECT_TRUE(rows[1].unloading);
+  EXPECT_TRUE(rows[1].slipped);
+  EXPECT_FALSE(rows[0].slipped);
 }
 
 /// What was read, written and read again is the same to the last bit where the format can say it.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/slips.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
 
 namespace palpate::estimation {
@@ -86,14 +87,17 @@ std::unique_ptr<Term> make_travel_term(const ToolTravel& travel, const TermConte
     throw Error("the travel needs its standard deviation (sigma_m > 0)", context.model.step(context.step).source + " travel");
   }
   const Push& push = context.model.push(context.step);
+  const std::size_t step = context.model.index(context.step).step;
+  const Load& loaded = context.model.step(context.step).loads[load];
+  const double slip_m = after_slip(push, step) ? slip_std_m(context.model.tool(loaded.tool)) : 0;
+  const double offset_std_m = std::hypot(push.travel_offset_std_m, slip_m);
   int offset = -1;
-  if (push.travel_offset_std_m > 0) {
-    const std::string name = "travel_zero[" + push.name + "]";
-    if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, push.travel_offset_std_m});
+  if (offset_std_m > 0) {
+    const std::string name = "travel_zero" + stretch_of(push, step);
+    if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, offset_std_m});
     offset = context.shared[name];
   }
   // The encoder reads the tip's motion plus what stick and arm give way.
-  const Load& loaded = context.model.step(context.step).loads[load];
   const double pressed_n = loaded.force_n.value_or(Vec3::Zero()).dot(loaded.direction.normalized());
   const double yielded_m = context.model.tool(loaded.tool).compliance_m_per_n * pressed_n;
   return std::make_unique<TravelTerm>(travel.travel_m - yielded_m, travel.sigma_m, static_cast<Index>(load), offset,
