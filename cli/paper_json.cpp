@@ -90,6 +90,7 @@ nlohmann::json json_of(const SceneAnswers& answers) {
   out["scores"] = {{"paper", json_of(scores.paper)},
                    {"paper_linear_tetrahedra", json_of(scores.paper_coarse)},
                    {"palpate", json_of(scores.palpate)},
+                   {"palpate_with_the_papers_law", json_of(scores.palpate_with_the_papers_law)},
                    {"where_the_papers_method_answers",
                     {{"paper", json_of(scores.paper_compared)}, {"palpate", json_of(scores.palpate_compared)}, {"left_out", scores.apart}}}};
   return out;

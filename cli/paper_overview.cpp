@@ -46,12 +46,13 @@ std::string overview_table(const std::vector<SceneAnswers>& scenes) {
   for (const SceneAnswers& scene : scenes) {
     const SceneScores scores = scores_of(scene.trials);
     std::vector<const MethodAnswer*> paper, palpate;
-    for (const TrialAnswer& trial : scene.trials) paper.push_back(&trial.paper), palpate.push_back(&trial.palpate);
+    for (const TrialAnswer& trial : scene.trials) paper.push_back(&trial.paper), palpate.push_back(&counted(trial));
     const bool known = !scene.scene->apparent;
+    const std::string of_law = scene.scene->other_law.empty() ? "" : fmt::format(" ({} law)", scene.scene->other_law);
     html += fmt::format("<tr><td><a href=\"#{}\">{}</a>{}</td><td class=\"words\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
                         scene.scene->name, scene.scene->name, scene.scene->figures.empty() ? "" : fmt::format(" (fig. {})", scene.scene->figures),
                         scene.scene->paper_says, scene.trials.size(), known ? errors(scores.paper) : apparent(scene, &TrialAnswer::paper),
-                        known ? errors(scores.palpate) : apparent(scene, &TrialAnswer::palpate),
+                        known ? errors(scores.palpate) + of_law : apparent(scene, &TrialAnswer::palpate),
                         known ? fmt::format("{} of {}", scores.palpate.inside_95, scores.palpate.asked) : "",
                         number(known ? scores.paper.seconds : spread_of(paper).seconds, "{:.1f}"),
                         number(known ? scores.palpate.seconds : spread_of(palpate).seconds, "{:.1f}"));

@@ -120,34 +120,37 @@ const TrialAnswer& SceneAnswers::shown() const {
   return at == trials.end() ? trials.front() : *at;
 }
 
+const MethodAnswer& counted(const TrialAnswer& trial) { return trial.other_law.empty() ? trial.palpate : trial.other; }
+
 SceneScores scores_of(const std::vector<TrialAnswer>& trials) {
-  Answers paper, coarse, palpate, other, paper_compared, palpate_compared;
+  Answers paper, coarse, palpate, same_law, paper_compared, palpate_compared;
   SceneScores out;
   for (const TrialAnswer& trial : trials) {
     if (!std::isfinite(trial.young_modulus_pa)) continue;  // the lab made no truth: nobody was asked
     coarse.add(trial, trial.paper_coarse);
-    if (!trial.other_law.empty()) other.add(trial, trial.other);
+    if (!trial.other_law.empty()) same_law.add(trial, trial.palpate);
     if (!trial.sites.empty()) {
       add_sites(trial, paper, palpate, paper_compared, palpate_compared, out.apart);
       continue;
     }
     paper.add(trial, trial.paper);
-    palpate.add(trial, trial.palpate);
+    palpate.add(trial, counted(trial));
     if (!answered(trial.paper)) {
       ++out.apart;
       continue;
     }
     paper_compared.add(trial, trial.paper);
-    palpate_compared.add(trial, trial.palpate);
+    palpate_compared.add(trial, counted(trial));
   }
-  out.paper = paper.score(), out.paper_coarse = coarse.score(), out.palpate = palpate.score(), out.other = other.score();
+  out.paper = paper.score(), out.paper_coarse = coarse.score(), out.palpate = palpate.score();
+  out.palpate_with_the_papers_law = same_law.score();
   out.paper_compared = paper_compared.score(), out.palpate_compared = palpate_compared.score();
   return out;
 }
 
 std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
   std::vector<double> shares, simulated, solved;
-  std::string worse, dear, apart;
+  std::string worse, dear, apart, laws;
   int inside = 0, asked = 0;
   for (const SceneAnswers& scene : scenes) {
     if (scene.scene->apparent) continue;
@@ -155,6 +158,8 @@ std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
     inside += scores.palpate.inside_95;
     asked += scores.palpate.asked;
     const std::string name(scene.scene->name);
+    const std::string& law = scene.shown().other_law;
+    if (!law.empty()) laws = also(laws, fmt::format("palpate with the {} law in {}", law, name));
     if (scores.apart > 0) apart = also(apart, fmt::format("{} of {} in {}", scores.apart, scores.paper.asked, name));
     // Where the paper's method has no answer nothing is compared: that decides for neither.
     const Score &paper = scores.paper_compared, &palpate = scores.palpate_compared;
@@ -167,7 +172,8 @@ std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
     if (paper.most_load_cases > 0) solved.push_back(static_cast<double>(palpate.most_load_cases) / paper.most_load_cases);
   }
   if (asked == 0) return {};
-  const std::string left_out = apart.empty() ? "" : "; left out, for the paper's method has no answer: " + apart;
+  const std::string by_law = laws.empty() ? "" : "; " + laws;
+  const std::string left_out = by_law + (apart.empty() ? "" : "; left out, for the paper's method has no answer: " + apart);
   const double middle = median(shares), in = 100.0 * inside / asked;
   const bool any = !shares.empty();
   const auto scenes_named = [&](const std::string& names) { return !any ? "nothing to compare" : names.empty() ? std::string("in all") : "not in: " + names; };
@@ -178,7 +184,7 @@ std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
                                     : "palpate left out an answer there") +
                left_out},
           {"at least 88 % of the truths lie in palpate's 95 % intervals (no interval: not inside)", in >= 88,
-           fmt::format("{:.0f} % of {}", in, asked)},
+           fmt::format("{:.0f} % of {}", in, asked) + by_law},
           {"palpate's finite elements are solved for at most a fifth as many load cases as the paper's method asks for simulations, "
            "each of which would be one without unit loads",
            any && dear.empty(),

@@ -27,11 +27,15 @@ struct Score {
   int most_load_cases = 0;         ///< in a seed: later ones take over what does not change
 };
 struct SceneScores {
-  Score paper, paper_coarse, palpate, other;
+  Score paper, paper_coarse, palpate;
+  /// Of a stuff whose law palpate has and the paper's method has not, `palpate` is that of this law, and this one of the law that both have.
+  Score palpate_with_the_papers_law;
   /// The two where the paper's method has an answer: what is compared. `apart` are those where it has none.
   Score paper_compared, palpate_compared;
   int apart = 0;
 };
+/// Palpate's answer that counts: with the law of the stuff, where it fits that as well.
+const MethodAnswer& counted(const TrialAnswer& trial);
 /// Of an object with regions, every site's E counts.
 SceneScores scores_of(const std::vector<TrialAnswer>& trials);
 

@@ -193,8 +193,8 @@ std::string score_table(const SceneAnswers& answers) {
   const SceneScores scores = scores_of(trials);
   if (!by_site && scores.paper_coarse.answers > 0) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
   html += score_row(by_site ? "the paper's method on palpate's mesh, by site" : "the paper's method on palpate's mesh", scores.paper, false);
-  html += score_row("palpate", scores.palpate, true);
-  if (!shown.other_law.empty()) html += score_row("palpate with the " + shown.other_law + " law", scores.other, true);
+  html += score_row(shown.other_law.empty() ? "palpate" : "palpate with the " + shown.other_law + " law, which counts", scores.palpate, true);
+  if (!shown.other_law.empty()) html += score_row("palpate with the law of the paper's method", scores.palpate_with_the_papers_law, true);
   return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm, spread: their standard "
                             "deviation. Without an interval nothing is inside. {}</p>\n",
                             trials.size(), trials.size() == 1 ? "" : "s", about_effort());

@@ -141,7 +141,8 @@ std::vector<int> without_held_poisson(std::vector<int> moving, const Optimum& op
 }  // namespace
 
 Doubts look_for_doubts(const Recording& recording, const Objective& objective, const Optimum& optimum, const Inputs& inputs,
-                       const FitOptions& options, double factor, double misfit, const OnProgress& progress) {
+                       const FitOptions& options, double factor, double misfit, const OnProgress& progress,
+                       std::shared_ptr<ForwardModel::Solved>* solved) {
   const ForwardModel& fitted = objective.model();
   Doubted more = doubted(recording, fitted.object().mesh);
   Inputs more_inputs = inputs;
@@ -152,7 +153,8 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   Unknowns unknowns;
   constexpr double between_ratios = 1e-3;  // of a linear body's answers: the test is no finer
   ForwardModel model(more.recording, object, unknowns, statics_options(recording, fitted.object(), options),
-                     nullptr, between_ratios);
+                     solved != nullptr ? *solved : nullptr, between_ratios);
+  if (solved != nullptr) *solved = model.solved();
   model.start_from(fitted);
   Objective wider(model, more_inputs, unknowns);
   const std::vector<int> at = places(objective.unknowns(), unknowns);

@@ -3,6 +3,7 @@
 // foot holds and its support stands firm, that the object is the same everywhere.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,7 +45,9 @@ struct Doubts {
 /// @param inputs  what `objective` was made of
 /// @param factor  information factor of robust rows
 /// @param misfit  chi2 per degree of freedom, where it is above one
+/// @param solved  used and filled, for another fit of the same object that is touched in the same way; nullptr: nothing is kept
 Doubts look_for_doubts(const Recording& recording, const Objective& objective, const Optimum& optimum, const Inputs& inputs,
-                       const FitOptions& options, double factor, double misfit, const OnProgress& progress);
+                       const FitOptions& options, double factor, double misfit, const OnProgress& progress,
+                       std::shared_ptr<ForwardModel::Solved>* solved = nullptr);
 
 }  // namespace palpate::estimation

@@ -60,7 +60,7 @@ struct ShapeDoubt;
 /// What a fit leaves for the next one of the same object, held and touched in the same way: what was solved for and does not
 /// depend on what was measured.
 struct FitMemory {
-  std::shared_ptr<ForwardModel::Solved> model, finer;
+  std::shared_ptr<ForwardModel::Solved> model, finer, doubted;
 };
 
 /// @throws Error naming the option that is out of range.

@@ -62,7 +62,7 @@ constexpr std::array<PaperScene, 8> table{{
      .figures = "5, 6",
      .paper_says = "One E is fitted whatever the foam does.",
      .differs = "The truth is the foam law (alpha = 4). One E is fitted with a law that does not soften so (Neo-Hookean); palpate then "
-                "fits the foam law as well, with alpha known. E is that of small strains throughout.",
+                "fits the foam law as well, with alpha known, and that answer counts. E is that of small strains throughout.",
      .object = "cube",
      .depth_sensor = "time_of_flight",
      .force_sensor = "schunk_ftcl_050",

@@ -96,6 +96,25 @@ TEST(PaperClaims, SeedsWithoutAnAnswerOfThePapersMethodDecideNothing) {
   EXPECT_FALSE(claims_of({scene("cube", {worse, unanswered})}).at(0).holds) << "a win by default must not make up for a loss";
 }
 
+// One E of a law that the stuff has not is no answer that palpate has to give; the page tells both, and which one counts.
+TEST(PaperScores, ALawThatPalpateFitsAsWellCounts) {
+  TrialAnswer foam = trial(13e3, answer(11.5e3, 11e3, 12e3, 90));
+  foam.other_law = "foam";
+  foam.other = answer(10.2e3, 9.8e3, 11e3, 70);
+  const SceneScores scores = scores_of({foam});
+  EXPECT_NEAR(scores.palpate.bias_percent, 100 * std::log(1.02), 1e-9);
+  EXPECT_EQ(scores.palpate.inside_95, 1);
+  EXPECT_NEAR(scores.palpate_compared.rms_percent, 100 * std::log(1.02), 1e-9);
+  EXPECT_EQ(scores.palpate.most_load_cases, 70);
+  EXPECT_NEAR(scores.palpate_with_the_papers_law.bias_percent, 100 * std::log(1.15), 1e-9);
+  EXPECT_EQ(scores.palpate_with_the_papers_law.inside_95, 0);
+  const std::string table = score_table(scene("foam9cm", {foam}));
+  EXPECT_NE(table.find("palpate with the foam law, which counts"), std::string::npos);
+  EXPECT_NE(table.find("palpate with the law of the paper's method"), std::string::npos);
+  for (const std::size_t claim : {0u, 1u, 2u})
+    EXPECT_NE(claims_of({scene("foam9cm", {foam})}).at(claim).found.find("palpate with the foam law in foam9cm"), std::string::npos);
+}
+
 TEST(PaperClaims, WithoutAnIntervalATruthIsNotInside) {
   const TrialAnswer good = trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90)), bare = trial(13e3, answer(10.4e3, nan, nan, 90));
   EXPECT_TRUE(claims_of({scene("cube", {good, good})}).at(2).holds);
