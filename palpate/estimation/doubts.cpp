@@ -142,7 +142,7 @@ std::vector<int> without_held_poisson(std::vector<int> moving, const Optimum& op
 
 Doubts look_for_doubts(const Recording& recording, const Objective& objective, const Optimum& optimum, const Inputs& inputs,
                        const FitOptions& options, double factor, double misfit, const OnProgress& progress,
-                       std::shared_ptr<ForwardModel::Solved>* solved) {
+                       SolveCount& took, std::shared_ptr<ForwardModel::Solved>* solved) {
   const ForwardModel& fitted = objective.model();
   Doubted more = doubted(recording, fitted.object().mesh);
   Inputs more_inputs = inputs;
@@ -155,6 +155,7 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   ForwardModel model(more.recording, object, unknowns, statics_options(recording, fitted.object(), options),
                      solved != nullptr ? *solved : nullptr, between_ratios);
   if (solved != nullptr) *solved = model.solved();
+  const CountsAtEnd counts(model, took);
   model.start_from(fitted);
   Objective wider(model, more_inputs, unknowns);
   const std::vector<int> at = places(objective.unknowns(), unknowns);

@@ -11,6 +11,7 @@
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/site_stiffness.hpp"
+#include "palpate/estimation/solve_count.hpp"
 #include "palpate/estimation/step_checks.hpp"
 
 namespace palpate::estimation {
@@ -45,9 +46,10 @@ struct Doubts {
 /// @param inputs  what `objective` was made of
 /// @param factor  information factor of robust rows
 /// @param misfit  chi2 per degree of freedom, where it is above one
+/// @param took    what the wider model is solved for is added
 /// @param solved  used and filled, for another fit of the same object that is touched in the same way; nullptr: nothing is kept
 Doubts look_for_doubts(const Recording& recording, const Objective& objective, const Optimum& optimum, const Inputs& inputs,
                        const FitOptions& options, double factor, double misfit, const OnProgress& progress,
-                       std::shared_ptr<ForwardModel::Solved>* solved = nullptr);
+                       SolveCount& took, std::shared_ptr<ForwardModel::Solved>* solved = nullptr);
 
 }  // namespace palpate::estimation

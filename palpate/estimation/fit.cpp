@@ -390,7 +390,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   std::optional<fem::Certificate> certificate;
   if ((options.cross_checks || options.find_slips) && optimum.termination == Termination::converged) {
     doubts = look_for_doubts(recording, objective, optimum, inputs, options, factor, std::max(1.0, summary.chi2_per_dof),
-                             progress, memory != nullptr ? &memory->doubted : nullptr);
+                             progress, elsewhere, memory != nullptr ? &memory->doubted : nullptr);
     if (doubts.unrecorded_slip && doubts.unrecorded_slip->p_value < very_rare) answer.slip = doubts.unrecorded_slip;
   }
   if (options.cross_checks && optimum.termination == Termination::converged) {
