@@ -62,6 +62,31 @@ std::vector<Stretch> stretches(const Objective& objective, const Optimum& optimu
   return all;
 }
 
+/// chi2 of an E that goes up or down with the load, from one added unknown: what a wrong law looks like, and a slip in a push of few steps.
+double of_drift(const Objective& objective, const Optimum& optimum, const std::vector<int>& moving, const MatrixX& fitted, const VectorX& slope,
+                double factor) {
+  const Index size = static_cast<Index>(moving.size());
+  const std::vector<double>& shares = objective.model().load_shares();
+  MatrixX information = MatrixX::Zero(size + 1, size + 1);
+  VectorX gradient = VectorX::Zero(size + 1);
+  information.topLeftCorner(size, size) = fitted;
+  gradient.head(size) = slope;
+  for (std::size_t s = 0; s < objective.model().step_count(); ++s) {
+    if (s >= objective.last_rows().size() || objective.last_rows()[s].empty()) continue;
+    const Evaluation said = objective.of_step(s, optimum.unknowns, optimum.loss);
+    const VectorX young = said.information(factor).col(log_young);
+    for (Index k = 0; k < size; ++k) information(k, size) += shares[s] * young(moving[static_cast<std::size_t>(k)]);
+    information(size, size) += shares[s] * shares[s] * young(log_young);
+    gradient(size) += shares[s] * said.gradient(log_young);
+  }
+  information.row(size).head(size) = information.col(size).head(size).transpose();
+  const Eigen::LDLT<MatrixX> factorised(information);
+  if (factorised.info() != Eigen::Success || !factorised.isPositive()) return 0;
+  const double asked = -factorised.solve(gradient)(size), variance = factorised.solve(VectorX(VectorX::Unit(size + 1, size)))(size);
+  const double chi2 = asked * asked / variance;
+  return std::isfinite(chi2) ? chi2 : 0;
+}
+
 }  // namespace
 
 bool after_slip(const Push& push, std::size_t step) { return slips_up_to(push, step) > 0; }
@@ -132,6 +157,9 @@ std::optional<Slip> find_slip(const Objective& objective, const Optimum& optimum
       best = slip;
     }
   }
+  // Three unknowns explain more than one by chance alone.
+  constexpr double for_more_numbers = 4;
+  if (best && best->chi2 < of_drift(objective, optimum, moving, fitted, slope, factor) / misfit + for_more_numbers) best.reset();
   if (best) best->p_value = std::min(1.0, best->p_value * places);
   return best;
 }

@@ -33,7 +33,8 @@ void free_contacts_after_slips(Recording& recording);
 void take_slips(const Recording& from, Recording& to);
 
 /// The slip that explains most, all that was fitted free to follow: contact and zero of the travel different from some step of a
-/// push on (score test of up to three added unknowns; an unknown that there is none of is left out).
+/// push on (score test of up to three added unknowns; an unknown that there is none of is left out). Nothing where an E that
+/// changes with the load explains about as much: then the law is wrong, or nobody can tell.
 /// @param objective  in which contacts may shift and travels have a zero, evaluated at `optimum`
 /// @param moving     what was fitted
 /// @param factor     information factor of robust rows
