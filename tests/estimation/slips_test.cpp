@@ -139,29 +139,29 @@ TEST(Slips, AreNotInventedWhereThereAreNone) {
   }
 }
 
-// What goes on with the load is no slip: a law that does not fit, here that of small strains under a quarter of E.
+// What goes on with the load is no slip: a law that does not fit, here that of small strains under up to a half of E.
 TEST(Slips, AreNotInventedForAWrongLaw) {
-  Recording deep = stated();
-  for (std::size_t s = 0; s < deep.pushes[0].steps.size(); ++s)
-    deep.pushes[0].steps[s].loads[0].force_n = Vec3(0, 0, -0.04 * static_cast<double>(s + 1) * young_pa * EIGEN_PI * 0.012 * 0.012);
-  for (unsigned seed = 1; seed <= 3; ++seed) {
-    const Slid push = slid(seed, 0, 0, deep, {"neo_hookean", 1});
+  for (const double step : {0.04, 0.06, 0.08}) {
+    Recording deep = stated();
+    for (std::size_t s = 0; s < deep.pushes[0].steps.size(); ++s)
+      deep.pushes[0].steps[s].loads[0].force_n = Vec3(0, 0, -step * static_cast<double>(s + 1) * young_pa * EIGEN_PI * 0.012 * 0.012);
+    const Slid push = slid(1, 0, 0, deep, {"neo_hookean", 1});
     const Identification answer = fitted(push.recording, push.inputs);
-    EXPECT_FALSE(answer.slip) << "seed " << seed << ": step " << answer.slip->step << ", chi2 " << answer.slip->chi2;
+    EXPECT_FALSE(answer.slip) << step << " of E a step: step " << answer.slip->step << ", chi2 " << answer.slip->chi2;
   }
 }
 
-// Nor is an object that is stiffer at the one place than at the other.
+// Nor is an object that is stiffer at the one place than at the other: with a factor of two and more slips would explain a part of it.
 TEST(Slips, AreNotInventedForAnObjectOfTwoStiffnesses) {
   Recording two = stated();
   two.pushes.push_back(two.pushes[0]);
   two.pushes[0].name = "left", two.pushes[1].name = "right";
   for (Step& step : two.pushes[0].steps) step.loads[0].contact_m.x() = 0.014;
   for (Step& step : two.pushes[1].steps) step.loads[0].contact_m.x() = 0.046;
-  for (unsigned seed = 1; seed <= 3; ++seed) {
-    const Slid push = slid(seed, 0, 0, two, {"linear", 1.3});
+  for (const double ratio : {1.3, 2.0, 4.0}) {
+    const Slid push = slid(2, 0, 0, two, {"linear", ratio});
     const Identification answer = fitted(push.recording, push.inputs);
-    EXPECT_FALSE(answer.slip) << "seed " << seed << ": push " << answer.slip->push << ", step " << answer.slip->step << ", chi2 " << answer.slip->chi2;
+    EXPECT_FALSE(answer.slip) << "ratio " << ratio << ": push " << answer.slip->push << ", step " << answer.slip->step << ", chi2 " << answer.slip->chi2;
     EXPECT_TRUE(says(answer, "not_homogeneous"));
   }
 }
