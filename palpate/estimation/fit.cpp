@@ -22,6 +22,7 @@
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
 #include "palpate/estimation/shape_error.hpp"
+#include "palpate/estimation/slips.hpp"
 #include "palpate/estimation/solve_count.hpp"
 #include "palpate/estimation/step_fits.hpp"
 #include "palpate/estimation/verdicts.hpp"
@@ -388,7 +389,13 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   CrossChecks checks;
   Doubts doubts;
   std::optional<fem::Certificate> certificate;
-  if ((options.cross_checks || options.find_slips) && optimum.termination == Termination::converged) {
+  // Without cross-checks all that may be doubted is asked only where the fit's own unknowns, which cost nothing, ask for a slip.
+  const auto asks_for_slip = [&] {
+    const std::optional<Slip> slip = find_slip(objective, optimum, moving, factor, std::max(1.0, summary.chi2_per_dof));
+    return slip && slip->p_value < rare;
+  };
+  const bool doubting = options.cross_checks || (options.find_slips && asks_for_slip());
+  if (doubting && optimum.termination == Termination::converged) {
     doubts = look_for_doubts(recording, objective, optimum, inputs, options, factor, std::max(1.0, summary.chi2_per_dof),
                              progress, elsewhere, memory != nullptr ? &memory->doubted : nullptr);
     if (doubts.unrecorded_slip && doubts.unrecorded_slip->p_value < very_rare) answer.slip = doubts.unrecorded_slip;

@@ -44,7 +44,8 @@ struct FitOptions {
   double poisson_start = 0.3;             ///< moved into the prior's range
   bool start_is_answer = false;           ///< of a coarser mesh, say: a misfit is then no reason to look elsewhere
   bool cross_checks = true;               ///< refit parts of the recording: per push, by load, held-out prediction
-  bool find_slips = false;                ///< looks for slips of a tool (slips.hpp) also without cross-checks
+  bool find_slips = false;                ///< slips of a tool (slips.hpp) also without cross-checks, where travel or an uncertain
+                                          ///< contact asks for one
   bool compare_laws = false;              ///< other laws are fitted too, also where E does not drift with the load (law_comparison.hpp)
   bool stresses = true;                   ///< von Mises stress of every step, for figures
   int threads = 1;
