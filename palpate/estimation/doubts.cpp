@@ -227,11 +227,8 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
     out.all.push_back(doubt);
   }
   std::stable_sort(out.all.begin(), out.all.end(), [](const Doubt& a, const Doubt& b) { return a.chi2 > b.chi2; });
-  // A slip has more numbers to explain with: by chance alone it explains as many more.
-  constexpr double for_more_numbers = 4;
-  // Nor is one asked for where places differ: far from a single E, what a linear step leaves of that looks like slips.
-  if (!apart) out.unrecorded_slip = find_slip(wider, there, moving, factor, misfit);
-  if (out.unrecorded_slip && !out.all.empty() && out.unrecorded_slip->chi2 < out.all.front().chi2 + for_more_numbers) out.unrecorded_slip.reset();
+  // No slip is asked for where places differ: far from a single E, what a linear step leaves of that looks like slips.
+  if (!apart) out.unrecorded_slip = find_slip(wider, there, moving, factor, misfit, out.all.empty() ? 0 : out.all.front().chi2);
   // And the other way round, where one of those is there all the same.
   if (apart && !out.all.empty() && out.all.front().p_value < very_rare) {
     ScoreTests with_doubt = as_stated;

@@ -21,7 +21,7 @@ int slips_up_to(const Push& push, std::size_t step) {
 
 /// What one step's rows say of all unknowns, priors left out of those that may slip.
 struct SaidByStep {
-  std::size_t s = 0, step = 0;
+  std::size_t step = 0;
   MatrixX information;  ///< all x those
   VectorX gradient;     ///< those
 };
@@ -50,7 +50,7 @@ std::vector<Stretch> stretches(const Objective& objective, const Optimum& optimu
     const bool loaded = std::any_of(loads.begin(), loads.end(), [](const Load& load) { return load.force_n && load.force_n->norm() > 0; });
     if (now.those.empty() || !loaded || s >= objective.last_rows().size() || objective.last_rows()[s].empty()) continue;
     const Evaluation said = objective.of_step(s, optimum.unknowns, optimum.loss);
-    SaidByStep one{s, at.step, said.information(factor)(Eigen::all, now.those), said.gradient(now.those)};
+    SaidByStep one{at.step, said.information(factor)(Eigen::all, now.those), said.gradient(now.those)};
     for (std::size_t j = 0; j < now.those.size(); ++j) {
       const int k = now.those[j];
       const double precision = std::pow(unknowns[k].prior_std, -2);
@@ -121,7 +121,7 @@ void take_slips(const Recording& from, Recording& to) {
 }
 
 std::optional<Slip> find_slip(const Objective& objective, const Optimum& optimum, const std::vector<int>& moving, double factor,
-                              double misfit) {
+                              double misfit, double otherwise_chi2) {
   const MatrixX fitted = optimum.evaluation.information(factor)(moving, moving);
   const VectorX slope = optimum.evaluation.gradient(moving);
   std::optional<Slip> best;
@@ -157,10 +157,11 @@ std::optional<Slip> find_slip(const Objective& objective, const Optimum& optimum
       best = slip;
     }
   }
-  // Three unknowns explain more than one by chance alone.
-  constexpr double for_more_numbers = 4;
-  if (best && best->chi2 < of_drift(objective, optimum, moving, fitted, slope, factor) / misfit + for_more_numbers) best.reset();
-  if (best) best->p_value = std::min(1.0, best->p_value * places);
+  if (!best) return best;
+  constexpr double for_more_numbers = 4;  // three unknowns explain more than one by chance alone
+  const double drift_chi2 = of_drift(objective, optimum, moving, fitted, slope, factor) / misfit;
+  if (best->chi2 < std::max(drift_chi2, otherwise_chi2) + for_more_numbers) return std::nullopt;
+  best->p_value = std::min(1.0, best->p_value * places);
   return best;
 }
 

@@ -39,8 +39,9 @@ void take_slips(const Recording& from, Recording& to);
 /// @param moving     what was fitted
 /// @param factor     information factor of robust rows
 /// @param misfit     chi2 per degree of freedom, where it is above one
+/// @param otherwise_chi2  what something else explains: a slip has to explain more
 std::optional<Slip> find_slip(const Objective& objective, const Optimum& optimum, const std::vector<int>& moving, double factor,
-                              double misfit);
+                              double misfit, double otherwise_chi2 = 0);
 
 /// Fits, and while that finds a slip (Identification::slip) fits again with it in the recording: twice at most. The verdict
 /// `contact_slipped` then says what was found and what E would be without.
