@@ -123,7 +123,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
                const OnProgress& progress, TrialAnswer& out) {
   const Takes all(out.total_s);
   const Watch truth;
-  lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress);
+  lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress, {}, shared != nullptr ? &shared->truths : nullptr);
   out.truth_s = truth.seconds();
   SharedModels of_this_seed;
   const bool same_mesh = trial.recording.rest.views.empty();  // in all seeds
@@ -159,7 +159,8 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
   const Prepared one = as_one(given);
   out.paper = asked([&] { return by_paper(one, fit, &shared->fine.paper, progress); });
-  if (!dear(given) && given.object.region_names.empty()) {  // sites are compared one by one, and not on those
+  // Sites are compared one by one, and not on those.
+  if (options.pictures && !dear(given) && given.object.region_names.empty()) {
     Recording coarse = trial.recording;
     choice.linear = true;
     out.paper_coarse =

@@ -78,7 +78,7 @@ struct TrialAnswer {
   Index tetrahedra = 0;
   double truth_s = 0, model_s = 0, total_s = 0;  ///< by the clock: the lab's pushes, the object's model, and all
   MethodAnswer paper = no_answer(), palpate = no_answer();
-  MethodAnswer paper_coarse = no_answer();    ///< the paper's method on linear tetrahedra of the same mesh; may be left out
+  MethodAnswer paper_coarse = no_answer();    ///< the paper's method on linear tetrahedra of the same mesh; only where asked for
   std::string other_law;                      ///< that palpate fitted as well; empty: none
   MethodAnswer other = no_answer();
   int left_out = 0;                           ///< samples whose loads are too high for the model (deep_loads.hpp): by neither method
@@ -95,13 +95,14 @@ struct TrialAnswer {
 struct TrialOptions {
   int every_sample = 0;    ///< alone: 1 = each, 2 = every second, ...; 0 = none
   int surface_points = 0;  ///< a side of the error surface; 0 = none
-  bool pictures = false;   ///< registrations, verdicts, and what ours says of an object with regions that it is not told of
+  bool pictures = false;   ///< registrations, verdicts, linear tetrahedra, and what ours says of an object with regions that it is not told of
   int threads = 1;
 };
 
 /// What all seeds of a scene share.
 struct SharedModels {
   SharedModel fine, linear, other;
+  lab::PressedMemory truths;
 };
 
 /// A method that ends with an error has no answer, and the other one answers all the same.

@@ -56,6 +56,9 @@ void add_push_thresholds(CLI::App& app, acquisition::PushOptions& push) {
       push.contact.noise_factor, "and at least this many standard deviations of the force in free air",
       number_from_zero());
   add(thresholds, "--contact-samples", push.contact.confirm_samples, "readings in a row that must say so", CLI::Range(1, 1000));
+  add(thresholds, "--obstacle-threshold", push.obstacle_threshold_n,
+      "change of the force on the way between pushes that means something is hit, at least, N; the contact threshold where that is more",
+      positive_number());
   add(thresholds, "--settling-rate", push.settling.rate_n_s, "a step is recorded once its force changes by less, N/s ...",
       positive_number());
   add(thresholds, "--settling-relative-rate", push.settling.relative_rate_s, "... or by less than this share of it a second, 1/s",

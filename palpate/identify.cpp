@@ -345,7 +345,9 @@ std::optional<estimation::UnseenSide> unseen_side(const Recording& given, const 
   Vec3 toward = Vec3::Zero();
   for (const DepthFrame& view : sensing::images_at_rest(given)) toward += (view.T_base_camera.translation() - middle).normalized();
   toward -= toward.dot(side.up) * side.up;
-  side.toward = toward.norm() > 1e-6 ? Vec3(toward.normalized()) : Vec3(side.up.unitOrthogonal());
+  constexpr double no_side = 0.2;  // of the way to the sensors
+  side.from_above = toward.norm() < no_side * static_cast<double>(std::max<std::size_t>(1, sensing::images_at_rest(given).size()));
+  side.toward = side.from_above ? Vec3(side.up.unitOrthogonal()) : Vec3(toward.normalized());
   for (const auto& touch : touched_places(given)) side.touched_m.push_back(touch.point_m);
   if (kept.empty()) return std::nullopt;
   return side;
@@ -362,12 +364,15 @@ estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share)
       std::vector<char> seen;
       auto object = build_simulated_object(recording, {}, completion, &seen);
       auto side = unseen_side(given, recording, seen);
+      // Seen from above there is no mirror: the planar one is the fitted one, and as many things narrow towards their foot.
+      if (side && side->from_above && completion == reconstruction::Completion::planar) continue;
+      const double likely = side && side->from_above && completion == reconstruction::Completion::tapered ? 1 : likelihood;
       const bool known = std::any_of(doubt.shapes.begin(), doubt.shapes.end(), [&](const auto& other) {
         return other.recording.rest.surface->vertices_m.rows() == recording.rest.surface->vertices_m.rows() &&
                other.recording.rest.surface->vertices_m == recording.rest.surface->vertices_m;
       });
       if (known) continue;
-      doubt.shapes.push_back({std::move(recording), std::move(object), completion == reconstruction::Completion::planar, likelihood, std::move(side)});
+      doubt.shapes.push_back({std::move(recording), std::move(object), completion == reconstruction::Completion::planar, likely, std::move(side), std::move(seen), hiding_plane(recording)});
     } catch (const Error&) {  // such a shape falls apart or encloses nothing: it is none that may stand there
     }
   }

@@ -37,7 +37,7 @@ bool GuardedMotion::is_felt(const RobotState& state) const {
   // A bias of the sensor turns with the hand; weight beside it may hide half of it.
   const double turns_n = 2 * turned_rad(state) * before_n_.norm();
   return (state.force_n - before_n_).norm() >
-         turns_n + std::max(options_.contact.threshold_n, options_.contact.noise_factor * std_n_);
+         turns_n + std::max({options_.obstacle_threshold_n, options_.contact.threshold_n, options_.contact.noise_factor * std_n_});
 }
 
 void GuardedMotion::watch(const Leaving& leaving, double gone_m) {

@@ -24,6 +24,7 @@ void check(const PushOptions& o) {
   need(o.clearance_m > 0, "clearance_m", "must be positive");
   need(o.tool_length_m >= 0, "tool_length_m", "must not be negative");
   need(o.look_every_m > 0 && o.look_every_m <= 0.05, "look_every_m", "must be positive and at most 50 mm");
+  need(o.obstacle_threshold_n > 0, "obstacle_threshold_n", "must be positive");
   need(o.blind_retreat_m > 0, "blind_retreat_m", "must be positive");
   need(o.approach_speed_m_s > 0, "approach_speed_m_s", "must be positive");
   need(o.push_speed_m_s > 0, "push_speed_m_s", "must be positive");

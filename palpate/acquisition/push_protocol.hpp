@@ -41,6 +41,9 @@ struct PushOptions {
   double clearance_m = 0.04;         ///< of the tip's middle around the object's box, on its way between pushes; more than the tool's radius
   double tool_length_m = 0.25;       ///< behind the tip: what keeps out of that box, too
   double look_every_m = 0.01;        ///< of the tip between two looks at the force, on its way
+  /// Change of the force on its way that means something is hit, at least; more where contact.threshold_n is. A wrist feels its own
+  /// stick turn by the arm's repeat error, of which a threshold for soft objects has no room.
+  double obstacle_threshold_n = 0.3;
   double blind_retreat_m = 0.15;     ///< along the tool, before and after a straight way past an object whose size nobody knows
   double approach_speed_m_s = 0.02;
   double push_speed_m_s = 0.005;

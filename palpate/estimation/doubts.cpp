@@ -153,7 +153,7 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   Unknowns unknowns;
   constexpr double between_ratios = 1e-3;  // of a linear body's answers: the test is no finer
   ForwardModel model(more.recording, object, unknowns, statics_options(recording, fitted.object(), options),
-                     solved != nullptr ? *solved : nullptr, between_ratios);
+                     solved != nullptr && *solved ? *solved : fitted.surface_modes(), between_ratios);
   if (solved != nullptr) *solved = model.solved();
   const CountsAtEnd counts(model, took);
   model.start_from(fitted);

@@ -62,6 +62,15 @@ bool ForwardModel::Solved::holds_for(const Solved& other) const {
          response_tolerance == other.response_tolerance && bodies.size() == other.bodies.size();
 }
 
+std::shared_ptr<ForwardModel::Solved> ForwardModel::surface_modes() const {
+  auto out = std::make_shared<Solved>();
+  out->vertices = solved_->vertices;
+  out->field = solved_->field;
+  out->field_std_m = solved_->field_std_m;
+  out->field_correlation_m = solved_->field_correlation_m;
+  return out;
+}
+
 ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, Unknowns& unknowns, fem::StaticsOptions options,
                            std::shared_ptr<Solved> earlier, double response_tolerance,
                            std::optional<std::pair<double, double>> poisson_expected)
@@ -99,10 +108,10 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     solved_->field_correlation_m = recording.rest.surface_correlation_m;
     if (earlier && earlier->field && earlier->vertices == object_.surface.vertex_count() &&
         earlier->field_std_m == solved_->field_std_m && earlier->field_correlation_m == solved_->field_correlation_m) {
-      solved_->field = std::move(earlier->field);
+      solved_->field = earlier->field;
     } else {
       solved_->field =
-          std::make_unique<SurfaceField>(object_.surface.rest(), solved_->field_std_m, solved_->field_correlation_m);
+          std::make_shared<const SurfaceField>(object_.surface.rest(), solved_->field_std_m, solved_->field_correlation_m);
     }
     field_ = solved_->field.get();
     field_unknown_ = unknowns.size();

@@ -107,6 +107,8 @@ class ForwardModel {
                std::optional<std::pair<double, double>> poisson_expected = std::nullopt);
   ~ForwardModel();
   const std::shared_ptr<Solved>& solved() const { return solved_; }
+  /// For a model of the same surface whose body is another: the modes of the rest surface's error alone, which take seconds.
+  std::shared_ptr<Solved> surface_modes() const;
 
   std::size_t step_count() const { return steps_.size(); }
   const Step& step(std::size_t s) const;

@@ -91,7 +91,7 @@ struct ForwardModel::Solved {
   bool holds_for(const Solved& other) const;
 
   std::vector<std::map<std::string, std::unique_ptr<Body>>> bodies;  ///< a worker (all together: linear), by driven tools
-  std::unique_ptr<SurfaceField> field;
+  std::shared_ptr<const SurfaceField> field;
   double field_std_m = 0, field_correlation_m = 0;
   std::shared_ptr<const geometry::TriangleTree> rest_tree;  ///< of the surface, once somebody asked
   std::shared_ptr<const std::vector<geometry::SurfaceEdge>> surface_edges;  ///< the same

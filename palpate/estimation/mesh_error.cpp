@@ -38,7 +38,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
     Unknowns unknowns;
     auto held = std::make_unique<Recording>(std::move(copy));
     // The change is a per cent itself: a few ratios are enough.
-    ForwardModel model(*held, std::move(body), unknowns, statics, kept ? *solved : nullptr, 1e-3);
+    ForwardModel model(*held, std::move(body), unknowns, statics, kept && *solved ? *solved : objective.model().surface_modes(), 1e-3);
     if (kept) *solved = model.solved();
     std::vector<StepPrediction> predicted(model.step_count());
     for (std::size_t s = 0; s < model.step_count(); ++s) {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/unseen_side.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -135,7 +136,11 @@ std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording
   SolveCount nobody_asks;
   SolveCount& count = solved != nullptr ? *solved : nobody_asks;
   double share = 1;
-  const Inputs few = thinned(inputs, share);
+  // The rim between seen and guessed is elsewhere on each shape: none is to be blamed for points on another's.
+  Inputs common = inputs;
+  for (const AlternativeShape& shape : doubt.shapes)
+    if (!shape.seen.empty()) drop_unseen(*shape.recording.rest.surface, shape.seen, shape.plane, common);
+  const Inputs few = thinned(common, share);
   Loss weighed = loss;  // fewer neighbours, less that they share
   weighed.rays.clear();
   weighed.surface_weight = std::min(1.0, loss.surface_weight / share / (loss.noise ? loss.noise->of_wide : 1));
@@ -162,10 +167,13 @@ std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording
   }
   // The others stay, as far as they agree with what was measured: a mean over models, each with what it does not know itself.
   std::vector<std::pair<const Answer*, double>> shapes;
+  double lowest = best->cost;
+  for (const auto& there : alternatives)
+    if (there && !there->strange) lowest = std::min(lowest, there->cost);
   const auto consider = [&](const Answer& shape, double likely) {
-    const double worse_by = (shape.cost - best->cost) / best->cost;
+    const double worse_by = (shape.cost - lowest) / lowest;
     if (&shape != best && ((shape.strange && !best->strange) || worse_by > worse)) return;
-    shapes.emplace_back(&shape, likely * std::min(1.0, std::exp(-worse_by / clearly_better_share)));
+    shapes.emplace_back(&shape, likely * std::exp(-worse_by / clearly_better_share));
   };
   consider(*fitted, 1);
   for (std::size_t s = 0; s < alternatives.size(); ++s)

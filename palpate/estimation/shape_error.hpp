@@ -20,6 +20,8 @@ struct AlternativeShape {
   bool as_likely = false;  ///< beforehand, as the one that is fitted: the pushes choose between them
   double likelihood = 0.3;  ///< beforehand, over that of the one that is fitted
   std::optional<UnseenSide> side = {};  ///< what of it may lean away; nothing: it is as it is
+  std::vector<char> seen = {};          ///< a vertex of its surface: 1 where a view showed it; empty: all
+  std::optional<Plane> plane = {};      ///< that hides what stands on it
 };
 
 struct ShapeEffect {
@@ -38,7 +40,7 @@ struct ShapeDoubt {
   std::optional<FootDoubt> foot;
 };
 
-/// Fits all shapes to the same few of the points, from the optimum on, and lets each lean as the pushes have it (unseen_modes.hpp). An
+/// Fits all shapes to the same few of the points, which all of them say were seen before, from the optimum on, and lets each lean as the pushes have it (unseen_modes.hpp). An
 /// alternative that is as likely and fits clearly better takes the place of the one that was fitted. A shape that wants force or travel of a
 /// push to be off by more than three of their standard deviations is ruled out, unless the best one wants it too; so is one with a tenth more
 /// of chi-square. The answer is the mean over the others, its covariance theirs and what is between them. Alternatives whose fit does not end

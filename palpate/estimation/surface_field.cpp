@@ -68,14 +68,19 @@ SurfaceField::SurfaceField(const TriMesh& rest, double std_m, double correlation
   }
   among.diagonal().array() += 1e-8 * std_m * std_m;
   const Eigen::LLT<MatrixX> root(among);
-  const MatrixX full = root.matrixL().solve(across.transpose()).transpose();
-  // A smooth field has few directions that matter: the principal ones over the vertices, until little is left.
-  const Eigen::SelfAdjointEigenSolver<MatrixX> principal(full.transpose() * full);
+  // A smooth field has few directions that matter: the principal ones over the vertices, until little is left. There are many
+  // vertices: what is done to each of them is done last, for what is kept.
+  MatrixX over_vertices = MatrixX::Zero(modes, modes);
+  over_vertices.selfadjointView<Eigen::Lower>().rankUpdate(across.transpose());
+  over_vertices.triangularView<Eigen::StrictlyUpper>() = over_vertices.transpose();
+  root.matrixL().solveInPlace(over_vertices);
+  root.matrixU().solveInPlace<Eigen::OnTheRight>(over_vertices);
+  const Eigen::SelfAdjointEigenSolver<MatrixX> principal(over_vertices);
   const VectorX& variance = principal.eigenvalues();  // rising
   double left = variance.sum() * (1 - kept);
   Index dropped = 0;
   while (dropped + 1 < modes && variance(dropped) < left) left -= variance(dropped++);
-  basis_ = full * principal.eigenvectors().rightCols(modes - dropped);
+  basis_ = across * root.matrixU().solve(principal.eigenvectors().rightCols(modes - dropped));
 }
 
 std::shared_ptr<const VectorX> SurfaceField::offset_m(const VectorX& coefficients) const {

@@ -15,10 +15,13 @@
 namespace palpate::estimation {
 namespace {
 
-/// Directions along the support over height and breadth, of a node at coordinates within minus one and one.
-Eigen::Matrix<double, 3, unseen_mode_count> directions(const Vec3& away, const Vec3& aside, double height, double breadth) {
+/// Directions along the support over height, breadth and depth, of a node at coordinates within minus one and one.
+Eigen::Matrix<double, 3, unseen_mode_count> directions(const UnseenSide& side, double height, double breadth, double depth) {
+  const Vec3 away = -side.toward, aside = side.up.cross(side.toward);
   Eigen::Matrix<double, 3, unseen_mode_count> out;
-  out << away, away * height, away * breadth, aside, aside * breadth, aside * breadth * height;
+  const Vec3 from_middle = away * depth + aside * breadth, outward = from_middle / std::max(1.0, from_middle.norm());
+  if (side.from_above) out << away, away * breadth, away * depth, aside, aside * breadth, aside * depth, outward;
+  else out << away, away * height, away * breadth, aside, aside * breadth, aside * breadth * height, outward;
   return out;
 }
 
@@ -31,13 +34,13 @@ std::vector<Eigen::Matrix<double, 3, unseen_mode_count>> motions(const TetMesh& 
     const double low = along.minCoeff(), high = along.maxCoeff();
     return high > low ? VectorX(2 * (along.array() - low) / (high - low) - 1) : VectorX::Zero(along.size());
   };
-  const VectorX height = within(side.up), breadth = within(aside);
+  const VectorX height = within(side.up), breadth = within(aside), depth = within(-side.toward);
   std::vector<Eigen::Matrix<double, 3, unseen_mode_count>> out;
   for (Index i = 0; i < mesh.nodes_m.rows(); ++i) {
     const Vec3 node = mesh.nodes_m.row(i);
     double far_m = std::sqrt(seen.closest(node).squared_distance_m2);
     for (const Vec3& touch : side.touched_m) far_m = std::min(far_m, (node - touch).norm());
-    out.push_back(unseen_lean_std * far_m * directions(-side.toward, aside, height(i), breadth(i)));
+    out.push_back(unseen_lean_std * far_m * directions(side, height(i), breadth(i), depth(i)));
   }
   // Edges stay as straight as they were: an element whose corners are in order is then in order.
   constexpr int edges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
@@ -115,7 +118,7 @@ std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& a
     body.mesh = mesh;
     body.material = "linear";
     Unknowns unknowns;
-    ForwardModel model(copy, std::move(body), unknowns, statics_options(copy, object, options), nullptr, 1e-3);
+    ForwardModel model(copy, std::move(body), unknowns, statics_options(copy, object, options), objective.model().surface_modes(), 1e-3);
     const CountsAtEnd counts(model, solved != nullptr ? *solved : nobody_asks);
     std::vector<StepPrediction> out(model.step_count());
     for (std::size_t s = 0; s < out.size(); ++s) {

@@ -15,19 +15,22 @@ struct UnseenSide {
   TriMesh seen;                   ///< triangles of the surface at rest that a view showed
   Vec3 toward = Vec3::UnitX();    ///< along the support, to where the object was seen from
   Vec3 up = Vec3::UnitZ();        ///< out of the support
+  bool from_above = false;        ///< it was seen from no side: `toward` is any
   std::vector<Vec3> touched_m;    ///< where tools met it: the surface is known there as well
 };
 
 /// What the unseen part may do: each moves it along the support in proportion to the distance from the nearest place that was seen
-/// or touched, so that these stay, and what stands on the support stays on it.
-inline constexpr int unseen_mode_count = 6;
+/// or touched, so that these stay, and what stands on the support stays on it. Of what was seen from a side: away and aside, evenly
+/// and growing with height or breadth. Of what was seen from above: everything linear in the support's plane. And of both: all around
+/// towards the middle, for what stands on a small foot.
+inline constexpr int unseen_mode_count = 7;
 
-/// One standard deviation of each: metres of motion a metre of that distance. All six together are 0.4 rms; mirrored backs of 11 bears,
+/// One standard deviation of each: metres of motion a metre of that distance. The first six together are 0.4 rms; mirrored backs of 11 bears,
 /// 12 cubes, 6 animals and 6 balls were off by 0.5, 0.2, 0.6 and 0.3 of that distance, flat ones by 0.6, 0.2, 0.7 and 0.5.
 inline constexpr double unseen_lean_std = 0.25;
 
 /// Of what the modes may do to E and nu before the pushes have said anything, this share stays: most of what those completions were off
-/// by is rougher than six modes, and no push tells of it.
+/// by is rougher than these modes, and no push tells of it.
 inline constexpr double unseen_rough_share = 0.5;
 
 /// @param amounts  of each mode, in standard deviations; halved until no element loses nine tenths of its volume, and handed back like that

@@ -29,6 +29,7 @@ LabObject draw(const std::string& name, const ObjectOptions& o, double stiffer =
   };
   need(!o.young_modulus_pa || *o.young_modulus_pa > 0, "young_modulus_pa", "must be positive");
   need(!o.poisson_ratio || (*o.poisson_ratio >= 0 && *o.poisson_ratio < 0.4999), "poisson_ratio", "must be in [0, 0.4999)");
+  need(o.poisson_steps >= 10, "poisson_steps", "must be at least 10");
   need(o.friction_coefficient > 0 && std::isfinite(o.friction_coefficient), "friction_coefficient", "must be positive");
   need(!o.albedo || (*o.albedo > 0 && *o.albedo <= 1), "albedo", "must be above 0 and at most 1");
   need(!o.texture || (*o.texture >= 0 && *o.texture <= 1), "texture", "must be between 0 and 1");
@@ -44,7 +45,7 @@ LabObject draw(const std::string& name, const ObjectOptions& o, double stiffer =
   object.foot_m = o.base_centre_m;
   object.material = o.material;
   object.young_modulus_pa = o.young_modulus_pa.value_or(std::round(young / 10) * 10);
-  object.poisson_ratio = o.poisson_ratio.value_or(std::round(poisson * 1000) / 1000);
+  object.poisson_ratio = o.poisson_ratio.value_or(std::round(poisson * o.poisson_steps) / o.poisson_steps);
   object.extra = o.extra;
   if (object.extra.empty())
     for (const auto& parameter : parameters) object.extra.push_back(parameter.initial);

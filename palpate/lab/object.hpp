@@ -29,7 +29,8 @@ struct PushSite {
 struct ObjectOptions {
   std::uint64_t seed = 1;
   std::optional<double> young_modulus_pa;            ///< drawn log-uniformly from 10 to 40 kPa
-  std::optional<double> poisson_ratio;               ///< drawn uniformly from 0.1 to 0.45
+  std::optional<double> poisson_ratio;               ///< drawn uniformly from 0.1 to 0.45 ...
+  int poisson_steps = 1000;                          ///< ... and rounded to a whole number of one in so many
   std::string material = "neo_hookean";              ///< a law of the solver's table
   std::vector<double> extra;                         ///< its further parameters, in the table's order; empty = their initial values
   double region_ratio = 1;                           ///< of an object with regions: their stiffnesses differ by this factor

@@ -88,17 +88,35 @@ double young_at(const LabObject& object, const PushSite& site) {
   return object.young_modulus_pa;
 }
 
-LabObject object_of(const PaperScene& scene, std::uint64_t seed) {
+ObjectOptions truth_of(const PaperScene& scene, std::uint64_t seed) {
   ObjectOptions truth;
   truth.seed = seed;
+  truth.poisson_steps = 20;
   if (!scene.apparent) truth.material = scene.true_law;  // a skin takes no law but its own
   if (scene.young_modulus_pa > 0) truth.young_modulus_pa = scene.young_modulus_pa;
   if (scene.poisson_ratio > 0) truth.poisson_ratio = scene.poisson_ratio;
   truth.region_ratio = scene.region_ratio;
-  LabObject object = scene.make != nullptr      ? scene.make(truth)
-                     : scene.surface != nullptr ? object_from_surface(*scene.surface, std::string(scene.object), truth)
-                                                : make_object(scene.object, truth);
+  return truth;
+}
+
+LabObject made(const PaperScene& scene, const ObjectOptions& truth) {
+  return scene.make != nullptr      ? scene.make(truth)
+         : scene.surface != nullptr ? object_from_surface(*scene.surface, std::string(scene.object), truth)
+                                    : make_object(scene.object, truth);
+}
+
+LabObject object_of(const PaperScene& scene, std::uint64_t seed, PressedMemory& memory) {
+  ObjectOptions truth = truth_of(scene, seed);
+  LabObject object = made(scene, truth);
   if (scene.sites > 0) object.sites.resize(static_cast<std::size_t>(scene.sites));
+  if (scene.apparent) return object;  // a skin under pressure does not scale with its E
+  const std::string what = std::string(scene.name) + " " + std::to_string(object.poisson_ratio);
+  object.press = [scene, truth, what, &memory, young_modulus_pa = object.young_modulus_pa](const PushSite& site) {
+    return memory.at(what, young_modulus_pa, site, [scene, truth](double pa, const PushSite& at) mutable {
+      truth.young_modulus_pa = pa;
+      return made(scene, truth).press(at);
+    });
+  };
   return object;
 }
 
@@ -134,13 +152,15 @@ void tilt_cameras(Recording& recording, double tilt_rad) {
 
 }  // namespace
 
-PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const OnProgress& progress, const PaperFault& fault) {
+PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const OnProgress& progress, const PaperFault& fault,
+                            PressedMemory* memory) {
+  PressedMemory of_this_seed;
   LabOptions options;
   options.seed = seed;
   options.depth = depth_sensor(scene.depth_sensor);
   options.force = force_sensor(scene.force_sensor);
   if (scene.force_sensor == "ideal") options.relaxation = 0;
-  LabObject object = object_of(scene, seed);
+  LabObject object = object_of(scene, seed, memory != nullptr ? *memory : of_this_seed);
   const PushSite again = object.sites.back();
   const PushSite unused = scene.unused ? place_on(object, "unused", Vec3(scene.unused->aim_m.data()), Vec3(scene.unused->direction.data()))
                                        : again;

@@ -12,6 +12,7 @@
 #include "palpate/core/progress.hpp"
 #include "palpate/core/recording.hpp"
 #include "palpate/lab/object.hpp"
+#include "palpate/lab/pressed_memory.hpp"
 
 namespace palpate::lab {
 
@@ -46,7 +47,7 @@ struct PaperScene {
   LabObject (*make)(const ObjectOptions&) = nullptr;
   const TriMesh* surface = nullptr;  ///< a user's, in place of `object`, which then is its name
   std::string_view depth_sensor, force_sensor;
-  double young_modulus_pa = 0, poisson_ratio = 0;  ///< 0: drawn from the seed
+  double young_modulus_pa = 0, poisson_ratio = 0;  ///< 0: drawn from the seed, nu in steps of 0.05
   double region_ratio = 1;                         ///< 1: one stiffness everywhere
   int sites = 0;                                   ///< of the object that are pushed; 0 = all
   PaperShape shape = PaperShape::given;
@@ -72,8 +73,11 @@ struct PaperFault {
   double said_radius = 1;                ///< of the pad, over the true one
 };
 
-/// Makes one seed of it. Stopped by its progress, the recording holds the pushes so far.
-PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const OnProgress& progress = {}, const PaperFault& fault = {});
+/// Makes one seed of it. Where nu is drawn, it is a multiple of 0.05: seeds of the same nu then share their true states.
+/// Stopped by its progress, the recording holds the pushes so far.
+/// @param memory  of true states, used and filled; nullptr: nothing is kept. The digits are the same
+PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const OnProgress& progress = {}, const PaperFault& fault = {},
+                            PressedMemory* memory = nullptr);
 
 /// The tables that --help, the page and the tests loop over.
 std::span<const PaperScene> paper_scenes();

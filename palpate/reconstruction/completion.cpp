@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "palpate/geometry/triangle_tree.hpp"
@@ -21,6 +22,7 @@ constexpr double faces_nobody = 0.1;        // resultant of the seen facets over
 constexpr double unchanged = 0.02;          // of the volume: the planar completion is then as good
 constexpr double close_cubes = 8;           // to a seen facet, in cubes: ...
 constexpr double anchor_cubes = 2.5;        // ... right behind it, the object was seen
+constexpr double nearer_share = 0.7;        // of how far a place is from what was seen: its image then knows more
 constexpr double touch_margin = 1.3;        // of a tool's radius
 constexpr double from_behind = 0.3;         // cosine between a push and the way to the sensors
 
@@ -43,6 +45,7 @@ class Completer {
     const geometry::WindingNumber winding(planar_);
     const geometry::TriangleTree to_seen(seen_);
     std::vector<char> hidden(cubes_.count()), planar(cubes_.count()), anchored(cubes_.count());
+    std::vector<double> from_seen_m(cubes_.count());
     std::size_t before = 0;
     cubes_.each([&](int x, int y, int z) {
       const Vec3 p = cubes_.middle(x, y, z);
@@ -52,6 +55,7 @@ class Completer {
       const double far = from.norm(), out = from.dot(area_of(seen_, c.triangle).normalized());
       // Close to what was seen, noise decides what is free; what lies outward of a facet is not hidden by it.
       hidden[k] = !options_.free(p) && !(far < close_cubes * cubes_.h && out > 0.5 * far);
+      from_seen_m[k] = far;
       anchored[k] = hidden[k] && far < anchor_cubes * cubes_.h && out < 0;
       const bool inside = winding(p) > 0.5;
       planar[k] = inside && hidden[k];
@@ -72,8 +76,9 @@ class Completer {
       });
     }
     // What one mirror says is handed to the next. What is known of the image counts: that it is free, or solid not only as
-    // the rim of what was hidden; where nothing is, what was there before.
-    for (const Mirror& mirror : mirrors()) {
+    // the rim of what was hidden; where nothing is, what was there before. Of several symmetries the one whose image is nearer to what
+    // was seen knows, for of a ball one says of one half of its back what is only guessed of the other.
+    const auto reflect = [&](const Mirror& mirror, std::vector<char>* only_guessed) {
       std::vector<char> next = out, still_open = open;
       cubes_.each([&](int x, int y, int z) {
         const std::size_t k = cubes_.at(x, y, z);
@@ -83,12 +88,23 @@ class Completer {
           const bool within = std::all_of(Cubes::sides.begin(), Cubes::sides.end(), [&](const auto& s) {
             return z + s[2] < 0 || value(out, mirror.of(p + cubes_.h * cubes_.axes * Vec3(s[0], s[1], s[2])));
           });
-          if (within || value(anchored, image)) next[k] = 1, still_open[k] = 0;
+          if (!within && !value(anchored, image)) return;
+          if (only_guessed && from_seen_m[std::size_t(cubes_.of(image))] > nearer_share * from_seen_m[k]) (*only_guessed)[k] = 1;
+          else next[k] = 1, still_open[k] = 0;
         } else if (cubes_.of(image) >= 0 && !value(hidden, image)) {
           next[k] = still_open[k] = 0;
         }
       });
       out.swap(next), open.swap(still_open);
+    };
+    if (options_.completion == Completion::mirrored) {
+      const MirrorSearch search(seen_, up_, cubes_.h, options_.free);
+      const std::vector<Mirror> symmetries = search.symmetries();
+      std::vector<char> guessed(cubes_.count());
+      for (const Mirror& mirror : symmetries) reflect(mirror, symmetries.size() > 1 ? &guessed : nullptr);
+      for (std::size_t k = 0; k < open.size(); ++k)
+        if (open[k] && guessed[k]) out[k] = 1, open[k] = 0;
+      if (const auto back = half_way_back(search)) reflect(*back, nullptr);
     }
     if (options_.completion == Completion::mirrored) close_grooves(hidden, open, out);
     for (const Touch& touch : options_.touched) reach_to(touch, hidden, anchored, out);
@@ -206,24 +222,20 @@ class Completer {
     });
   }
 
-  /// The surest first: a symmetry of what was seen, then the one that says how far back the object reaches.
-  std::vector<Mirror> mirrors() const {
-    std::vector<Mirror> out;
-    if (options_.completion != Completion::mirrored) return out;
-    const MirrorSearch search(seen_, up_, cubes_.h, options_.free);
-    if (const auto symmetry = search.symmetry()) out.push_back(*symmetry);
+  /// The mirror that says how far back the object reaches.
+  std::optional<Mirror> half_way_back(const MirrorSearch& search) const {
     std::vector<Vec3> touched_m;
     for (const Touch& touch : options_.touched)
       if (touch.inward.dot(toward_) > from_behind) touched_m.push_back(touch.point_m);
-    if (const auto back = search.half_way_back(toward_, behind_m_, touched_m)) out.push_back(*back);
-    return out;
+    return search.half_way_back(toward_, behind_m_, touched_m);
   }
 
-  /// Through half the height.
+  /// Through nearly half the height: at half of it a ball would stand on a point, and what is held has a foot (of 0.46 of the ball's breadth).
   Mirror upside_down() const {
+    constexpr double of_height = 0.47;
     double top = -1e300;
     for (Index t = 0; t < seen_.triangles.rows(); ++t) top = std::max(top, up_.dot(middle_of(seen_, t)));
-    return {up_, 0.5 * (top + cubes_.low.z())};
+    return {up_, cubes_.low.z() + of_height * (top - cubes_.low.z())};
   }
 
   std::vector<double> blur(const std::vector<double>& in) const {

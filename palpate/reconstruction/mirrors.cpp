@@ -20,6 +20,8 @@ constexpr Index few = 150, many = 800;
 constexpr double promising = 0.2, believed = 0.5;  // scores
 constexpr double finer_rad = 2 * radian;
 constexpr int finer_turns = 3, finer_steps = 6;
+constexpr double apart_rad = 29 * radian;  // of two that are found
+constexpr double nearly_as_sure = 0.2;     // in score: a square seen askew is no symmetry of a bear
 constexpr double margin = 0.2;  // of the seen part's width that lies beyond a plane of symmetry at least
 
 // Of the way back.
@@ -62,38 +64,49 @@ MirrorSearch::Judged MirrorSearch::judged(const Mirror& mirror, const Facets& fa
   return {good / all, bad / all, curvature > 0.01 * good ? std::abs(slope) / curvature / near_m() : 0};
 }
 
-std::optional<Mirror> MirrorSearch::symmetry() const {
+std::vector<Mirror> MirrorSearch::symmetries() const {
   const Vec3 side = up_.unitOrthogonal(), middle = seen_.vertices_m.colwise().mean().transpose();
-  std::optional<Mirror> found;
-  double most = promising;
-  const auto look = [&](const Mirror& mirror, const Facets& facets) {
+  using Scored = std::pair<double, Mirror>;
+  const auto look = [&](const Mirror& mirror, const Facets& facets, Scored& best) {
     const Judged by = judged(mirror, facets);
     const double score = by.good - price_of_free * by.bad - by.off;
-    if (score <= most) return;
-    most = score, found = mirror;
+    if (score > best.first) best = {score, mirror};
   };
   const Facets coarse = some(few), fine = some(many);
+  std::vector<Scored> rough;  // the best of each direction
   for (int k = 0; k < directions; ++k) {
     Mirror mirror;
     mirror.normal = Eigen::AngleAxisd(k * M_PI / directions, up_) * side;
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (const auto& [p, n] : coarse) low = std::min(low, mirror.normal.dot(p)), high = std::max(high, mirror.normal.dot(p));
     const double least = low + margin * (high - low), furthest = high - margin * (high - low);
-    for (mirror.offset_m = least; mirror.offset_m < furthest; mirror.offset_m += step_m_) look(mirror, coarse);
+    Scored best{promising, mirror};
+    for (mirror.offset_m = least; mirror.offset_m < furthest; mirror.offset_m += step_m_) look(mirror, coarse, best);
+    if (best.first > promising) rough.push_back(best);
   }
-  if (!found) return found;
-  const Mirror rough = *found;
-  found.reset(), most = believed;
-  const Vec3 on_it = middle - (rough.normal.dot(middle) - rough.offset_m) * rough.normal;  // where finer ones turn
-  for (int turn = -finer_turns; turn <= finer_turns; ++turn) {
-    Mirror mirror;
-    mirror.normal = Eigen::AngleAxisd(turn * finer_rad, up_) * rough.normal;
-    for (int step = -finer_steps; step <= finer_steps; ++step) {
-      mirror.offset_m = mirror.normal.dot(on_it) + 0.5 * step * step_m_;
-      look(mirror, fine);
+  const auto surest_first = [](const Scored& a, const Scored& b) { return a.first > b.first; };
+  std::stable_sort(rough.begin(), rough.end(), surest_first);
+  std::vector<Scored> found;
+  for (const auto& [score, about] : rough) {
+    const auto is_near = [&](const Scored& other) { return std::abs(other.second.normal.dot(about.normal)) > std::cos(apart_rad); };
+    if (std::any_of(found.begin(), found.end(), is_near)) continue;
+    Scored best{believed, about};
+    const Vec3 on_it = middle - (about.normal.dot(middle) - about.offset_m) * about.normal;  // where finer ones turn
+    for (int turn = -finer_turns; turn <= finer_turns; ++turn) {
+      Mirror mirror;
+      mirror.normal = Eigen::AngleAxisd(turn * finer_rad, up_) * about.normal;
+      for (int step = -finer_steps; step <= finer_steps; ++step) {
+        mirror.offset_m = mirror.normal.dot(on_it) + 0.5 * step * step_m_;
+        look(mirror, fine, best);
+      }
     }
+    if (best.first > believed) found.push_back(best);
   }
-  return found;
+  std::stable_sort(found.begin(), found.end(), surest_first);
+  std::vector<Mirror> out;
+  for (const auto& [score, mirror] : found)
+    if (score > found.front().first - nearly_as_sure) out.push_back(mirror);
+  return out;
 }
 
 double MirrorSearch::missed(const Mirror& mirror, const std::vector<Vec3>& touched_m) const {

@@ -27,8 +27,9 @@ class MirrorSearch {
   /// @param step_m  between two planes that are tried; images within two steps of a seen facet lie on it
   MirrorSearch(const TriMesh& seen, const Vec3& up, double step_m, const std::function<bool(const Vec3&)>& free);
 
-  /// The object's own symmetry: most of what was seen has its image in what was seen. Planes of all directions along `up`.
-  std::optional<Mirror> symmetry() const;
+  /// The object's own symmetries, the surest first: most of what was seen has its image in what was seen. Planes of all directions
+  /// along `up`, at least 30 degrees apart: an animal has one, a box has up to four, and of a ball's some are found.
+  std::vector<Mirror> symmetries() const;
   /// Half way to the unseen back: planes within 30 degrees of across `toward` (to the sensor, along the support), up to
   /// `behind_m` behind the front. Where the object's outline bends away, its rim is its own image; where a tool met the back
   /// (`touched_m`), its image lies on what was seen.

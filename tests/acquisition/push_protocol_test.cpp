@@ -343,6 +343,7 @@ TEST(PushProtocol, BadOptionsAndPlansAreRefused) {
   EXPECT_TRUE(refused([](O& o) { o.blind_retreat_m = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.approach_speed_m_s = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.push_speed_m_s = 0; }));
+  EXPECT_TRUE(refused([](O& o) { o.obstacle_threshold_n = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.sample_period_s = 0; }));
   EXPECT_TRUE(refused([](O& o) { o.free_air_samples = 1; }));
   EXPECT_TRUE(refused([](O& o) { o.settling_timeout_s = 0.1; }));

@@ -148,6 +148,28 @@ TEST(Transit, WhatStandsInTheWayStopsItAndItGoesBack) {
   }
 }
 
+// A threshold for an object of 1 kPa: the arm's repeat error, of which nothing is read, turns the stick's weight by as much.
+TEST(Transit, TheSticksOwnWeightIsNoObstacleWhereContactIsFelt) {
+  struct Turning : FreeRobot {
+    RobotState read() override {
+      RobotState state = FreeRobot::read();
+      state.force_n = Eigen::AngleAxisd(way.size() % 2 == 1 ? 3e-3 : 0, Vec3::UnitY()) * state.force_n;
+      return state;
+    }
+  };
+  for (const double obstacle_n : {PushOptions{}.obstacle_threshold_n, 0.005}) {
+    Turning robot;
+    robot.tip = before(plans()[1], 0.05);
+    PushPlan plan = plans()[2];
+    plan.around = robot.box;
+    PushOptions soft;
+    soft.contact.threshold_n = 0.005;
+    soft.obstacle_threshold_n = obstacle_n;
+    const PushReport report = run_push(robot, plan, soft, {}, [&] { return !robot.arrived; });
+    EXPECT_EQ(report.stop, obstacle_n < 0.1 ? StopReason::obstacle : StopReason::user) << report.message;
+  }
+}
+
 TEST(Transit, WithoutAShapeItGoesBackAndSaysSo) {
   FreeRobot robot;
   robot.tip = before(plans()[1], 0.05);

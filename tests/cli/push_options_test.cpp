@@ -40,7 +40,7 @@ TEST(PushOptionWords, EveryNumberArrives) {
        "--start-distance", "0.06", "--search-distance", "0.07", "--increment", "0.0008", "--clearance", "0.03", "--tool-length", "0.5", "--look-every", "0.02",
        "--blind-retreat", "0.31", "--approach-speed", "0.09", "--push-speed", "0.01",
        "--sample-period", "0.011", "--free-air-samples", "12", "--contact-threshold", "0.13", "--contact-noise-factor", "14",
-       "--contact-samples", "15", "--settling-rate", "0.16", "--settling-relative-rate", "0.17", "--settling-window", "0.18",
+       "--contact-samples", "15", "--obstacle-threshold", "0.155", "--settling-rate", "0.16", "--settling-relative-rate", "0.17", "--settling-window", "0.18",
        "--settling-timeout", "19", "--slip-sideways", "0.2", "--slip-friction", "0.21", "--slip-force-drop", "0.22", "--slip-deeper",
        "0.23", "--slip-least-force", "0.24", "--changed-share", "0.25"});
   EXPECT_EQ(p.force_limit_n, 1.5);
@@ -62,6 +62,7 @@ TEST(PushOptionWords, EveryNumberArrives) {
   EXPECT_EQ(p.contact.threshold_n, 0.13);
   EXPECT_EQ(p.contact.noise_factor, 14);
   EXPECT_EQ(p.contact.confirm_samples, 15);
+  EXPECT_EQ(p.obstacle_threshold_n, 0.155);
   EXPECT_EQ(p.settling.rate_n_s, 0.16);
   EXPECT_EQ(p.settling.relative_rate_s, 0.17);
   EXPECT_EQ(p.settling.window_s, 0.18);

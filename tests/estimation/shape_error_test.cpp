@@ -111,12 +111,16 @@ TEST(ShapeError, WhatOtherShapesTookIsInTheFitsCount) {
 
 TEST(ShapeError, AShapeThatIsLessLikelyBeforehandCountsLess) {
   const Seen data = seen();
-  ShapeDoubt doubt = doubt_of(data, 0, false);
-  fit_beside(doubt, data, 0.01);
-  ASSERT_TRUE(doubt.effect);
-  EXPECT_FALSE(doubt.effect->better);
-  const double apart = std::log(doubt.effect->softest_pa / doubt.effect->stiffest_pa);
-  EXPECT_NEAR(doubt.effect->move.log_young, 0.3 / 1.3 * apart, 1e-9);
+  for (const bool right : {true, false}) {  // is the one that was fitted
+    ShapeDoubt doubt = doubt_of(data, right ? 0.01 : 0, false);
+    fit_beside(doubt, data, right ? 0 : 0.01);
+    ASSERT_TRUE(doubt.effect);
+    EXPECT_FALSE(doubt.effect->better) << "it does not take the other's place";
+    const double apart = std::log(doubt.effect->stiffest_pa / doubt.effect->softest_pa), counts = std::abs(doubt.effect->move.log_young) / apart;
+    EXPECT_GT(counts, 0);
+    if (right) EXPECT_LT(counts, 0.3 / 1.3);
+    else EXPECT_GT(counts, 0.3 / 1.3) << "which agrees better";
+  }
 }
 
 TEST(ShapeError, AShapeThatContradictsTheTravelIsRuledOut) {

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/lab/pressed_memory.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace palpate::lab {
+
+struct PressedMemory::States {
+  struct State {
+    double force_n = 0, travel_m = 0;  // of an object of `one_pa`
+    Points vertices_m;
+  };
+  TriMesh rest;
+  Index nodes = 0;
+  std::vector<State> pressed;  // one after the other, each from the one before
+  int solved = 0;
+};
+
+namespace {
+
+constexpr double one_pa = 1e4;
+
+// Forces over E are the same for all but for rounding: nine digits of them are meant.
+double rounded(double value) {
+  int exponent = 0;
+  const double digits = std::frexp(value, &exponent);
+  constexpr int bits = 30;
+  return std::ldexp(std::round(std::ldexp(digits, bits)), exponent - bits);
+}
+
+class Remembered : public Pressed {
+ public:
+  Remembered(std::shared_ptr<PressedMemory::States> states, double young_modulus_pa, const PushSite& at, PressedMemory::Make make)
+      : states_(std::move(states)), young_modulus_pa_(young_modulus_pa), at_(at), make_(std::move(make)) {
+    if (states_->rest.vertices_m.rows() > 0) return;
+    object_ = make_(one_pa, at_);
+    states_->rest = object_->surface();
+    states_->nodes = object_->nodes();
+  }
+
+  void press(double force_n) override {
+    const double one_n = rounded(force_n / young_modulus_pa_ * one_pa);
+    auto& known = states_->pressed;
+    if (next_ < known.size() && known[next_].force_n == one_n) {
+      now_ = known[next_];
+    } else {
+      solve(one_n);
+      known.resize(next_);  // what was pressed otherwise
+      known.push_back(now_);
+    }
+    ++next_;
+    force_n_ = force_n;
+  }
+  double force_n() const override { return force_n_; }
+  double travel_m() const override { return now_.travel_m; }
+  TriMesh surface() const override {
+    TriMesh out = states_->rest;
+    if (next_ > 0) out.vertices_m = now_.vertices_m;
+    return out;
+  }
+  Index nodes() const override { return states_->nodes; }
+
+ private:
+  // On from the state before, to which an object that was not needed so far is brought first.
+  void solve(double one_n) {
+    if (!object_) object_ = make_(one_pa, at_);
+    for (; stands_ < next_; ++stands_) press_object(states_->pressed[stands_].force_n);
+    press_object(one_n);
+    stands_ = next_ + 1;
+    now_ = {one_n, object_->travel_m(), object_->surface().vertices_m};
+  }
+  void press_object(double one_n) {
+    object_->press(one_n);
+    ++states_->solved;
+  }
+
+  std::shared_ptr<PressedMemory::States> states_;
+  double young_modulus_pa_;
+  PushSite at_;
+  PressedMemory::Make make_;
+  std::unique_ptr<Pressed> object_;  // empty until something has to be solved for
+  std::size_t stands_ = 0;           // states that it has been through
+  std::size_t next_ = 0;             // states that have been asked for
+  PressedMemory::States::State now_;
+  double force_n_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Pressed> PressedMemory::at(const std::string& what, double young_modulus_pa, const PushSite& at, Make make) {
+  const auto& [c, d] = std::pair(at.contact_m, at.direction);
+  auto& states = known_[fmt::format("{} at {:.9f} {:.9f} {:.9f} along {:.9f} {:.9f} {:.9f}", what, c.x(), c.y(), c.z(), d.x(), d.y(), d.z())];
+  if (!states) states = std::make_shared<States>();
+  return std::make_unique<Remembered>(states, young_modulus_pa, at, std::move(make));
+}
+
+int PressedMemory::solved() const {
+  int count = 0;
+  for (const auto& [what, states] : known_) count += states->solved;
+  return count;
+}
+
+}  // namespace palpate::lab

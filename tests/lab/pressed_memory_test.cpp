@@ -1,0 +1,98 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// States that objects of like nu share, against objects that are pressed by themselves.
+#include "palpate/lab/pressed_memory.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "palpate/lab/paper_scenes.hpp"
+#include "palpate/lab/pressed_block.hpp"
+
+namespace palpate::lab {
+namespace {
+
+std::unique_ptr<Pressed> block(double young_modulus_pa, const PushSite&) {
+  PressedBlockOptions block;
+  block.cells_in_radius = 2;
+  block.cell_share = 2;
+  block.young_modulus_pa = young_modulus_pa;
+  return std::make_unique<PressedBlock>(block);
+}
+
+TEST(PressedMemory, OfAnotherEThereIsNothingToSolveFor) {
+  const PushSite top{"top", Vec3(0, 0, 0.1), -Vec3::UnitZ(), 1};
+  PressedMemory memory;
+  for (const double young_pa : {23e3, 7.7e3, 31e3}) {
+    const auto kept = memory.at("block", young_pa, top, block), alone = block(young_pa, top);
+    EXPECT_EQ(kept->nodes(), alone->nodes());
+    EXPECT_EQ(kept->surface().vertices_m, alone->surface().vertices_m);
+    for (const double share : {0.003, 0.012, 0.03}) {
+      const double force_n = share * young_pa * 0.01;
+      kept->press(force_n);
+      alone->press(force_n);
+      EXPECT_EQ(kept->force_n(), force_n);
+      EXPECT_NEAR(kept->travel_m(), alone->travel_m(), 1e-7 * alone->travel_m());
+      EXPECT_LT((kept->surface().vertices_m - alone->surface().vertices_m).cwiseAbs().maxCoeff(), 1e-7 * alone->travel_m());
+    }
+    EXPECT_EQ(memory.solved(), 3) << young_pa;
+  }
+}
+
+TEST(PressedMemory, GoesOnWhereTheOneBeforeEndedAndTakesAnotherWay) {
+  const PushSite top{"top", Vec3(0, 0, 0.1), -Vec3::UnitZ(), 1};
+  PressedMemory memory;
+  const auto pressed = [&](PressedMemory& by, double young_pa, const std::vector<double>& shares) {
+    auto object = by.at("block", young_pa, top, block);
+    for (const double share : shares) object->press(share * young_pa);
+    return object;
+  };
+  pressed(memory, 12e3, {3e-5, 1e-4});
+  const auto deeper = pressed(memory, 17e3, {3e-5, 1e-4, 2e-4});
+  EXPECT_EQ(memory.solved(), 2 + 3) << "the new object is brought to where the other one stood";
+  const auto otherwise = pressed(memory, 9e3, {3e-5, 1.5e-4, 2e-4});
+  for (const auto& [one, shares] : {std::pair(deeper.get(), std::vector<double>{3e-5, 1e-4, 2e-4}),
+                                    std::pair(otherwise.get(), std::vector<double>{3e-5, 1.5e-4, 2e-4})}) {
+    PressedMemory fresh;
+    const auto same = pressed(fresh, 25e3, shares);
+    EXPECT_EQ(one->travel_m(), same->travel_m()) << "to the last digit";
+    EXPECT_EQ(one->surface().vertices_m, same->surface().vertices_m);
+  }
+}
+
+TEST(PressedMemory, ARecordingIsTheSameWithAndWithoutIt) {
+  const PaperScene& scene = paper_scene("cube");
+  PressedMemory memory;
+  const PaperTrial first = make_paper_trial(scene, 1, {}, {}, &memory);
+  const int solved = memory.solved();
+  EXPECT_GT(solved, 0);
+  std::uint64_t seed = 2;
+  const auto poisson_of = [&](std::uint64_t of) {
+    return make_paper_trial(scene, of, [](std::string_view, double) { return false; }).poisson_ratio;
+  };
+  while (poisson_of(seed) != first.poisson_ratio) ++seed;
+  const PaperTrial by_memory = make_paper_trial(scene, seed, {}, {}, &memory), alone = make_paper_trial(scene, seed);
+  EXPECT_EQ(memory.solved(), solved);
+  EXPECT_NE(alone.young_modulus_pa, first.young_modulus_pa);
+  const Push &a = by_memory.recording.pushes.at(0), &b = alone.recording.pushes.at(0);
+  ASSERT_EQ(a.steps.size(), b.steps.size());
+  for (std::size_t s = 0; s < a.steps.size(); ++s) {
+    ASSERT_EQ(a.steps[s].observations.size(), b.steps[s].observations.size());
+    for (std::size_t k = 0; k < a.steps[s].observations.size(); ++k) {
+      if (const auto* image = std::get_if<DepthFrame>(&a.steps[s].observations[k])) {
+        EXPECT_TRUE(image->depth_m == std::get<DepthFrame>(b.steps[s].observations[k]).depth_m) << s;
+      }
+      if (const auto* travel = std::get_if<ToolTravel>(&a.steps[s].observations[k])) {
+        EXPECT_EQ(travel->travel_m, std::get<ToolTravel>(b.steps[s].observations[k]).travel_m) << s;
+      }
+    }
+    if (!a.steps[s].loads.empty()) {
+      EXPECT_EQ(*a.steps[s].loads[0].force_n, *b.steps[s].loads[0].force_n) << s;
+    }
+  }
+  EXPECT_EQ(by_memory.unused.steps.size(), alone.unused.steps.size());
+}
+
+}  // namespace
+}  // namespace palpate::lab
