@@ -78,6 +78,31 @@ TEST(Completion, MirrorFindsTheBackOfABallAndOfABox) {
   }
 }
 
+Seen look_from(const std::shared_ptr<const geometry::TriangleTree>& tree, double around_degrees, double above_degrees);
+
+// From above and from one side the flank that bends in is seen on that side alone. A ball has a symmetry in every upright plane, and one
+// that says of one half of its back what is only guessed of the other says nothing.
+TEST(Completion, SymmetriesCarryASeenFlankAllAround) {
+  const auto tree = std::make_shared<const geometry::TriangleTree>(shapes::sphere(0.06, 5, Vec3(0, 0, 0.052)));
+  Seen seen = look_from(tree, -115, 39);
+  const Seen above = look_from(tree, 0, 87);
+  const auto below = [](const Points& a, const Points& b) {
+    Points both(a.rows() + b.rows(), 3);
+    both << a, b;
+    return both;
+  };
+  seen.cloud.points_m = below(seen.cloud.points_m, above.cloud.points_m);
+  seen.cloud.normals = below(seen.cloud.normals, above.cloud.normals);
+  seen.fuse.free = [side = seen.fuse.free, top = above.fuse.free](const Vec3& p) { return side(p) || top(p); };
+  const TriMesh surface = complete_as(Completion::mirrored, seen).model.surface;
+  constexpr double height_m = 0.021, band_m = 0.003;
+  const double true_m = std::sqrt(0.06 * 0.06 - std::pow(height_m - 0.052, 2));
+  double widest_m = 0;
+  for (Index v = 0; v < surface.vertices_m.rows(); ++v)
+    if (std::abs(surface.vertices_m(v, 2) - height_m) < band_m) widest_m = std::max(widest_m, surface.vertices_m.row(v).head<2>().norm());
+  EXPECT_NEAR(widest_m / true_m, 1, 0.1);  // straight down it would be 1.17
+}
+
 /// The lab's bear over the origin, facing -y.
 TriMesh bear() {
   TriMesh surface = lab::make_object("bear").surface;
