@@ -93,7 +93,7 @@ void answer_samples(const Prepared& given, int every, const estimation::FitOptio
 
 /// An object with regions: the paper's method answers for each site by its push alone, ours with all regions at once.
 std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& trial, const Identification& ours,
-                                 const estimation::FitOptions& options, TrialAnswer& out, const OnProgress& progress) {
+                                 const estimation::FitOptions& options, SharedModels& shared, TrialAnswer& out, const OnProgress& progress) {
   std::vector<double> by_region;
   for (const std::string& name : given.object.region_names) {
     for (const Parameter& young : ours.parameters)
@@ -104,7 +104,9 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
     SiteAnswer site;
     site.site = given.recording.pushes[p].site;
     site.young_modulus_pa = trial.site_young_pa[p];
-    site.paper = asked([&] { return by_paper(part_of(one, [&](std::size_t q, std::size_t) { return q == p; }), options, nullptr, progress); });
+    site.paper = asked([&] {
+      return by_paper(part_of(one, [&](std::size_t q, std::size_t) { return q == p; }), options, &shared.sites[site.site], progress);
+    });
     site.palpate = out.palpate;
     for (const Parameter& young : ours.parameters) {
       if (young.name != "young_modulus" || young.region != site.site) continue;
@@ -175,7 +177,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
 
   std::vector<double> by_region;
   if (!given.object.region_names.empty() && ours.parameters.size() > 2)
-    by_region = answer_sites(given, trial, ours, fit, out, progress);
+    by_region = answer_sites(given, trial, ours, fit, *shared, out, progress);
   predict_unused(given, other ? &*other : nullptr, trial, by_region, fit, *shared, out);
   if (options.every_sample > 0) answer_samples(one, options.every_sample, fit, out, progress);
   if (options.pictures && by_region.empty()) {

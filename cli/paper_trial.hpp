@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -102,6 +103,7 @@ struct TrialOptions {
 /// What all seeds of a scene share.
 struct SharedModels {
   SharedModel fine, linear, other;
+  std::map<std::string, estimation::FitMemory> sites;  ///< of the paper's method, which answers from one push alone
   lab::PressedMemory truths;
 };
 

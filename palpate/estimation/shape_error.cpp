@@ -167,13 +167,10 @@ std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording
   }
   // The others stay, as far as they agree with what was measured: a mean over models, each with what it does not know itself.
   std::vector<std::pair<const Answer*, double>> shapes;
-  double lowest = best->cost;
-  for (const auto& there : alternatives)
-    if (there && !there->strange) lowest = std::min(lowest, there->cost);
   const auto consider = [&](const Answer& shape, double likely) {
-    const double worse_by = (shape.cost - lowest) / lowest;
+    const double worse_by = (shape.cost - best->cost) / best->cost;
     if (&shape != best && ((shape.strange && !best->strange) || worse_by > worse)) return;
-    shapes.emplace_back(&shape, likely * std::exp(-worse_by / clearly_better_share));
+    shapes.emplace_back(&shape, likely * std::min(1.0, std::exp(-worse_by / clearly_better_share)));
   };
   consider(*fitted, 1);
   for (std::size_t s = 0; s < alternatives.size(); ++s)
