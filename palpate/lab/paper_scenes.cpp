@@ -159,7 +159,10 @@ PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const O
   options.seed = seed;
   options.depth = depth_sensor(scene.depth_sensor);
   options.force = force_sensor(scene.force_sensor);
-  if (scene.force_sensor == "ideal") options.relaxation = 0;
+  if (scene.force_sensor == "ideal") {  // the paper simulated: no arm's repeat error turns a stick's weight
+    options.relaxation = 0;
+    options.force.bias_n = options.force.tool_mass_kg = 0;
+  }
   LabObject object = object_of(scene, seed, memory != nullptr ? *memory : of_this_seed);
   const PushSite again = object.sites.back();
   const PushSite unused = scene.unused ? place_on(object, "unused", Vec3(scene.unused->aim_m.data()), Vec3(scene.unused->direction.data()))

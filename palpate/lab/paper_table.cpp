@@ -17,7 +17,7 @@ constexpr std::array<PaperScene, 8> table{{
      .title = "Simulated test on a four-legged animal",
      .figures = "3, 4",
      .paper_says = "E = 1000 N/m2 and nu = 0.3 are found again; the error over (E, nu) is convex around them.",
-     .differs = "The animal is the lab's own; the pad is soft and 15 mm in radius, the paper pushed at a point.",
+     .differs = "The animal is the lab's own; the pad is soft and 15 mm in radius, the paper pushed at a point. The stick weighs nothing.",
      .object = "animal",
      .depth_sensor = "realsense_l515",
      .force_sensor = "ideal",
