@@ -372,7 +372,8 @@ estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share)
                other.recording.rest.surface->vertices_m == recording.rest.surface->vertices_m;
       });
       if (known) continue;
-      doubt.shapes.push_back({std::move(recording), std::move(object), completion == reconstruction::Completion::planar, likely, std::move(side), std::move(seen), hiding_plane(recording)});
+      const auto plane = hiding_plane(recording);  // before it is moved away
+      doubt.shapes.push_back({std::move(recording), std::move(object), completion == reconstruction::Completion::planar, likely, std::move(side), std::move(seen), plane});
     } catch (const Error&) {  // such a shape falls apart or encloses nothing: it is none that may stand there
     }
   }
