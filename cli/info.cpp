@@ -145,6 +145,7 @@ json described(const Recording& recording, const std::vector<io::Problem>& probl
                      {"poisson_range", json::array({model.poisson_lower, model.poisson_upper})},
                      {"poisson_fixed", model.poisson_fixed ? json(*model.poisson_fixed) : json(nullptr)}};
   result["force_scale_std"] = recording.force_scale_std;
+  result["force_cross_talk_std"] = recording.force_cross_talk_std;
   result["time_offset_std_s"] = recording.time_offset_std_s;
   result["pushes"] = json::array();
   for (const Push& push : recording.pushes) result["pushes"].push_back(push_of(push));

@@ -127,6 +127,7 @@ void must_be_same_scene(const Recording& there, const Recording& now, bool by_vi
   for (std::size_t i = 0; i < there.regions.size(); ++i) as.same("region", there.regions[i].name, now.regions[i].name);
   compare_robot(as, there, now);
   as.same("force_scale_std", there.force_scale_std, now.force_scale_std);
+  as.same("force_cross_talk_std", there.force_cross_talk_std, now.force_cross_talk_std);
   as.same("model's material", there.model.material, now.model.material);
 }
 

@@ -240,6 +240,7 @@ struct Recording {
   double density_kg_m3 = 0;  ///< 0 = unknown and not needed
   double density_std_kg_m3 = 0;
   double force_scale_std = 0;  ///< prior of the sensor's common scale error (0.01 = 1 %)
+  double force_cross_talk_std = 0;  ///< of what it reads across a push, over the force along it (0.01 = 1 %): each push's, each way across
   double time_offset_std_s = 0;  ///< prior of what is left between the clocks of force and camera
   ModelDefaults model;
   std::vector<Push> pushes;

@@ -56,6 +56,13 @@ class Exact {
         add("force_tare", fmt::format("{:g} % of the push's highest force", 100 * errors_.force_share), "force_tare_std_n",
             {{name + axis}, size_n});
     }
+    if (stated_.force_cross_talk_std == 0 && any) {
+      more_.force_cross_talk_std = errors_.force_share;
+      for (const Push& push : stated_.pushes)
+        for (const char* axis : {"_1", "_2"})
+          add("force_cross_talk", fmt::format("{:g} % of the force along the push", 100 * errors_.force_share), "force_cross_talk_std",
+              {{"force_cross_talk[" + push.name + "]" + axis}, errors_.force_share});
+    }
     if (stated_.force_scale_std > 0 || !any) return;
     more_.force_scale_std = errors_.force_share;
     add("force_scale", fmt::format("{:g} %", 100 * errors_.force_share), "force_scale_std", {{"force_scale"}, errors_.force_share});

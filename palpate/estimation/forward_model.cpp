@@ -162,6 +162,11 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     tare_axis_.push_back(axis);
     tare_.push_back(unknowns.add_block("force_tare" + in_push, "N", push.force_tare_std_n,
                                        axis.norm() > 0 ? std::vector<std::string>{""} : xyz));
+    // A sensor that reads one axis reads nothing across it.
+    const bool reads_across = axis.norm() == 0 && std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) {
+      return std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) { return load.force_n && load.force_n->norm() > 0; });
+    });
+    cross_talk_.push_back(reads_across ? unknowns.add_block("force_cross_talk" + in_push, "1", recording.force_cross_talk_std, {"_1", "_2"}) : -1);
     const double offset_std_m =
         driven_tools(push).empty() ? 0 : push.travel_offset_std_m;  // else it belongs to the readings
     travel_offset_.push_back(unknowns.add_block("travel_offset" + in_push, "m", offset_std_m, {""}));

@@ -289,6 +289,7 @@ class ForwardModel {
   std::vector<int> spread_;                      // a support that spreads: the unknown
   std::vector<double> effort_;                   // a step: its load as a share of the highest
   std::vector<int> tare_, travel_offset_;        // a push: first of three, the one; or -1
+  std::vector<int> cross_talk_;                  // a push: first of two unknowns, or -1
   std::vector<Vec3> tare_axis_;                  // a push: zero = three unknowns, else one along this axis
   int force_scale_ = -1, time_offset_ = -1, density_ = -1;
   std::map<std::string, int> compliance_;  // a tool whose compliance is not exactly known

@@ -210,12 +210,21 @@ ForwardModel::TrueForce ForwardModel::true_force(std::size_t s, std::size_t l, c
   Vec3 measured = load.force_n.value_or(Vec3::Zero());
   if (error >= 0) measured += unknowns.segment<3>(error);
   if (time_offset_ >= 0) measured += unknowns(time_offset_) * load.force_rate_n_s;
+  // What the sensor reads across of what acts along: a strain gauge's axes are not quite square.
+  const int cross = cross_talk_[p];
+  const Vec3 along = load.direction.normalized();
+  const std::array<Vec3, 2> across = tangents(along);
+  const Vec3 leaks = cross >= 0 ? Vec3(unknowns(cross) * across[0] + unknowns(cross + 1) * across[1]) : Vec3(Vec3::Zero());
+  const double read_along_n = along.dot(measured);
+  const auto straightened = [&](const Vec3& read) { return Vec3(read - along.dot(read) * leaks); };
+  measured = straightened(measured);
   const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
   TrueForce out;
   out.force_n = scale * measured;
-  for (int k = 0; error >= 0 && k < 3; ++k) out.derivatives.emplace_back(error + k, scale * Vec3::Unit(k));
+  for (int k = 0; error >= 0 && k < 3; ++k) out.derivatives.emplace_back(error + k, scale * straightened(Vec3::Unit(k)));
   if (force_scale_ >= 0) out.derivatives.emplace_back(force_scale_, measured);
-  if (time_offset_ >= 0) out.derivatives.emplace_back(time_offset_, scale * load.force_rate_n_s);
+  if (time_offset_ >= 0) out.derivatives.emplace_back(time_offset_, scale * straightened(load.force_rate_n_s));
+  for (int k = 0; cross >= 0 && k < 2; ++k) out.derivatives.emplace_back(cross + k, -scale * read_along_n * across[static_cast<std::size_t>(k)]);
   if (tare_[p] < 0) return out;
   const bool one_axis = tare_axis_[p].norm() > 0;
   for (int k = 0; k < (one_axis ? 1 : 3); ++k) {

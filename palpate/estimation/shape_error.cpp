@@ -58,7 +58,8 @@ AnswerShift shift_of(const VectorX& change) {
 }
 
 bool about_instruments(const std::string& name) {
-  return name.starts_with("travel_zero") || name.starts_with("travel_offset") || name.starts_with("force_tare") || name.starts_with("force_scale");
+  return name.starts_with("travel_zero") || name.starts_with("travel_offset") || name.starts_with("force_tare") || name.starts_with("force_scale") ||
+         name.starts_with("force_cross_talk");
 }
 
 /// A fit of one shape to few of the rays, and what leaning its unseen side does to it. A lean changes what it does itself (a thin

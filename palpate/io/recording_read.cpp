@@ -85,6 +85,7 @@ void read_object(YamlKeys& keys, RecordingContext& context) {
   recording.description = keys.text_or("description", "");
   recording.accept_size = keys.boolean_or("accept_size", false);
   recording.force_scale_std = keys.within_or("force_scale_std", 0, ranges::share_std);
+  recording.force_cross_talk_std = keys.within_or("force_cross_talk_std", 0, ranges::share_std);
   recording.time_offset_std_s = keys.within_or("time_offset_std_s", 0, ranges::clock_std);
   read_density(keys, recording);
   read_environment(keys, recording);

@@ -296,6 +296,7 @@ void RecordingWriter::Pages::set_head(const Recording& recording) {
   if (!recording.tools.empty()) head += "tools:\n";
   for (std::size_t i = 0; i < recording.tools.size(); ++i) head += "  - " + tool_text(recording.tools[i], i + 1) + "\n";
   head += fmt::format("force_scale_std: {}\n", recording.force_scale_std);
+  if (recording.force_cross_talk_std > 0) head += fmt::format("force_cross_talk_std: {}\n", recording.force_cross_talk_std);
   if (recording.time_offset_std_s != 0) head += fmt::format("time_offset_std_s: {}\n", recording.time_offset_std_s);
   if (recording.robot) {
     std::string joints;

@@ -158,6 +158,7 @@ Recording LabRobot::scene() const {
   for (const TrueRegion& one : lab.object.regions) recording.regions.push_back(one.region);
   recording.environment.planes = lab.planes;
   recording.force_scale_std = lab.options.force.scale_std;
+  recording.force_cross_talk_std = lab.options.force.cross_talk_std;
   Tool pad;
   pad.name = "stick";
   pad.shape = ToolShape::disc;

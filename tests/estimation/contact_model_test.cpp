@@ -98,6 +98,7 @@ std::vector<Scene> scenes() {
     r.pushes = {push_of("down", {force_of("pad", Vec3(0, 0, -2), end)})};
     r.pushes[0].steps[0].loads[0].contact_std_m = 1e-3;
     r.force_scale_std = 0.02;
+    r.force_cross_talk_std = 0.015;
     out.push_back({"smooth_table", "neo_hookean", r, 0});
     // What is measured sideways is an error: nothing holds the block that way.
     r.pushes[0].steps[0].loads[0].force_n = Vec3(0.03, -0.02, -2);

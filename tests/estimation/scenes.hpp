@@ -108,6 +108,7 @@ inline Recording clamped_block(const TetMesh& mesh, bool weight = true) {
     recording.density_std_kg_m3 = 50;
   }
   recording.force_scale_std = 0.02;
+  recording.force_cross_talk_std = 0.015;
   recording.time_offset_std_s = 0.02;
 
   Tool tip;

@@ -25,6 +25,7 @@ inline Recording made_up() {
   recording.tools.push_back(stick);
   recording.density_kg_m3 = 30;
   recording.force_scale_std = 0.01;
+  recording.force_cross_talk_std = 0.015;
   for (int p = 0; p < 2; ++p) {
     Push push;
     push.name = "push " + std::to_string(p + 1);

@@ -123,6 +123,7 @@ void expect_same_object(const Recording& a, const Recording& b) {
   }
   EXPECT_EQ(a.density_kg_m3, b.density_kg_m3);
   EXPECT_EQ(a.force_scale_std, b.force_scale_std);
+  EXPECT_EQ(a.force_cross_talk_std, b.force_cross_talk_std);
   EXPECT_EQ(a.time_offset_std_s, b.time_offset_std_s);
   EXPECT_EQ(a.model.mesh, b.model.mesh);
   EXPECT_EQ(a.model.element, b.model.element);
