@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -44,6 +45,7 @@ class Scene {
  public:
   static constexpr double sigma_m = 2e-3;
   static constexpr int levels = 6, points = 2000, calculix_points = 9;
+  static constexpr int places = 20;  ///< of contacts that moved: one after the other serves a seed
   /// Truths are solved by CalculiX (C3D10) instead of our own solver, on the same mesh of theirs. May change between draws.
   bool by_calculix = false;
   double noise = 1;  ///< of the depths, in sigma_m: 0 shows what meshes do to the answer
@@ -84,12 +86,7 @@ class Scene {
     const TriMesh seen = finer_near(spec_.surface, spec_.contact_m, 2 * spec_.pad_radius_m, 1.2e-3, 6e-3);
     surface_ = estimation::SimulatedSurface::embedded(mesh_, seen, geometry::embed(seen.vertices_m, mesh_));
     tree_ = std::make_unique<geometry::TriangleTree>(seen);
-    statics_ = statics_at(spec_.contact_m, watched_);
-    fem::LinearResponse::Options options;
-    options.poisson_lower = recording_.model.poisson_lower;
-    options.poisson_upper = recording_.model.poisson_upper;
-    options.tolerance = 1e-5;
-    response_ = std::make_unique<fem::LinearResponse>(*statics_, watched_, options);
+    at_contact_.at_m = {spec_.contact_m};
 
     normals_ = Points::Zero(seen.vertices_m.rows(), 3);
     for (Index t = 0; t < seen.triangles.rows(); ++t) {
@@ -132,7 +129,14 @@ class Scene {
   estimation::FitMemory& memory() { return memory_; }
   Index true_tetrahedra() const { return static_cast<Index>(mesh_.tetrahedra.rows()); }
   /// Of the truth between the Poisson ratios that it is solved at, relative to the largest motion.
-  double solver_error() const { return calculix_ ? calculix_->error() : response_->interpolation_error(); }
+  double solver_error() const {
+    double error = 0;
+    for (const Truths* truths : {&at_contact_, &moved_}) {
+      if (truths->response) error = std::max(error, truths->response->interpolation_error());
+      for (const auto& [place, calculix] : truths->calculix) error = std::max(error, calculix.error());
+    }
+    return error;
+  }
 
   Draw draw(const Row& row, std::uint64_t seed) {
     enum Stream : std::uint64_t { of_truth, of_contact, of_tare, of_pose, of_rest, of_points, of_noise, of_correlated, of_outliers };
@@ -141,12 +145,16 @@ class Scene {
     out.young_pa = 1e4 * std::exp(truth.uniform() * std::log(10.0));
     out.poisson = truth.uniform(recording_.model.poisson_lower, recording_.model.poisson_upper);
 
-    Vec3 contact_m = spec_.contact_m;
-    if (row.contact_m > 0) {
-      lab::Random random(seed, of_contact);
-      contact_m += row.contact_m * across(random.normal3());
+    Truths& truths = row.contact_m > 0 ? moved_ : at_contact_;
+    if (row.contact_m > 0 && moved_by_m_ != row.contact_m) {
+      moved_ = {};
+      moved_by_m_ = row.contact_m;
+      for (std::uint64_t place = 1; place <= places; ++place)
+        moved_.at_m.emplace_back(spec_.contact_m + row.contact_m * across(lab::Random(place, of_contact).normal3()));
     }
-    const Unit unit = unit_response(contact_m, out.poisson);
+    const std::size_t place = (seed - 1) % truths.at_m.size();
+    const Vec3 contact_m = truths.at_m[place];
+    const Unit unit = unit_response(truths, place, out.poisson);
     // The pad's mean motion along the push is the depth at the highest level.
     const double per_newton_m = spec_.direction.dot(unit.pad * spec_.direction) / out.young_pa;
     const double highest_n = row.depth_m / per_newton_m;
@@ -236,58 +244,70 @@ class Scene {
     return {held.begin(), held.end()};
   }
 
-  std::unique_ptr<fem::Statics> statics_at(const Vec3& contact_m, Eigen::SparseMatrix<double>& watched) const {
+  /// Truths of contacts at a few places, solved for together: over nu, so that each factor serves all of them.
+  struct Truths {
+    std::vector<Vec3> at_m;
+    Eigen::SparseMatrix<double> watched;  // the surface, and the pad's mean motion at each place
+    std::unique_ptr<fem::Statics> statics;
+    std::unique_ptr<fem::LinearResponse> response;  // made when they are first asked for, as are a place's by CalculiX
+    std::map<std::size_t, CalculixResponse> calculix;
+  };
+
+  void prepare(Truths& truths) const {
     fem::Boundary boundary;
     for (Index node : held_nodes()) boundary.constraints.push_back({node, Mat3::Identity(), 3});
-    boundary.forces = fem::spread_over_patch(mesh_, contact_m, spec_.pad_radius_m);
+    std::vector<Eigen::Triplet<double>> forces;
+    for (std::size_t place = 0; place < truths.at_m.size(); ++place) {
+      const Eigen::SparseMatrix<double> here = fem::spread_over_patch(mesh_, truths.at_m[place], spec_.pad_radius_m);
+      for (int axis = 0; axis < 3; ++axis)
+        for (Eigen::SparseMatrix<double>::InnerIterator it(here, axis); it; ++it) forces.emplace_back(it.row(), int(3 * place) + axis, it.value());
+    }
+    boundary.forces.resize(3 * mesh_.nodes_m.rows(), Eigen::Index(3 * truths.at_m.size()));
+    boundary.forces.setFromTriplets(forces.begin(), forces.end());
     boundary.motions.resize(boundary.forces.rows(), 0);
     Eigen::SparseMatrix<double, Eigen::RowMajor> rows = surface_.rows(static_cast<Index>(mesh_.nodes_m.rows()));
     const Eigen::Index seen = rows.rows();
-    rows.conservativeResize(seen + 3, rows.cols());
-    rows.bottomRows(3) = Eigen::SparseMatrix<double, Eigen::RowMajor>(boundary.forces.transpose());
-    watched = rows;
+    rows.conservativeResize(seen + boundary.forces.cols(), rows.cols());
+    rows.bottomRows(boundary.forces.cols()) = Eigen::SparseMatrix<double, Eigen::RowMajor>(boundary.forces.transpose());
+    truths.watched = rows;
     fem::StaticsOptions options;
     options.dilatation = fem::Dilatation::averaged;
-    return std::make_unique<fem::Statics>(mesh_, "linear", std::move(boundary), options);
+    truths.statics = std::make_unique<fem::Statics>(mesh_, "linear", std::move(boundary), options);
+    fem::LinearResponse::Options over_nu;
+    over_nu.poisson_lower = recording_.model.poisson_lower;
+    over_nu.poisson_upper = recording_.model.poisson_upper;
+    over_nu.tolerance = 1e-5;
+    over_nu.memory_limit_bytes = 4e9;
+    truths.response = std::make_unique<fem::LinearResponse>(*truths.statics, truths.watched, over_nu);
   }
 
-  /// Watched rows for unit forces along x, y, z at E = 1.
-  MatrixX solved_by_calculix(const Vec3& contact_m, double poisson) const {
+  /// Watched rows for unit forces along x, y, z at E = 1, at one place.
+  MatrixX solved_by_calculix(const Truths& truths, std::size_t place, double poisson) const {
     constexpr double young_pa = 1e4;  // its digits are few, but not those of the exponent
-    Eigen::SparseMatrix<double> watched;
-    const auto statics = statics_at(contact_m, watched);
-    const Eigen::SparseMatrix<double> forces = fem::spread_over_patch(mesh_, contact_m, spec_.pad_radius_m);
-    MatrixX moved(watched.rows(), 3);
+    const Eigen::SparseMatrix<double> forces = fem::spread_over_patch(mesh_, truths.at_m[place], spec_.pad_radius_m);
+    MatrixX moved(truths.watched.rows(), 3);
     for (int axis = 0; axis < 3; ++axis) {
       const VectorX u = fem::calculix_displacements(mesh_, held_nodes(), VectorX(forces.col(axis)), false, young_pa, poisson);
       if (!u.allFinite()) throw std::runtime_error("CalculiX (ccx) gave no displacements");
-      moved.col(axis) = young_pa * (watched * u);
+      moved.col(axis) = young_pa * (truths.watched * u);
     }
     return moved;
   }
 
-  Unit unit_response(const Vec3& contact_m, double poisson) {
-    Unit out;
-    if (by_calculix) {
-      if (contact_m == spec_.contact_m && !calculix_) {
-        calculix_.emplace([&](double nu) { return solved_by_calculix(contact_m, nu); }, recording_.model.poisson_lower,
-                          recording_.model.poisson_upper, calculix_points);
-      }
-      const MatrixX moved = contact_m == spec_.contact_m ? calculix_->at(poisson) : solved_by_calculix(contact_m, poisson);
-      out.moved = moved.topRows(moved.rows() - 3);
-      out.pad = moved.bottomRows<3>();
-    } else if (contact_m == spec_.contact_m) {
-      const auto known = response_->at(poisson);
-      out.moved = known->force.topRows(known->force.rows() - 3);
-      out.pad = known->force.bottomRows<3>();
-    } else {
-      Eigen::SparseMatrix<double> watched;
-      const auto statics = statics_at(contact_m, watched);
-      const fem::UnitResponses solved = statics->unit_responses(poisson, watched);
-      out.moved = solved.force.topRows(solved.force.rows() - 3);
-      out.pad = solved.force.bottomRows<3>();
+  Unit unit_response(Truths& truths, std::size_t place, double poisson) const {
+    if (!truths.response) prepare(truths);
+    const Eigen::Index surface = truths.watched.rows() - Eigen::Index(3 * truths.at_m.size()), first = Eigen::Index(3 * place);
+    if (!by_calculix) {
+      const auto answers = truths.response->at(poisson);
+      const MatrixX& moved = answers->force;
+      return {moved.block(0, first, surface, 3), moved.block<3, 3>(surface + first, first)};
     }
-    return out;
+    if (!truths.calculix.contains(place)) {
+      truths.calculix.emplace(place, CalculixResponse([&](double nu) { return solved_by_calculix(truths, place, nu); },
+                                                      recording_.model.poisson_lower, recording_.model.poisson_upper, calculix_points));
+    }
+    const MatrixX moved = truths.calculix.at(place).at(poisson);
+    return {moved.topRows(surface), moved.middleRows<3>(surface + first)};
   }
 
   /// Exact ranges of the pixels that see the object past the stick (8 mm thick), at most `most`.
@@ -355,10 +375,8 @@ class Scene {
   TetMesh mesh_;  // of the truth
   std::vector<Support> supports_;
   estimation::SimulatedSurface surface_;
-  Eigen::SparseMatrix<double> watched_;
-  std::unique_ptr<fem::Statics> statics_;
-  std::unique_ptr<fem::LinearResponse> response_;
-  std::optional<CalculixResponse> calculix_;  // made when it is first asked for
+  Truths at_contact_, moved_;
+  double moved_by_m_ = 0;  // standard deviation of the places in moved_
   std::unique_ptr<geometry::TriangleTree> tree_;
   Points normals_;
   Vec3 centre_m_ = Vec3::Zero();  // of what the camera sees at rest
