@@ -102,17 +102,18 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
     if (shared->built->finer) out.finer = std::make_shared<estimation::FinerModel>(*shared->built->finer);
   } else {
     std::vector<char> seen;
+    ShapeOfViews views;
     const Recording as_given = recording;
     if (choice.linear) recording.model.element = "tet4";
     if (choice.linear) recording.model.refine = "none";
     const bool planar = choice.planar_back || choice.planar_agrees;
     const auto completion = planar ? reconstruction::Completion::planar : reconstruction::Completion::mirrored;
     if (choice.tetrahedra > 0) fill(recording, choice, completion, seen, progress);
-    out.object = build_simulated_object(recording, progress, completion, choice.tetrahedra > 0 ? nullptr : &seen);
+    out.object = build_simulated_object(recording, progress, completion, choice.tetrahedra > 0 ? nullptr : &seen, &views);
     if (choice.point_load) press_at_nodes(recording, out.object.mesh);
     const double unseen = drop_unseen_side(recording, seen, out.inputs);
     if (unseen > 0 && !choice.planar_back) {
-      out.doubt = doubt ? std::move(doubt) : std::make_shared<estimation::ShapeDoubt>(other_shapes(as_given, unseen));
+      out.doubt = doubt ? std::move(doubt) : std::make_shared<estimation::ShapeDoubt>(other_shapes(as_given, unseen, views.symmetries));
       out.doubt->side = unseen_side(as_given, recording, seen);
     }
     if (auto finer = estimation::finer_model(recording, out.object))

@@ -155,7 +155,7 @@ reconstruction::BuildOptions fill_options(const Recording& recording) {
 
 /// Volume mesh of a recording that gives a surface or views of one.
 void fill_with_tetrahedra(Recording& recording, reconstruction::Completion completion, std::vector<char>* seen,
-                          double* strip_m, const OnProgress& progress) {
+                          ShapeOfViews* views, const OnProgress& progress) {
   if (!recording.rest.surface && recording.rest.views.empty()) {
     throw Error("give the object's shape as rest.volume_mesh, rest.surface_mesh or rest.views", "rest");
   }
@@ -170,7 +170,7 @@ void fill_with_tetrahedra(Recording& recording, reconstruction::Completion compl
   const reconstruction::SeenVertices& of_surface = fine ? built.of_fine_surface : built.of_surface;
   if (recording.rest.surface_std_m == 0) recording.rest.surface_std_m = std::hypot(seen_std_m(of_surface), built.slow_error_m);
   if (seen != nullptr) *seen = of_surface.seen;
-  if (strip_m != nullptr) *strip_m = built.strip_m;
+  if (views != nullptr) *views = {built.strip_m, built.symmetries};
   for (const auto& warning : built.model.warnings) recording.warnings.push_back(warning);
   recording.supports = std::move(built.model.supports);
   recording.rest.surface = std::move(fine ? built.fine_surface : built.model.surface);
@@ -212,6 +212,11 @@ reconstruction::BuiltObject build_from_views(const Recording& recording, const r
   reconstruction::FuseOptions fuse;
   fuse.support = hiding_plane(recording);
   fuse.free = sensing::FreeSpace(images);
+  if (fuse.support) {
+    sensing::FreeSpaceOptions to_support;
+    to_support.support = fuse.support;
+    fuse.free_to_support = sensing::FreeSpace(images, to_support);
+  }
   fuse.completion = completion;
   fuse.touched = touched_places(recording);
   const auto build = [&](bool smooth) {
@@ -270,8 +275,8 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
 
 estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress,
                                                    reconstruction::Completion completion, std::vector<char>* seen,
-                                                   double* strip_m) {
-  if (!recording.rest.volume) fill_with_tetrahedra(recording, completion, seen, strip_m, progress);
+                                                   ShapeOfViews* views) {
+  if (!recording.rest.volume) fill_with_tetrahedra(recording, completion, seen, views, progress);
   const TetMesh& given = *recording.rest.volume;
   estimation::SimulatedObject object;
   object.material = recording.model.material;
@@ -353,11 +358,12 @@ std::optional<estimation::UnseenSide> unseen_side(const Recording& given, const 
   return side;
 }
 
-estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share) {
+estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share, int symmetries) {
   estimation::ShapeDoubt doubt;
   doubt.unseen_share = unseen_share;
+  const bool flat_is_likely = symmetries < 2;
   const std::pair<reconstruction::Completion, double> others[] = {
-      {reconstruction::Completion::planar, 1}, {reconstruction::Completion::tapered, 0.3}, {reconstruction::Completion::hidden, 0.1}};
+      {reconstruction::Completion::planar, flat_is_likely ? 1 : 0.3}, {reconstruction::Completion::tapered, 0.3}, {reconstruction::Completion::hidden, 0.1}};
   for (const auto& [completion, likelihood] : others) {
     Recording recording = given;
     try {
@@ -373,7 +379,7 @@ estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share)
       });
       if (known) continue;
       const auto plane = hiding_plane(recording);  // before it is moved away
-      doubt.shapes.push_back({std::move(recording), std::move(object), completion == reconstruction::Completion::planar, likely, std::move(side), std::move(seen), plane});
+      doubt.shapes.push_back({std::move(recording), std::move(object), flat_is_likely && completion == reconstruction::Completion::planar, likely, std::move(side), std::move(seen), plane});
     } catch (const Error&) {  // such a shape falls apart or encloses nothing: it is none that may stand there
     }
   }
@@ -401,12 +407,12 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
     recording = as_given;
     estimation::Inputs observed = all_observed;
     std::vector<char> seen;
-    double strip_m = 0;
-    object = build_simulated_object(recording, progress, completion, &seen, &strip_m);  // sec. IV-C: tetrahedral model
+    ShapeOfViews views;
+    object = build_simulated_object(recording, progress, completion, &seen, &views);  // sec. IV-C: tetrahedral model
     const double unseen = drop_unseen_side(recording, seen, observed);
-    if (unseen > 0 && options.method != "paper" && !doubt) doubt = other_shapes(as_given, unseen);
+    if (unseen > 0 && options.method != "paper" && !doubt) doubt = other_shapes(as_given, unseen, views.symmetries);
     if (unseen > 0 && doubt) doubt->side = unseen_side(as_given, recording, seen);
-    const auto foot = foot_doubt(recording, strip_m);
+    const auto foot = foot_doubt(recording, views.strip_m);
     if (foot && options.method != "paper" && !doubt) doubt.emplace().foot = foot;
     if (options.method == "paper") {
       out.answer = estimation::fit_as_in_paper(recording, object, observed, options.fit, progress);  // sec. VI: error function and its minimum

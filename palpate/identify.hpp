@@ -57,14 +57,19 @@ reconstruction::BuiltObject build_from_views(const Recording& recording, const r
                                              reconstruction::Completion completion = reconstruction::Completion::mirrored,
                                              const OnProgress& progress = {});
 
+struct ShapeOfViews {
+  double strip_m = 0;  ///< height above the table below which no view showed an object that was seen from all around; else 0
+  int symmetries = 0;  ///< of one that was seen from one side, its own that were found
+};
+
 /// Stage 2: the object as the solver sees it: volume mesh, element, simulated surface. Says the chosen element in the
 /// recording's model, and what was built (surface, volume, supports with the tolerance that their nodes need) in the recording.
 /// @param completion  of a side that no view of rest.views shows
 /// @param seen        if given: a vertex of rest.surface as built, 1 where a view showed it; empty where the shape was given
-/// @param strip_m     if given: height above the table below which no view showed an object that was seen from all around; else 0
+/// @param views       if given: what is known of a shape that views showed
 estimation::SimulatedObject build_simulated_object(Recording& recording, const OnProgress& progress = {},
                                                    reconstruction::Completion completion = reconstruction::Completion::mirrored,
-                                                   std::vector<char>* seen = nullptr, double* strip_m = nullptr);
+                                                   std::vector<char>* seen = nullptr, ShapeOfViews* views = nullptr);
 
 /// Stage 3, of an object that views leave partly unseen: takes out the rays that show what no view of it at rest showed, for a
 /// guess is nothing to compare with. Returns the share of its surface that was not seen; 0 where that is too little to matter.
@@ -84,10 +89,11 @@ std::optional<estimation::UnseenSide> unseen_side(const Recording& given, const 
 
 /// What else may stand where nobody looked: all that was hidden, and less than what is fitted.
 /// @param given  the recording before its object was built
-estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share);
+/// @param symmetries  of the fitted shape: a flat back contradicts several
+estimation::ShapeDoubt other_shapes(const Recording& given, double unseen_share, int symmetries);
 
 /// The foot of an object that was seen from all around down to `strip_m` above what it stands on; nothing where it stands on nothing.
-/// @param built  as build_simulated_object left it, with `strip_m`
+/// @param built  as build_simulated_object left it, with `views.strip_m`
 std::optional<estimation::FootDoubt> foot_doubt(const Recording& built, double strip_m);
 
 }  // namespace palpate

@@ -261,6 +261,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   out.model.embedding = geometry::embed(out.model.surface.vertices_m, out.model.volume);
   out.around = fused.around;
   out.strip_m = fused.strip_m;
+  out.symmetries = fused.symmetries;
   TriMesh seen = fused.facets;
   seen.triangles.conservativeResize(fused.seen, 3);
   const geometry::TriangleTree to_seen(seen);

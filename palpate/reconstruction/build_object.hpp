@@ -41,6 +41,7 @@ struct BuiltObject {
   /// were corrected by each other, and what flat faces of the volume are off the fused surface. Of views from all around; else 0.
   double slow_error_m = 0;
   double strip_m = 0;      ///< of views from all around: FusedViews::strip_m
+  int symmetries = 0;      ///< of views from one side: FusedViews::symmetries
   bool around = false;     ///< of views: the object was seen from all sides, down to its support (FusedViews::around)
   std::vector<Pose>
       view_correction;  ///< applied to each view on the left before fusing; empty when poses were taken as known

@@ -23,12 +23,14 @@ constexpr double unchanged = 0.02;          // of the volume: the planar complet
 constexpr double close_cubes = 8;           // to a seen facet, in cubes: ...
 constexpr double anchor_cubes = 2.5;        // ... right behind it, the object was seen
 constexpr double nearer_share = 0.7;        // of how far a place is from what was seen: its image then knows more
+constexpr double untold_cells = 2;          // above the support: not told from it by any sensor
 constexpr double touch_margin = 1.3;        // of a tool's radius
 constexpr double from_behind = 0.3;         // cosine between a push and the way to the sensors
 
 class Completer {
  public:
-  Completer(const FusedViews& fused, const FuseOptions& options) : options_(options), seen_(fused.facets), planar_(fused.facets) {
+  Completer(const FusedViews& fused, const FuseOptions& options)
+      : options_(options), free_(options.free_to_support ? options.free_to_support : options.free), seen_(fused.facets), planar_(fused.facets) {
     seen_.triangles.conservativeResize(fused.seen, 3);
     Vec3 facing = Vec3::Zero();
     double area = 0;
@@ -40,7 +42,8 @@ class Completer {
   }
 
   /// Cubes of the solid that is asked for; empty where the planar completion will do.
-  std::vector<char> solid() const {
+  /// @param symmetries_found  how many of what was seen were found, where they were looked for
+  std::vector<char> solid(int& symmetries_found) const {
     if (toward_.isZero() && options_.completion == Completion::mirrored) return {};  // seen from above
     const geometry::WindingNumber winding(planar_);
     const geometry::TriangleTree to_seen(seen_);
@@ -54,7 +57,7 @@ class Completer {
       const Vec3 from = p - c.point_m;
       const double far = from.norm(), out = from.dot(area_of(seen_, c.triangle).normalized());
       // Close to what was seen, noise decides what is free; what lies outward of a facet is not hidden by it.
-      hidden[k] = !options_.free(p) && !(far < close_cubes * cubes_.h && out > 0.5 * far);
+      hidden[k] = !free_(p) && !(far < close_cubes * cubes_.h && out > 0.5 * far);
       from_seen_m[k] = far;
       anchored[k] = hidden[k] && far < anchor_cubes * cubes_.h && out < 0;
       const bool inside = winding(p) > 0.5;
@@ -78,8 +81,9 @@ class Completer {
     // What one mirror says is handed to the next. What is known of the image counts: that it is free, or solid not only as
     // the rim of what was hidden; where nothing is, what was there before. Of several symmetries the one whose image is nearer to what
     // was seen knows, for of a ball one says of one half of its back what is only guessed of the other.
+    std::vector<char> free_by_image(cubes_.count());
     const auto reflect = [&](const Mirror& mirror, std::vector<char>* only_guessed) {
-      std::vector<char> next = out, still_open = open;
+      std::vector<char> next = out, still_open = open, next_free = free_by_image;
       cubes_.each([&](int x, int y, int z) {
         const std::size_t k = cubes_.at(x, y, z);
         if (!open[k]) return;
@@ -89,23 +93,29 @@ class Completer {
             return z + s[2] < 0 || value(out, mirror.of(p + cubes_.h * cubes_.axes * Vec3(s[0], s[1], s[2])));
           });
           if (!within && !value(anchored, image)) return;
-          if (only_guessed && from_seen_m[std::size_t(cubes_.of(image))] > nearer_share * from_seen_m[k]) (*only_guessed)[k] = 1;
-          else next[k] = 1, still_open[k] = 0;
-        } else if (cubes_.of(image) >= 0 && !value(hidden, image)) {
+          const double of_image_m = from_seen_m[std::size_t(cubes_.of(image))];
+          if (!only_guessed || of_image_m <= nearer_share * from_seen_m[k]) next[k] = 1, still_open[k] = 0;
+          else if (nearer_share * of_image_m <= from_seen_m[k]) (*only_guessed)[k] = 1;
+        } else if (cubes_.of(image) >= 0 && (!value(hidden, image) || (only_guessed && value(free_by_image, image)))) {
           next[k] = still_open[k] = 0;
+          next_free[k] = 1;
         }
       });
-      out.swap(next), open.swap(still_open);
+      out.swap(next), open.swap(still_open), free_by_image.swap(next_free);
     };
     if (options_.completion == Completion::mirrored) {
-      const MirrorSearch search(seen_, up_, cubes_.h, options_.free);
+      const MirrorSearch search(seen_, up_, cubes_.h, free_);
       const std::vector<Mirror> symmetries = search.symmetries();
+      symmetries_found = static_cast<int>(symmetries.size());
       std::vector<char> guessed(cubes_.count());
       for (const Mirror& mirror : symmetries) reflect(mirror, symmetries.size() > 1 ? &guessed : nullptr);
+      if (symmetries.size() > 1)  // what the last ones showed
+        for (const Mirror& mirror : symmetries) reflect(mirror, &guessed);
       for (std::size_t k = 0; k < open.size(); ++k)
         if (open[k] && guessed[k]) out[k] = 1, open[k] = 0;
       if (const auto back = half_way_back(search)) reflect(*back, nullptr);
     }
+    keep_narrow_above_support(anchored, out);
     if (options_.completion == Completion::mirrored) close_grooves(hidden, open, out);
     for (const Touch& touch : options_.touched) reach_to(touch, hidden, anchored, out);
     out = cubes_.connected(out, planar);
@@ -166,6 +176,7 @@ class Completer {
       low = low.cwiseMin(p), high = high.cwiseMax(p);
     }
     cubes_.h = std::max(0.5 * fused.cell_m, (high - low).norm() / most_cubes_across);
+    untold_m_ = untold_cells * fused.cell_m;
     behind_m_ = (high - low).head<2>().norm();
     const Vec3 back = cubes_.axes.transpose() * (-behind_m_ * toward_);
     low.head<2>() = low.head<2>().cwiseMin(low.head<2>() + back.head<2>()), high.head<2>() = high.head<2>().cwiseMax(high.head<2>() + back.head<2>());
@@ -174,6 +185,19 @@ class Completer {
     if (options_.support) low.z() = up_.dot(options_.support->point_m);
     cubes_.low = low;
     for (int k = 0; k < 3; ++k) cubes_.n[std::size_t(k)] = std::max(1, int(std::ceil((high[k] - low[k]) / cubes_.h)));
+  }
+
+  /// No sensor tells a place right above the support from the support itself, and what is free further up may seem hidden there:
+  /// the object becomes no wider from there down, unless something was seen.
+  void keep_narrow_above_support(const std::vector<char>& anchored, std::vector<char>& solid) const {
+    if (!options_.support) return;
+    const int untold = std::min(cubes_.n[2] - 1, static_cast<int>(std::ceil(untold_m_ / cubes_.h)));
+    for (int z = untold - 1; z >= 0; --z)
+      for (int x = 0; x < cubes_.n[0]; ++x)
+        for (int y = 0; y < cubes_.n[1]; ++y) {
+          const std::size_t k = cubes_.at(x, y, z);
+          if (!anchored[k] && !solid[cubes_.at(x, y, z + 1)]) solid[k] = 0;
+        }
   }
 
   /// Where a tool met the object there is its skin: nothing before it, and all behind it as far as the rest.
@@ -254,9 +278,10 @@ class Completer {
   }
 
   const FuseOptions& options_;
+  const std::function<bool(const Vec3&)>& free_;
   TriMesh seen_, planar_;
   Vec3 up_, toward_ = Vec3::Zero();  // toward the sensors, along the plane
-  double behind_m_ = 0;
+  double behind_m_ = 0, untold_m_ = 0;
   Cubes cubes_;
 };
 
@@ -269,7 +294,7 @@ void complete(FusedViews& fused, const FuseOptions& options) {
     return;
   }
   const Completer completer(fused, options);
-  const std::vector<char> solid = completer.solid();
+  const std::vector<char> solid = completer.solid(fused.symmetries);
   if (solid.empty()) return;
   const std::vector<Facet> skin = completer.skin(solid, fused.cell_m);
   fused.support_area_m2 = 0;

@@ -30,6 +30,8 @@ struct FuseOptions {
   std::optional<Plane> support;  ///< table or wall that hides a side: the object is completed down to it
   /// Says of a place in the clouds' frame that a sensor looked through it; empty: nothing is known, and the back stays planar.
   std::function<bool(const Vec3&)> free;
+  /// The same where what sees the support tells it, and how near: used for the side that nobody saw. Empty: `free`.
+  std::function<bool(const Vec3&)> free_to_support;
   std::vector<Touch> touched;  ///< used where free space is known
   Completion completion = Completion::mirrored;
 };
@@ -41,6 +43,7 @@ struct FusedViews {
   TriMesh facets;              ///< one triangle a cell, outward, as large as the surface that it stands for; open
   Index seen = 0;              ///< that many facets come first and were seen; the others complete the object
   Index held = 0;              ///< so many lie on the surface: those seen, and the strip down to the support
+  int symmetries = 0;          ///< upright planes at which it was mirrored because what was seen is symmetric there
   double strip_m = 0;          ///< height above the support below which nothing was seen, where facets go on to it
   bool around = false;         ///< seen from all sides, down to the support, and free space is known
   /// Where it is given, a place is inside where this is above one half, and not where the facets' winding number is.

@@ -31,6 +31,50 @@ DepthImage least_around(const DepthImage& image, Eigen::Index reach) {
   return (image.array() > 0).select(out, image);
 }
 
+/// Sums over squares of `reach` pixels to every side.
+Eigen::MatrixXd sums_around(const Eigen::MatrixXd& image, Eigen::Index reach) {
+  Eigen::MatrixXd to = Eigen::MatrixXd::Zero(image.rows() + 1, image.cols() + 1);  // sum of all above and to the left
+  for (Eigen::Index r = 0; r < image.rows(); ++r)
+    for (Eigen::Index c = 0; c < image.cols(); ++c) to(r + 1, c + 1) = image(r, c) + to(r, c + 1) + to(r + 1, c) - to(r, c);
+  Eigen::MatrixXd out(image.rows(), image.cols());
+  for (Eigen::Index r = 0; r < image.rows(); ++r)
+    for (Eigen::Index c = 0; c < image.cols(); ++c) {
+      const Eigen::Index top = std::max<Eigen::Index>(0, r - reach), bottom = std::min(image.rows(), r + reach + 1),
+                         left = std::max<Eigen::Index>(0, c - reach), right = std::min(image.cols(), c + reach + 1);
+      out(r, c) = to(bottom, right) - to(top, right) - to(bottom, left) + to(top, left);
+    }
+  return out;
+}
+
+/// Depth of the plane in each pixel that sees it, as far as its neighbours' mean can tell; 0 elsewhere.
+/// @param sigma_m  of each depth; 0: there is none
+DepthImage depth_of_seen(const Plane& plane, const DepthFrame& frame, const DepthImage& sigma_m, double sigmas) {
+  constexpr Eigen::Index reach = 3;
+  constexpr double noise_shared_by_px = 3;  // a side: neighbours of a stereo camera are matched by the same pixels
+  const Points directions = pixel_directions(frame.camera);
+  const Vec3 normal = frame.T_base_camera.linear().transpose() * plane.normal;
+  const double below_m = plane.normal.dot(plane.point_m - frame.T_base_camera.translation());
+  DepthImage plane_m = DepthImage::Zero(sigma_m.rows(), sigma_m.cols());
+  Eigen::MatrixXd off_m = Eigen::MatrixXd::Zero(sigma_m.rows(), sigma_m.cols()), there = off_m;
+  for (Eigen::Index r = 0; r < sigma_m.rows(); ++r)
+    for (Eigen::Index c = 0; c < sigma_m.cols(); ++c) {
+      const double z = below_m / normal.dot(directions.row(r * sigma_m.cols() + c).transpose());
+      if (!(sigma_m(r, c) > 0) || !(z > 0) || !std::isfinite(z)) continue;
+      plane_m(r, c) = static_cast<float>(z);
+      off_m(r, c) = frame.depth_m(r, c) - z;
+      there(r, c) = 1;
+    }
+  const Eigen::MatrixXd sum_m = sums_around(off_m, reach), count = sums_around(there, reach);
+  for (Eigen::Index r = 0; r < plane_m.rows(); ++r)
+    for (Eigen::Index c = 0; c < plane_m.cols(); ++c) {
+      if (plane_m(r, c) == 0) continue;
+      const double pose = std::hypot(frame.pose_std_m, double(plane_m(r, c)) * frame.pose_std_rad);
+      const double of_mean = noise_shared_by_px * double(sigma_m(r, c)) / std::sqrt(count(r, c));
+      if (!(std::abs(sum_m(r, c) / count(r, c)) < sigmas * std::hypot(of_mean, pose))) plane_m(r, c) = 0;
+    }
+  return plane_m;
+}
+
 }  // namespace
 
 FreeSpace::FreeSpace(const std::vector<DepthFrame>& frames, const FreeSpaceOptions& options) {
@@ -43,14 +87,24 @@ FreeSpace::FreeSpace(const std::vector<DepthFrame>& frames, const FreeSpaceOptio
       throw Error("the depth image has another size than its camera", "view " + std::to_string(views_.size()));
     const bool masked = frame.mask.rows() == rows && frame.mask.cols() == columns;
     View view{frame.camera, frame.T_base_camera.inverse(), DepthImage::Zero(rows, columns)};
+    DepthImage sigma_m = view.free_m;
     for (Eigen::Index r = 0; r < rows; ++r)
       for (Eigen::Index c = 0; c < columns; ++c) {
         const double z = frame.depth_m(r, c);
         if (!(z > 0) || !std::isfinite(z) || (masked && frame.mask(r, c))) continue;
         const double sigma = axial_sigma_m(frame.noise, {z, 0, frame.camera.fx_px});
         const double pose = std::hypot(frame.pose_std_m, z * frame.pose_std_rad);
+        sigma_m(r, c) = static_cast<float>(sigma);
         view.free_m(r, c) = static_cast<float>(std::max(0.0, z - options.margin_m - options.sigmas * std::hypot(sigma, pose)));
       }
+    if (options.support) {
+      const DepthImage plane_m = depth_of_seen(*options.support, frame, sigma_m, options.sigmas);
+      for (Eigen::Index k = 0; k < plane_m.size(); ++k) {
+        const double z = plane_m.data()[k], pose = std::hypot(frame.pose_std_m, z * frame.pose_std_rad);
+        float& free_m = view.free_m.data()[k];
+        if (z > 0) free_m = std::max(free_m, static_cast<float>(z - options.margin_m - options.sigmas * pose));
+      }
+    }
     // The nearest of the neighbours counts, as far aside as the picture may be off, and one without data is asked for none.
     std::vector<float> depths;
     for (Eigen::Index k = 0; k < view.free_m.size(); ++k)

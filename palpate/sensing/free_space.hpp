@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "palpate/core/mesh.hpp"
 #include "palpate/core/recording.hpp"
 
 namespace palpate::sensing {
@@ -10,6 +12,9 @@ namespace palpate::sensing {
 struct FreeSpaceOptions {
   double sigmas = 4;       ///< so many standard deviations of depth and pose before and beside what was seen are not called free
   double margin_m = 0.003; ///< nor is this
+  /// That the object stands on: where a pixel and its neighbours together see this plane, free space reaches down to it, and the
+  /// noise of a single depth does not count. Nothing: every pixel for itself.
+  std::optional<Plane> support = {};
 };
 
 /// Places that cameras looked through: nothing stood there.

@@ -62,16 +62,16 @@ TEST_P(BuiltFoot, IsWhereTheTrueOneIs) {
       push.steps.emplace_back().loads.push_back(load);
       recording.pushes.push_back(push);
     }
-    double strip_m = 0;
-    build_simulated_object(recording, {}, reconstruction::Completion::mirrored, nullptr, &strip_m);
+    ShapeOfViews views;
+    build_simulated_object(recording, {}, reconstruction::Completion::mirrored, nullptr, &views);
     const Foot built = foot_of(*recording.rest.surface, recording.supports.front().tolerance_m);
     const Vec3 aside = built.middle_m - truth.middle_m;
     std::printf("%s seed %d: area %.2f of the true one, its middle %+.1f, %+.1f mm aside; nothing seen below %.1f mm\n", name,
-                static_cast<int>(seed), built.area_m2 / truth.area_m2, 1e3 * aside.x(), 1e3 * aside.y(), 1e3 * strip_m);
+                static_cast<int>(seed), built.area_m2 / truth.area_m2, 1e3 * aside.x(), 1e3 * aside.y(), 1e3 * views.strip_m);
     EXPECT_NEAR(built.area_m2 / truth.area_m2, 1, area) << name << seed;
     EXPECT_LT(aside.norm(), middle_m) << name << seed;
-    EXPECT_GT(strip_m, 0.004);
-    EXPECT_LT(strip_m, 0.02);
+    EXPECT_GT(views.strip_m, 0.004);
+    EXPECT_LT(views.strip_m, 0.02);
     EXPECT_GT(recording.rest.surface_std_m, 1e-4);  // what poses and faces leave, and not only noise
     EXPECT_LT(recording.rest.surface_std_m, 8e-4);
   }
