@@ -59,7 +59,7 @@ Stopped PushRun::press() {
     try {
       return rise();
     } catch (const Stopped& stop) {
-      const bool hardly_touched = !loaded_ && recorded_.force_n == 0 && top_n_ < options_.force_step_n;
+      const bool hardly_touched = !loaded_ && recorded_.force_n == 0 && top_n_ < 2 * options_.force_step_n;
       if (stop.reason != StopReason::contact_lost || !hardly_touched || touch == touches) throw;
     }
   }

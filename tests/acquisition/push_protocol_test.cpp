@@ -206,7 +206,7 @@ TEST(PushProtocol, AfterALostTouchContactIsStillWhereItWasFelt) {
     if (result.report.stop == StopReason::contact_lost && ++lost) continue;  // an error of a motion is 0.75 N: lost again and again, and said
     EXPECT_EQ(result.report.stop, StopReason::force_limit) << seed << ": " << result.report.message;
   }
-  EXPECT_LT(lost, 50);
+  EXPECT_LT(lost, 30);  // 39 where only touches below a step's force were taken up again
 }
 
 TEST(PushProtocol, GivesUpWhereNothingIsTouched) {
