@@ -56,7 +56,8 @@ void ForwardModel::drop_what_nothing_holds(std::size_t s, const Body& body, cons
     for (Index l = 0; 3 * l < rows; ++l) {
       const auto& [load, parts] = acting[static_cast<std::size_t>(l)];
       const Vec3 sideways = dropped.segment<3>(3 * l);
-      const double std_n = std::hypot(load->force_std_n, load->force_relative_std * force.segment<3>(3 * l).norm(), tare_n);
+      const double force_n = force.segment<3>(3 * l).norm(), of_force = std::hypot(load->force_relative_std, recording_->force_cross_talk_std);
+      const double std_n = std::hypot(load->force_std_n, of_force * force_n, tare_n);
       if (sideways.norm() > 4 * std_n + 1e-6 * (size_n + 1e-12))
         throw Error(why_unheld(sideways.norm(), std_n), now.source.empty() ? "supports" : now.source);
       for (const LoadPart& part : parts) {
@@ -86,7 +87,7 @@ std::string ForwardModel::why_unheld(double sideways_n, double std_n) const {
   }
   return "the supports leave the object free to slide where a load acts on it: " + words(sideways_n) + " act that way" +
          (std_n > 0 ? ", which the force's uncertainty (" + words(std_n) + ") does not explain" : "") + "; " + cure +
-         "add the support that holds it, state the uncertainty of the force (force_std_n, force_tare_std_n), or give the "
+         "add the support that holds it, state the uncertainty of the force (force_std_n, force_tare_std_n, force_cross_talk_std), or give the "
          "load's normal component alone";
 }
 
