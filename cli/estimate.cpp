@@ -33,7 +33,7 @@ struct Options {
   std::optional<double> poisson_ratio, young_start_pa;
   double mesh_tolerance = 0.01;
   int max_iterations = 60;
-  bool budget = false, compare_laws = false, all_loads = false, no_slips = false;
+  bool poisson_by_region = false, budget = false, compare_laws = false, all_loads = false, no_slips = false;
   LiveOptions live;
 };
 
@@ -66,6 +66,7 @@ IdentifyOptions identify_options(const Options& given, const Session& session) {
   if (!given.refine.empty()) options.refine = given.refine;
   if (given.poisson_range.size() == 2) options.poisson_range = {given.poisson_range[0], given.poisson_range[1]};
   if (given.poisson_ratio) options.poisson_fixed = *given.poisson_ratio;
+  options.poisson_by_region = given.poisson_by_region;
   if (given.young_start_pa) options.fit.young_start_pa = *given.young_start_pa;
   options.mesh_tolerance = given.mesh_tolerance;
   options.all_loads = given.all_loads;
@@ -124,7 +125,8 @@ void tell(Session& session, const Options& given, const Identification& answer) 
   for (const auto& parameter : answer.parameters) {
     const bool young = parameter.name == "young_modulus" && parameter.region.empty();
     const std::string label = young ? "Young's modulus E"
-                              : parameter.name == "poisson_ratio" ? "Poisson ratio nu" : report::parameter_title(parameter);
+                              : parameter.name == "poisson_ratio" && parameter.region.empty() ? "Poisson ratio nu"
+                                                                                               : report::parameter_title(parameter);
     if (!std::isfinite(parameter.lower_95)) {
       session.say(fmt::format("{:<18} {}   (this method gives no interval)", label, report::quantity(parameter.value, parameter.unit)));
       continue;
@@ -221,6 +223,7 @@ Run verbs::estimate(CLI::App& app) {
       ->check(CLI::IsMember({"recorded", "by-site", "none"}));
   app.add_option("--poisson-range", given->poisson_range, "range of the uniform prior on nu, e.g. 0.3 0.4995")->expected(2)->check(poisson_number());
   app.add_option("--poisson-ratio", given->poisson_ratio, "take nu as known")->check(poisson_number());
+  app.add_flag("--poisson-by-region", given->poisson_by_region, "every region has a nu of its own; without it they share one");
   app.add_option("--young-modulus-start", given->young_start_pa, "start of E in Pa (default: found from the data)")
       ->check(positive_number());
   app.add_option("--max-iterations", given->max_iterations, "most iterations of the fit")->check(positive_number());

@@ -32,11 +32,18 @@ struct Options {
 
 io::ExportModel model_of(const Options& given, const LearnedObject& learned) {
   io::ExportModel model;
-  const prediction::Elasticity elasticity = prediction::elasticity_of(learned.answer);
+  const prediction::Elasticity elasticity = elasticity_of(learned);
   model.name = "object";
   model.mesh = *learned.object.rest.volume;
   model.young_modulus_pa = elasticity.young_modulus_pa;
   model.poisson_ratio = elasticity.poisson_ratio;
+  for (std::size_t r = 0; r < elasticity.regions.size(); ++r) {
+    const Index at = static_cast<Index>(r);
+    const bool own = r > 0 && elasticity.region_poisson.size() > 0;
+    model.regions.push_back({elasticity.regions[r], elasticity.region_stiffness(at) * elasticity.young_modulus_pa,
+                             own ? elasticity.region_poisson(at) : elasticity.poisson_ratio});
+  }
+  model.region = elasticity.region;
   model.density_kg_m3 = given.density_kg_m3 > 0 ? given.density_kg_m3 : learned.object.density_kg_m3;
   // A shape that was measured with its weight on has sagged already: under gravity it would sag once more.
   const bool sags = learned.object.rest.state == RestState::stress_free;
@@ -70,6 +77,17 @@ VectorX solved_here(const io::ExportModel& model, int threads) {
   boundary.motions.resize(size, 0);
   fem::Response::Options options;
   options.statics.threads = threads;
+  if (!model.regions.empty()) {
+    const Index count = static_cast<Index>(model.regions.size());
+    options.statics.region = model.region;
+    options.statics.region_stiffness.resize(count);
+    options.statics.region_poisson.resize(count);
+    for (Index r = 0; r < count; ++r) {
+      const io::ExportRegion& one = model.regions[static_cast<std::size_t>(r)];
+      options.statics.region_stiffness(r) = one.young_modulus_pa / model.young_modulus_pa;
+      options.statics.region_poisson(r) = r > 0 ? one.poisson_ratio : std::nan("");
+    }
+  }
   const fem::Response response(model.mesh, "linear", std::move(boundary), Eigen::SparseMatrix<double>(0, size), options);
   fem::ResponseQuery query{model.young_modulus_pa, model.poisson_ratio, VectorX::Ones(1), VectorX(0)};
   query.derivatives = false;
@@ -142,6 +160,7 @@ int run(const Options& given, Session& session) {
                          {"young_modulus_pa", model.young_modulus_pa},
                          {"poisson_ratio", model.poisson_ratio},
                          {"density_kg_m3", model.density_kg_m3},
+                         {"regions", model.regions.size()},
                          {"fixed_nodes", model.fixed.size()},
                          {"elements", coarser ? "corners" : "as_fitted"}};
   int code = exit_done;

@@ -143,6 +143,7 @@ json described(const Recording& recording, const std::vector<io::Problem>& probl
                      {"refine", model.refine},
                      {"material", model.material},
                      {"poisson_range", json::array({model.poisson_lower, model.poisson_upper})},
+                     {"poisson_by_region", model.poisson_by_region},
                      {"poisson_fixed", model.poisson_fixed ? json(*model.poisson_fixed) : json(nullptr)}};
   result["force_scale_std"] = recording.force_scale_std;
   result["force_cross_talk_std"] = recording.force_cross_talk_std;
@@ -231,11 +232,12 @@ void tell(Session& session, const Recording& recording, const json& all) {
   if (recording.robot)
     session.say(fmt::format("robot      {}, {} joints recorded", recording.robot->name, recording.joint_names.size()));
   const ModelDefaults& model = recording.model;
-  session.say(fmt::format("model      {}, mesh {}, element {}, refinement {}, Poisson ratio {}", model.material, model.mesh,
+  session.say(fmt::format("model      {}, mesh {}, element {}, refinement {}, Poisson ratio {}{}", model.material, model.mesh,
                           model.element, model.refine,
                           model.poisson_fixed
                               ? fmt::format("{:.4g}", *model.poisson_fixed)
-                              : fmt::format("in [{:.4g}, {:.4g}]", model.poisson_lower, model.poisson_upper)));
+                              : fmt::format("in [{:.4g}, {:.4g}]", model.poisson_lower, model.poisson_upper),
+                          model.poisson_by_region && !model.poisson_fixed ? ", each region its own" : ""));
   session.say(fmt::format("pushes     {}", recording.pushes.size()));
   for (const json& push : all["pushes"]) tell_push(session, push);
 }

@@ -7,6 +7,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/materials.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
 
@@ -33,6 +34,17 @@ LearnedObject load_learned_object(const fs::path& given) {
   learned.object = io::read_recording_unchecked(out / "model");
   if (!learned.object.rest.volume) throw Error("holds no volume mesh", (out / "model").string());
   return learned;
+}
+
+prediction::Elasticity elasticity_of(const LearnedObject& learned) {
+  prediction::Elasticity elasticity = prediction::elasticity_of(learned.answer);
+  if (elasticity.regions.empty()) return elasticity;
+  std::vector<std::string> named;
+  for (const Region& region : learned.object.regions) named.push_back(region.name);
+  if (named != elasticity.regions)
+    throw Error("tells other regions apart than the result does; run `palpate estimate` again", "model/recording.yaml: regions");
+  elasticity.region = fem::regions_of(*learned.object.rest.volume, learned.object.regions, &*learned.object.rest.volume);
+  return elasticity;
 }
 
 std::vector<Index> held_nodes(const Recording& object) {

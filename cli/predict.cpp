@@ -89,6 +89,18 @@ nlohmann::json json_of(const prediction::Band& band) {
   return {{"value", band.value}, {"std", band.std}, {"lower_95", band.lower_95}, {"upper_95", band.upper_95}};
 }
 
+nlohmann::json regions_json(const prediction::Elasticity& elasticity) {
+  nlohmann::json list = nlohmann::json::array();
+  for (std::size_t r = 0; r < elasticity.regions.size(); ++r) {
+    const Index at = static_cast<Index>(r);
+    const bool own = r > 0 && elasticity.region_poisson.size() > 0;
+    list.push_back({{"region", elasticity.regions[r]},
+                    {"young_modulus_pa", elasticity.region_stiffness(at) * elasticity.young_modulus_pa},
+                    {"poisson_ratio", own ? elasticity.region_poisson(at) : elasticity.poisson_ratio}});
+  }
+  return list;
+}
+
 MatrixX by_rows(const VectorX& field) { return Eigen::Map<const Points>(field.data(), field.size() / 3, 3); }
 
 double mesh_size_m(const TetMesh& mesh) { return (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm(); }
@@ -150,11 +162,11 @@ int run(const Options& given, Session& session) {
   if (push.force_n.has_value() == push.travel_m.has_value()) throw Error("give either --force or --travel", "predict");
   if (!given.out.empty()) must_take_files(given.out);
   fem::Boundary boundary = boundary_of(object, tool, load, push.background);
-  const prediction::Elasticity elasticity = prediction::elasticity_of(learned.answer);
-  must_be_bearable(push, tool, mesh, elasticity.young_modulus_pa);
+  const prediction::Elasticity elasticity = elasticity_of(learned);
+  must_be_bearable(push, tool, mesh, elasticity.highest_young_modulus_pa());
   fem::StaticsOptions options;
   options.threads = session.thread_count();
-  if (mesh.tetrahedra.cols() == 10 && elasticity.poisson_ratio > 0.45) options.dilatation = fem::Dilatation::averaged;
+  if (mesh.tetrahedra.cols() == 10 && elasticity.highest_poisson_ratio() > 0.45) options.dilatation = fem::Dilatation::averaged;
   const prediction::Prediction found = prediction::predict(mesh, elasticity, std::move(boundary), push, options);
   if (!found.converged) {
     session.warn("no equilibrium was found: " + found.reason);
@@ -180,6 +192,7 @@ int run(const Options& given, Session& session) {
                          {"material", elasticity.material},
                          {"young_modulus_pa", elasticity.young_modulus_pa},
                          {"poisson_ratio", elasticity.poisson_ratio},
+                         {"regions", regions_json(elasticity)},
                          {"tool", tool.name},
                          {"contact_m", {load.contact_m.x(), load.contact_m.y(), load.contact_m.z()}},
                          {"direction", {load.direction.x(), load.direction.y(), load.direction.z()}},

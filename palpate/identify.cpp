@@ -253,6 +253,7 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
     model.poisson_fixed.reset();
   }
   if (options.poisson_fixed) model.poisson_fixed = options.poisson_fixed;
+  if (options.poisson_by_region) model.poisson_by_region = true;
   if (options.regions == "none") recording.regions.clear();
   if (options.regions == "by-site") recording.regions = fem::regions_by_site(recording);
   const auto demand = [](bool fine, const std::string& where, const std::string& cure) {
@@ -263,6 +264,8 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
   demand(options.method == "palpate" || options.method == "paper", "method " + options.method, "the methods are palpate and paper");
   demand(options.regions == "recorded" || options.regions == "by-site" || options.regions == "none", "regions " + options.regions,
          "regions are those of the recording (recorded), one around each pushed site (by-site), or none");
+  demand(!options.poisson_by_region || recording.regions.size() > 1, "poisson_by_region",
+         "the object has one region: let the recording name its regions, or take one around each pushed site (by-site)");
   demand(options.mesh_tolerance > 0 && std::isfinite(options.mesh_tolerance), "mesh_tolerance",
          "must be positive: a share of E, such as 0.01");
   demand(model.refine == "none" || model.refine == "auto", "model.refine " + model.refine, "refinement is none or auto");
@@ -461,6 +464,16 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   out.object.rest = {};
   out.object.rest.state = given.rest.state;
   out.object.rest.volume = object.mesh;
+  if (out.object.regions.size() > 1) {  // as they were simulated, whatever they were chosen by
+    for (std::size_t r = 0; r < out.object.regions.size(); ++r) {
+      Region region;
+      region.name = out.object.regions[r].name;
+      region.select = RegionSelection::elements;
+      for (std::size_t e = 0; e < out.region.size(); ++e)
+        if (out.region[e] == static_cast<int>(r)) region.elements.push_back(static_cast<Index>(e));
+      out.object.regions[r] = std::move(region);
+    }
+  }
   out.object.pushes.clear();
   out.object.robot.reset();
   out.object.joint_names.clear();

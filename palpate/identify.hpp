@@ -24,6 +24,7 @@ struct IdentifyOptions {
   std::string regions = "recorded";  ///< or "by-site": one around each site that was pushed; or "none"
   std::optional<std::pair<double, double>> poisson_range;
   std::optional<double> poisson_fixed;
+  bool poisson_by_region = false;  ///< every region has its own nu, also where the recording says that they share one
   /// With `refine: auto`: while what the mesh does to E is estimated to be more than this share, and more than a third of all
   /// else that is not known of E, the object is fitted again on a finer mesh.
   double mesh_tolerance = 0.01;

@@ -62,6 +62,7 @@ void name_push_for_poisson(const Recording& recording, Identified& found, int th
                                     [](const Parameter& each) { return each.name == "poisson_ratio"; });
   const bool usable = answer.termination == Termination::converged && answer.covariance.size() > 0;
   if (verdict == answer.verdicts.end() || poisson == answer.parameters.end() || !usable) return;
+  if (!poisson->region.empty()) return;  // pushes are planned for a nu that all regions share
   if (!why_not_to_build_on(answer).empty()) return;
   SuggestOptions options;
   options.goal = estimation::PushGoal::poisson_ratio;

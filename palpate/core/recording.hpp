@@ -173,6 +173,7 @@ struct ModelDefaults {
   std::string material = "neo_hookean";
   double poisson_lower = 0.0, poisson_upper = 0.4995;  ///< uniform prior
   std::optional<double> poisson_fixed;
+  bool poisson_by_region = false;  ///< every region has its own nu; false: they share one
 };
 
 /// Where the object came from: exactly one of the three.

@@ -41,8 +41,18 @@ Parameter young_from(const Posterior& posterior, const std::string& region) {
   return young;
 }
 
-Parameter ratio_from(const Posterior& posterior, const Unknown& nu) {
-  Parameter ratio{"poisson_ratio", "", "1"};
+std::vector<Parameter> parameters_from(const std::vector<Posterior>& regions, const OwnPoisson& own, const Unknowns& unknowns,
+                                       const std::vector<std::string>& names) {
+  const auto name = [&](std::size_t r) { return names.empty() ? std::string() : names[r]; };
+  std::vector<Parameter> out{young_from(regions.front(), name(0)),
+                             ratio_from(regions.front(), unknowns[poisson], own.mean.size() > 0 ? name(0) : std::string())};
+  for (std::size_t r = 1; r < regions.size(); ++r) out.push_back(young_from(regions[r], name(r)));
+  for (Parameter& one : own.parameters(unknowns, names)) out.push_back(std::move(one));
+  return out;
+}
+
+Parameter ratio_from(const Posterior& posterior, const Unknown& nu, const std::string& region) {
+  Parameter ratio{"poisson_ratio", region, "1"};
   ratio.value = posterior.poisson_quantile(0.5);
   ratio.std = posterior.poisson_std();
   ratio.lower_95 = posterior.poisson_quantile(0.025);

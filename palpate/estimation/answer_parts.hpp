@@ -7,6 +7,7 @@
 
 #include "palpate/core/identification.hpp"
 #include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/own_poisson.hpp"
 #include "palpate/estimation/posterior.hpp"
 
 namespace palpate::estimation {
@@ -15,7 +16,13 @@ namespace palpate::estimation {
 Parameter young_from(const Posterior& posterior, const std::string& region);
 
 /// nu; determined where less than 60 % of its prior's standard deviation is left.
-Parameter ratio_from(const Posterior& posterior, const Unknown& nu);
+/// @param region  whose it is; empty: the whole object's
+Parameter ratio_from(const Posterior& posterior, const Unknown& nu, const std::string& region = {});
+
+/// E of the first region, nu, E of the others, and their own nu where they have it.
+/// @param names  of the regions; empty: there is one
+std::vector<Parameter> parameters_from(const std::vector<Posterior>& regions, const OwnPoisson& own, const Unknowns& unknowns,
+                                       const std::vector<std::string>& names);
 
 /// (log E of the first region, nu, log E of the others), in the order of the parameters.
 MatrixX covariance_of(const std::vector<Posterior>& regions);

@@ -56,7 +56,7 @@ MatrixX log_young_of_regions(const Unknowns& unknowns, const std::vector<int>& m
   MatrixX out = MatrixX::Zero(1 + unknowns.ratio_count(), static_cast<Index>(moving.size()));
   out.col(0).setOnes();
   for (std::size_t k = 0; k < moving.size(); ++k) {
-    if (moving[k] >= first_ratio && moving[k] < unknowns.parameter_count()) out(1 + moving[k] - first_ratio, static_cast<Index>(k)) = 1;
+    if (moving[k] >= first_ratio && moving[k] < unknowns.first_own_poisson()) out(1 + moving[k] - first_ratio, static_cast<Index>(k)) = 1;
   }
   return out;
 }

@@ -20,6 +20,7 @@
 #include "palpate/estimation/mesh_correction.hpp"
 #include "palpate/estimation/mesh_error.hpp"
 #include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/own_poisson.hpp"
 #include "palpate/estimation/posterior.hpp"
 #include "palpate/estimation/shape_error.hpp"
 #include "palpate/estimation/slips.hpp"
@@ -343,6 +344,12 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   }
   std::vector<Posterior> regions{posterior};
   for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));
+  OwnPoisson own = own_poisson(unknowns, optimum.unknowns, covariance, moving);
+  const auto move_by = [&](const AnswerShift& shift) {
+    for (std::size_t r = 0; r < regions.size(); ++r)
+      move(regions[r], shift.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
+    own.move(shift);
+  };
   const auto widen_by = [&](const char* name, const std::vector<AnswerShift>& independent) {
     BudgetEntry entry{name};
     VectorX percent = VectorX::Zero(static_cast<Index>(regions.size()));
@@ -353,28 +360,23 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
         percent(region) = std::hypot(percent(region), 100 * shift.of_region(region).log_young);
       }
       entry.poisson_shift = std::hypot(entry.poisson_shift, shift.poisson);
+      own.widen(shift);
     }
     set_young(entry, percent, object.region_names);
     answer.budget.push_back(entry);
     sort_by_share(answer.budget);
   };
   if (mesh) {
-    for (std::size_t r = 0; r < regions.size(); ++r)
-      move(regions[r], mesh->of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
+    move_by(*mesh);
     widen_by("mesh", {mesh->times(mesh_left_over)});
   }
   if (doubt != nullptr && doubt->effect) {
-    for (std::size_t r = 0; r < regions.size(); ++r)
-      move(regions[r], doubt->effect->move.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
+    move_by(doubt->effect->move);
     widen_by("unseen side", doubt->effect->shifts);
   }
   if (doubt != nullptr && doubt->foot && doubt->foot->effect) widen_by("foot", *doubt->foot->effect);
-  const auto region_name = [&](std::size_t r) {
-    return object.region_names.empty() ? std::string() : object.region_names[r];
-  };
-  answer.parameters = {young_from(regions.front(), region_name(0)), ratio_from(regions.front(), unknowns[poisson])};
-  for (std::size_t r = 1; r < regions.size(); ++r) answer.parameters.push_back(young_from(regions[r], region_name(r)));
-  answer.covariance = covariance_of(regions);
+  answer.parameters = parameters_from(regions, own, unknowns, object.region_names);
+  answer.covariance = own.covariance_with(covariance_of(regions));
   answer.posterior = posterior_grid(regions.front());
   if (options.on_estimate) options.on_estimate(answer);
   const auto stopped = [&] {

@@ -58,6 +58,7 @@ bool ForwardModel::Solved::holds_for(const Solved& other) const {
          supports == other.supports && spreads == other.spreads && options.dilatation == other.options.dilatation &&
          options.threads == other.options.threads && options.residual_tolerance == other.options.residual_tolerance &&
          options.region == other.options.region && same(options.region_stiffness, other.options.region_stiffness) &&
+         options.region_poisson.size() == other.options.region_poisson.size() &&  // their values are said with every question
          poisson_lower == other.poisson_lower && poisson_upper == other.poisson_upper &&
          response_tolerance == other.response_tolerance && bodies.size() == other.bodies.size();
 }
@@ -80,10 +81,18 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
   unknowns.add({"poisson_ratio", "1", 0, std::numeric_limits<double>::infinity(), recording.model.poisson_lower,
                 recording.model.poisson_upper});
   if (object_.region_names.size() > 1) {
-    unknowns.add_ratios({object_.region_names.begin() + 1, object_.region_names.end()});
+    const std::vector<std::string> further{object_.region_names.begin() + 1, object_.region_names.end()};
+    unknowns.add_ratios(further);
     options_.region = object_.region;
+    if (recording.model.poisson_by_region && !recording.model.poisson_fixed) {
+      if (recording.model.poisson_lower < 0)
+        throw Error("regions with a nu of their own need a lower bound of 0 or more", "model.poisson_range");
+      unknowns.add_own_poisson(further, recording.model.poisson_lower, recording.model.poisson_upper);
+    }
   }
   parameters_ = unknowns.parameter_count();
+  first_own_poisson_ = unknowns.first_own_poisson();
+  options_.region_poisson = region_poisson(unknowns.prior_mean());
   force_scale_ = unknowns.add_block("force_scale", "1", recording.force_scale_std, {""});
   const bool moves = std::any_of(recording.pushes.begin(), recording.pushes.end(), [](const Push& push) {
     return std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) {

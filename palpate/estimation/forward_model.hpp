@@ -229,6 +229,7 @@ class ForwardModel {
 
   std::size_t worker_of(std::size_t s) const;
   VectorX region_stiffness(const VectorX& unknowns) const;
+  VectorX region_poisson(const VectorX& unknowns) const;
   std::vector<int> parameter_columns() const;
   void place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const;
   /// Forgets the push's body where it lacks columns of a contact.
@@ -293,7 +294,8 @@ class ForwardModel {
   std::vector<Vec3> tare_axis_;                  // a push: zero = three unknowns, else one along this axis
   int force_scale_ = -1, time_offset_ = -1, density_ = -1;
   std::map<std::string, int> compliance_;  // a tool whose compliance is not exactly known
-  int parameters_ = first_ratio;  ///< log E, nu and the regions' ratios: the first columns of every derivative
+  int parameters_ = first_ratio;  ///< log E, nu, the regions' ratios and their own nu: the first columns of every derivative
+  int first_own_poisson_ = first_ratio;  ///< where the ratios end
   const SurfaceField* field_ = nullptr;  // of solved_; nullptr: none
   int field_unknown_ = -1;
   std::vector<int> solves_;    // a worker

@@ -2,6 +2,7 @@
 // One step solved: unit responses superposed, derivatives followed, or Newton's method.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "palpate/estimation/forward_model_parts.hpp"
 
@@ -9,9 +10,17 @@ namespace palpate::estimation {
 
 VectorX ForwardModel::region_stiffness(const VectorX& unknowns) const {
   if (parameters_ == first_ratio) return {};
-  VectorX stiffness = VectorX::Ones(1 + parameters_ - first_ratio);
-  stiffness.tail(stiffness.size() - 1) = unknowns.segment(first_ratio, parameters_ - first_ratio).array().exp();
+  VectorX stiffness = VectorX::Ones(1 + first_own_poisson_ - first_ratio);
+  stiffness.tail(stiffness.size() - 1) = unknowns.segment(first_ratio, first_own_poisson_ - first_ratio).array().exp();
   return stiffness;
+}
+
+/// Of the first region it is the nu that is asked for.
+VectorX ForwardModel::region_poisson(const VectorX& unknowns) const {
+  if (parameters_ == first_own_poisson_) return {};
+  VectorX own(1 + parameters_ - first_own_poisson_);
+  own << std::numeric_limits<double>::quiet_NaN(), unknowns.segment(first_own_poisson_, parameters_ - first_own_poisson_);
+  return own;
 }
 
 fem::ResponseQuery ForwardModel::query(const Coefficients& c, const VectorX& unknowns, bool derivatives) const {
@@ -23,6 +32,7 @@ fem::ResponseQuery ForwardModel::query(const Coefficients& c, const VectorX& unk
   q.derivatives = derivatives;
   q.along = fem::LoadDirections{c.d_force, c.d_motion};
   q.stiffness = region_stiffness(unknowns);
+  q.region_poisson = region_poisson(unknowns);
   return q;
 }
 

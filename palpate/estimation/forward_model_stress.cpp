@@ -37,16 +37,15 @@ VectorX ForwardModel::von_mises_pa(std::size_t s, const VectorX& unknowns) {
       displacement_m = at.solution->displacement_m;
     }
   }
-  VectorX stiffness;
-  if (parameters_ > first_ratio) {
-    stiffness = VectorX::Ones(object_.mesh.tetrahedra.rows());
-    for (Index e = 0; e < stiffness.size(); ++e) {
-      const int region = object_.region[static_cast<std::size_t>(e)];
-      if (region > 0) stiffness(e) = std::exp(unknowns(first_ratio + region - 1));
-    }
+  const VectorX of_region = region_stiffness(unknowns), nu_of_region = region_poisson(unknowns);
+  VectorX stiffness, nu;  // an element
+  if (of_region.size() > 0) stiffness = of_region(object_.region);
+  if (nu_of_region.size() > 0) {
+    nu = nu_of_region(object_.region);
+    nu = nu.array().isNaN().select(unknowns(poisson), nu);
   }
   const VectorX at_nodes =
-      fem::von_mises(object_.mesh, object_.material, young_pa, unknowns(poisson), {}, displacement_m, stiffness);
+      fem::von_mises(object_.mesh, object_.material, young_pa, unknowns(poisson), {}, displacement_m, stiffness, nu);
   // The surface hangs on the nodes by weights that serve any nodal field: stresses travel as first components.
   VectorX carried = VectorX::Zero(3 * at_nodes.size());
   for (Index n = 0; n < at_nodes.size(); ++n) carried(3 * n) = at_nodes(n);

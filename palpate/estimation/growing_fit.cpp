@@ -168,10 +168,9 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   }
   std::vector<Posterior> regions{posterior};
   for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));
-  const auto region_name = [&](std::size_t r) { return object.region_names.empty() ? std::string() : object.region_names[r]; };
-  answer.parameters = {young_from(regions.front(), region_name(0)), ratio_from(regions.front(), unknowns[poisson])};
-  for (std::size_t r = 1; r < regions.size(); ++r) answer.parameters.push_back(young_from(regions[r], region_name(r)));
-  answer.covariance = covariance_of(regions);
+  const OwnPoisson own = own_poisson(unknowns, optimum.unknowns, covariance, moving);
+  answer.parameters = parameters_from(regions, own, unknowns, object.region_names);
+  answer.covariance = own.covariance_with(covariance_of(regions));
   objective.set_reuse(reuse);
   objective.evaluate(optimum.unknowns, optimum.loss);  // verdicts look at the optimum's rows
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}, Doubts{}, std::nullopt});

@@ -76,13 +76,18 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
   const double whole = 1 / (1 - finer.left());
   AnswerShift shift;
   shift.load_cases = load_cases;
-  shift.region_log_young = VectorX::Zero(objective.unknowns().ratio_count());
+  const Unknowns& list = objective.unknowns();
+  shift.region_log_young = VectorX::Zero(list.ratio_count());
+  shift.region_poisson = VectorX::Zero(list.own_poisson_count());
   for (std::size_t k = 0; k < moving.size(); ++k) {
     const double moved = whole * change(static_cast<Index>(k));
     if (moving[k] == log_young) shift.log_young = moved;
     if (moving[k] == poisson) shift.poisson = moved;
-    if (moving[k] >= first_ratio && moving[k] < objective.unknowns().parameter_count())
+    if (moving[k] < first_ratio || moving[k] >= list.parameter_count()) continue;
+    if (moving[k] < list.first_own_poisson())
       shift.region_log_young(moving[k] - first_ratio) = moved;
+    else
+      shift.region_poisson(moving[k] - list.first_own_poisson()) = moved;
   }
   shift.region_log_young.array() += shift.log_young;
   return shift.plus(finer.elsewhere);

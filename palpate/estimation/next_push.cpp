@@ -111,7 +111,9 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
   std::vector<Index> rows;
   for (const auto& name : known.regions) rows.push_back(parameter_row(answer, "young_modulus", name));
   if (rows.empty()) rows.push_back(parameter_row(answer, "young_modulus", ""));
-  rows.push_back(parameter_row(answer, "poisson_ratio", ""));
+  const bool own = std::none_of(answer.parameters.begin(), answer.parameters.end(),
+                                [](const Parameter& one) { return one.name == "poisson_ratio" && one.region.empty(); });
+  rows.push_back(parameter_row(answer, "poisson_ratio", own && !known.regions.empty() ? known.regions.front() : ""));
   const Index regions = static_cast<Index>(rows.size()) - 1;
   if (answer.covariance.rows() <= *std::max_element(rows.begin(), rows.end()) || !answer.covariance.allFinite())
     throw Error("holds no covariance; estimate with the default method", "result: covariance");

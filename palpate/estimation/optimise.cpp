@@ -22,6 +22,15 @@ MatrixX pick(const MatrixX& matrix, const std::vector<int>& which) {
   return out;
 }
 
+/// A nu of a region's own that sits on a bound which the gradient pushes against.
+bool pushes_out(const Unknowns& unknowns, const VectorX& at, const VectorX& gradient, int k) {
+  return (at(k) <= unknowns[k].lower && gradient(k) > 0) || (at(k) >= unknowns[k].upper && gradient(k) < 0);
+}
+
+void keep_own_poisson_inside(const Unknowns& unknowns, VectorX& at) {
+  for (int k = unknowns.first_own_poisson(); k < unknowns.parameter_count(); ++k) at(k) = std::clamp(at(k), unknowns[k].lower, unknowns[k].upper);
+}
+
 }  // namespace
 
 std::vector<int> free_unknowns(const Unknowns& unknowns) {
@@ -47,7 +56,8 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
   const ReuseWhile reuse(model, options.reuse);
   Optimum best;
   best.unknowns = start;
-  best.evaluation = objective.evaluate(start, loss, progress);
+  keep_own_poisson_inside(unknowns, best.unknowns);  // a caller's guess may lie outside
+  best.evaluation = objective.evaluate(best.unknowns, loss, progress);
   if (!best.evaluation.usable) {
     best.termination = best.evaluation.reason == "cancelled" ? Termination::cancelled : Termination::failed;
     best.message = best.evaluation.reason;
@@ -73,6 +83,10 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
     best.poisson_at_upper = nu >= unknowns[poisson].upper && slope < 0;
     std::vector<int> moving = free_unknowns(unknowns);
     if (best.poisson_at_lower || best.poisson_at_upper) moving.erase(std::remove(moving.begin(), moving.end(), poisson), moving.end());
+
+    std::erase_if(moving, [&](int k) {
+      return k >= unknowns.first_own_poisson() && k < unknowns.parameter_count() && pushes_out(unknowns, best.unknowns, best.evaluation.gradient, k);
+    });
 
     const MatrixX hessian = pick(best.evaluation.curvature, moving);
     VectorX gradient(static_cast<Index>(moving.size()));
@@ -102,7 +116,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
       for (std::size_t k = 0; k < moving.size(); ++k) next(moving[k]) += move(static_cast<Index>(k));
       // A step of log E, in any region, beyond a factor of five leaves every linearisation behind.
       double jump = std::abs(next(log_young) - best.unknowns(log_young));
-      for (int k = first_ratio; k < unknowns.parameter_count(); ++k) jump = std::max(jump, std::abs(next(k) - best.unknowns(k)));
+      for (int k = first_ratio; k < unknowns.first_own_poisson(); ++k) jump = std::max(jump, std::abs(next(k) - best.unknowns(k)));
       if (jump > 1.6) next = best.unknowns + (1.6 / jump) * (next - best.unknowns);
       for (int k : moving) {
         const Unknown& unknown = unknowns[k];
@@ -112,6 +126,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
       }
       next(log_young) = std::clamp(next(log_young), unknowns[log_young].lower, unknowns[log_young].upper);
       next(poisson) = std::clamp(next(poisson), unknowns[poisson].lower, unknowns[poisson].upper);
+      keep_own_poisson_inside(unknowns, next);
 
       Evaluation trial = objective.evaluate(next, loss, progress);
       if (trial.reason == "cancelled") {

@@ -261,6 +261,7 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
     plan.region.push_back(region);
   }
   if (plan.candidates.empty()) return;
+  plan.planned.model.poisson_by_region = false;  // planned for as if they shared it
   plan.model = std::make_unique<ForwardModel>(plan.planned, std::move(small_strains), plan.unknowns, statics);
   for (int k = 0; k < plan.unknowns.size(); ++k)
     if (plan.unknowns[k].name == "force_scale") plan.force_scale = k;

@@ -49,11 +49,13 @@ struct Answer {
 };
 
 /// @param change  of the parameters
-AnswerShift shift_of(const VectorX& change) {
+/// @param ratios  how many of them are log ratios of regions
+AnswerShift shift_of(const VectorX& change, Index ratios) {
   AnswerShift out;
   out.log_young = change(log_young);
   out.poisson = change(poisson);
-  out.region_log_young = change.tail(change.size() - first_ratio).array() + change(log_young);
+  out.region_log_young = change.segment(first_ratio, ratios).array() + change(log_young);
+  out.region_poisson = change.tail(change.size() - first_ratio - ratios);
   return out;
 }
 
@@ -190,11 +192,12 @@ std::optional<ShapeEffect> shape_effect(const ShapeDoubt& doubt, const Recording
     out.softest_pa = std::min(out.softest_pa, std::exp(shape->parameters(log_young)));
     out.stiffest_pa = std::max(out.stiffest_pa, std::exp(shape->parameters(log_young)));
   }
-  out.move = shift_of(mean - best->fitted);
+  const Index ratios = objective.unknowns().ratio_count();
+  out.move = shift_of(mean - best->fitted, ratios);
   const Eigen::SelfAdjointEigenSolver<MatrixX> parts(spread);
   for (Index k = 0; k < mean.size(); ++k) {
     const double variance = parts.eigenvalues()(k);
-    if (variance > 0) out.shifts.push_back(shift_of(std::sqrt(variance) * parts.eigenvectors().col(k)));
+    if (variance > 0) out.shifts.push_back(shift_of(std::sqrt(variance) * parts.eigenvectors().col(k), ratios));
   }
   return out;
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The vector that the fit moves: log E, nu, log ratios of regions, then every nuisance with its prior. One entry a scalar.
+// The vector that the fit moves: log E, nu, log ratios of regions and Poisson ratios of their own, then every nuisance with its prior.
+// One entry a scalar.
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <string>
@@ -48,6 +50,15 @@ class Unknowns {
     ratios_ = static_cast<int>(regions.size());
   }
   int ratio_count() const { return ratios_; }
+  /// Poisson ratios of the same further regions, where they have their own; right after the ratios. A normal prior with the mean and
+  /// the standard deviation of the uniform one between these bounds, which are kept.
+  void add_own_poisson(const std::vector<std::string>& regions, double lower, double upper) {
+    for (const auto& region : regions)
+      add({"poisson_ratio[" + region + "]", "1", 0.5 * (lower + upper), (upper - lower) / std::sqrt(12.0), lower, upper});
+    own_poisson_ = static_cast<int>(regions.size());
+  }
+  int own_poisson_count() const { return own_poisson_; }
+  int first_own_poisson() const { return first_ratio + ratios_; }
   std::vector<int> ratios() const {
     std::vector<int> all(static_cast<std::size_t>(ratios_));
     std::iota(all.begin(), all.end(), first_ratio);
@@ -62,8 +73,8 @@ class Unknowns {
     }
     return found;
   }
-  /// log E, nu and the ratios: what is asked for; everything from here on is a nuisance.
-  int parameter_count() const { return first_ratio + ratios_; }
+  /// log E, nu, the ratios and the regions' own nu: what is asked for; everything from here on is a nuisance.
+  int parameter_count() const { return first_ratio + ratios_ + own_poisson_; }
   int size() const { return static_cast<int>(entries_.size()); }
   const Unknown& operator[](int i) const { return entries_[static_cast<std::size_t>(i)]; }
   Unknown& operator[](int i) { return entries_[static_cast<std::size_t>(i)]; }
@@ -75,7 +86,7 @@ class Unknowns {
 
  private:
   std::vector<Unknown> entries_;
-  int ratios_ = 0;
+  int ratios_ = 0, own_poisson_ = 0;
 };
 
 }  // namespace palpate::estimation

@@ -70,7 +70,8 @@ void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
     if (parameter.name == "poisson_ratio" && !parameter.determined) {
       determined = false;
       out.push_back({"nu_not_determined",
-                     "These pushes hardly determine the Poisson ratio: its interval [" + number(parameter.lower_95) + ", " +
+                     "These pushes hardly determine the Poisson ratio" + (parameter.region.empty() ? "" : " of region '" + parameter.region + "'") +
+                         ": its interval [" + number(parameter.lower_95) + ", " +
                          number(parameter.upper_95) +
                          "] is mostly the prior's. Push where the object can bulge sideways in view, or deeper, or from a "
                          "second side, or fix nu (`--poisson-ratio`) if it is known; `palpate suggest --for poisson-ratio` ranks "

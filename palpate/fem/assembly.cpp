@@ -100,9 +100,50 @@ void Assembly::set_region_stiffness(const VectorX& stiffness) {
   stiffness_ = stiffness;
   const std::size_t points = weights_.size() / region_.size();
   for (std::size_t k = 0; k < weights_.size(); ++k) weights_[k] = stiffness_(region_[k / points]) * volumes_[k];
+  weigh_dilatations();
+}
+
+void Assembly::weigh_dilatations() const {
   for (Patch& patch : patches_) patch.volume = 0;
-  for (std::size_t e = 0; e < patch_of_.size(); ++e) patches_[patch_of_[e]].volume += weights_[e];
+  for (std::size_t e = 0; e < patch_of_.size(); ++e) patches_[patch_of_[e]].volume += bulk_weight(static_cast<Index>(e)) * weights_[e];
   if (pressures_ > 0) factorise_pressure_mass();
+}
+
+void Assembly::set_region_poisson(const VectorX& poisson) {
+  const bool sizes_fit = poisson.size() == 0 || poisson.size() == stiffness_.size();
+  if (!sizes_fit || (poisson.array() <= -1 || poisson.array() >= 0.5 || poisson.array().isInf()).any())
+    throw Error("needs a Poisson ratio in (-1, 0.5), or NaN, for each of " + std::to_string(stiffness_.size()) + " regions",
+                "StaticsOptions.region_poisson");
+  const bool own = poisson.size() > 0 && !poisson.array().isNaN().all();
+  region_poisson_ = own ? poisson : VectorX();
+  if (own || bulk_share_.size() == 0) return;
+  bulk_share_.resize(0);
+  weigh_dilatations();
+}
+
+void Assembly::prepare_regions(const MaterialLaw& law, const Moduli& m) const {
+  const Index regions = static_cast<Index>(region_poisson_.size());
+  if (regions == 0) return;
+  region_moduli_.assign(static_cast<std::size_t>(regions), m);
+  for (Index r = 0; r < regions; ++r)
+    if (!std::isnan(region_poisson_(r))) region_moduli_[static_cast<std::size_t>(r)] = moduli(m.young_pa, region_poisson_(r), m.extra);
+  VolumetricPart part;
+  if ((patches_.empty() && pressures_ == 0) || !law.volumetric_part(m, Mat3::Zero(), false, part)) return;
+  VectorX bulk_pa(regions);
+  for (Index r = 0; r < regions; ++r) {
+    law.volumetric_part(region_moduli_[static_cast<std::size_t>(r)], Mat3::Zero(), false, part);
+    bulk_pa(r) = part.modulus;
+  }
+  if (bulk_pa.minCoeff() < 0)
+    throw Error("a region whose volume term is negative (nu below 0) does not go with regions of another nu where dilatations are averaged",
+                "StaticsOptions.region_poisson");
+  bulk_pa_ = bulk_pa.maxCoeff();
+  // A region without a volume term weighs nothing; what little it is given keeps the projection regular.
+  constexpr double least = 1e-9;
+  const VectorX share = bulk_pa_ > 0 ? VectorX((bulk_pa / bulk_pa_).cwiseMax(least)) : VectorX::Ones(regions);
+  if (bulk_share_.size() == share.size() && bulk_share_ == share) return;
+  bulk_share_ = share;
+  weigh_dilatations();
 }
 
 void Assembly::build_pattern() {
@@ -172,12 +213,14 @@ void Assembly::for_each_point(const VectorX& u, Function&& function) const {
 // Fills mean_ with the averaged theta of every point. False: this law or this assembly averages nothing.
 template <int N, int Q>
 bool Assembly::average_dilatation(const MaterialLaw& law, const Moduli& m, const VectorX& u) const {
+  prepare_regions(law, m);
   VolumetricPart part;
   if ((patches_.empty() && pressures_ == 0) || !law.volumetric_part(m, Mat3::Zero(), false, part)) return false;
   static const auto quadrature = tet_quadrature_4();
   VectorX sum = VectorX::Zero(patches_.empty() ? pressures_ : static_cast<Index>(patches_.size()));
-  for_each_point<N, Q>(u, [&](Index e, int q, const auto&, double weight, const Mat3& h) {
-    law.volumetric_part(m, h, false, part);
+  for_each_point<N, Q>(u, [&](Index e, int q, const auto&, double plain, const Mat3& h) {
+    law.volumetric_part(of_element(m, e), h, false, part);
+    const double weight = bulk_weight(e) * plain;
     if (Q == 1)
       sum(patch_of_[e]) += weight * part.theta;
     else
@@ -209,13 +252,14 @@ double Assembly::energy_and_forces_of(const MaterialLaw& law, const Moduli& m, c
   VolumetricPart part;
   const bool averaged = average_dilatation<N, Q>(law, m, u);
   for_each_point<N, Q>(u, [&](Index e, int q, const auto& g, double weight, const Mat3& h) {
-    double density = law.energy_and_stress(m, h, stress);
+    const Moduli& here = of_element(m, e);
+    double density = law.energy_and_stress(here, h, stress);
     if (!(density < std::numeric_limits<double>::infinity())) {
       energy = std::numeric_limits<double>::infinity();
       return false;
     }
     if (averaged) {
-      law.volumetric_part(m, h, false, part);
+      law.volumetric_part(here, h, false, part);
       const double mean = mean_[static_cast<std::size_t>(e) * Q + q];
       stress += part.modulus * (mean - part.theta) * part.gradient;
       density += 0.5 * part.modulus * (mean * mean - part.theta * part.theta);
@@ -247,15 +291,16 @@ void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX
   Mat9 c;
   for_each_point<N, Q>(u, [&](Index e, int q, const auto& g, double weight, const Mat3& h) {
     if (point == 0) std::fill(local, local + kPairs * 9, 0.0);
-    law.tangent(m, h, c);
+    const Moduli& here = of_element(m, e);
+    law.tangent(here, h, c);
     if (averaged) {
-      law.volumetric_part(m, h, true, part);
+      law.volumetric_part(here, h, true, part);
       c += part.modulus * (mean_[static_cast<std::size_t>(e) * Q + q] - part.theta) * part.hessian;
       c.noalias() -= part.modulus * as_vector(part.gradient) * as_vector(part.gradient).transpose();
       if (Q == 1) {
         VectorX& sum = volume_gradient[patch_of_[e]];
         for (int a = 0; a < N; ++a)
-          sum.segment<3>(3 * slot_[static_cast<std::size_t>(e) * N + a]) += weight * part.gradient * g.row(a).transpose();
+          sum.segment<3>(3 * slot_[static_cast<std::size_t>(e) * N + a]) += bulk_weight(e) * weight * part.gradient * g.row(a).transpose();
       }
     }
     double* block = local;
@@ -281,7 +326,7 @@ void Assembly::tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX
   });
   for (std::size_t p = 0; p < volume_gradient.size(); ++p) {
     const VectorX& v = volume_gradient[p];
-    const double scale = part.modulus / patches_[p].volume;
+    const double scale = (has_own_poisson() ? bulk_pa_ : part.modulus) / patches_[p].volume;
     const Index* target = patches_[p].blocks.data();
     for (Index b = 0; b < v.size(); b += 3)
       for (Index a = b; a < v.size(); a += 3)
@@ -297,6 +342,7 @@ void Assembly::add_pressure_blocks(const MaterialLaw& law, const Moduli& m, cons
   static const auto quadrature = tet_quadrature_4();
   VolumetricPart part;
   const bool split = law.volumetric_part(m, Mat3::Zero(), false, part);
+  if (has_own_poisson()) part.modulus = bulk_pa_;
   // Nothing couples a body without a volumetric part (foam, nu = 0) to its pressures.
   const bool coupled = split && std::abs(part.modulus) > 1e-9 * m.young_pa;
   modulus_ = coupled ? part.modulus : 0;
@@ -308,8 +354,9 @@ void Assembly::add_pressure_blocks(const MaterialLaw& law, const Moduli& m, cons
     if (!coupled) block(0, 0) = -idle;
   }
   if (!coupled) return;
-  for_each_point<N, Q>(u, [&](Index e, int q, const auto& g, double weight, const Mat3& h) {
-    law.volumetric_part(m, h, false, part);
+  for_each_point<N, Q>(u, [&](Index e, int q, const auto& g, double plain, const Mat3& h) {
+    law.volumetric_part(of_element(m, e), h, false, part);
+    const double weight = bulk_weight(e) * plain;
     const Eigen::Matrix<double, 3, N> flux = weight * part.gradient * g.transpose();
     for (int a = 0; a < 4; ++a) {
       const std::size_t k = 4 * static_cast<std::size_t>(e) + a;
@@ -382,60 +429,97 @@ void Assembly::tangent(const MaterialLaw& law, const Moduli& m, const VectorX& u
     tangent_of<10, 4>(law, m, u, blocks);
 }
 
-VectorX Assembly::forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const {
+// How averaged dilatations move as the weights do that they are averaged with, by `weight_slope` of an element's plain weight: of the
+// projection M p = s, M dp = ds - dM p.
+template <typename Slope>
+std::vector<double> Assembly::mean_slope(const MaterialLaw& law, const Moduli& m, const VectorX& u, Slope&& weight_slope) const {
+  const bool quadratic = connectivity_.cols() == 10;
+  const std::size_t points = quadratic ? 4 : 1;
+  VolumetricPart part;
+  VectorX sum = VectorX::Zero(patches_.empty() ? pressures_ : static_cast<Index>(patches_.size()));
+  const auto quadrature = tet_quadrature_4();
+  const auto add = [&](Index e, int q, const auto&, double weight, const Mat3& h) {
+    const double slope = weight_slope(e);
+    if (slope == 0) return true;
+    law.volumetric_part(of_element(m, e), h, false, part);
+    const double off = slope * weight * (part.theta - mean_[static_cast<std::size_t>(e) * points + q]);
+    if (!quadratic) {
+      sum(patch_of_[e]) += off / patches_[patch_of_[e]].volume;
+    } else {
+      for (int a = 0; a < 4; ++a) sum(pressure_of_[4 * static_cast<std::size_t>(e) + a]) += quadrature[q].barycentric(a) * off;
+    }
+    return true;
+  };
+  if (quadratic)
+    for_each_point<10, 4>(u, add);
+  else
+    for_each_point<4, 1>(u, add);
+  if (quadratic) mass_factor_.solve_in_place(sum);
+  std::vector<double> slopes(weights_.size(), 0);
+  for (std::size_t k = 0; k < slopes.size(); ++k) {
+    if (!quadratic) slopes[k] = sum(patch_of_[k]);
+    for (int a = 0; quadratic && a < 4; ++a) slopes[k] += quadrature[k % 4].barycentric(a) * sum(pressure_of_[4 * (k / 4) + a]);
+  }
+  return slopes;
+}
+
+// `moves` says of an element whether its nu does. Where all have the same, averages stay: their weights move as one.
+template <typename Moves>
+VectorX Assembly::forces_d_poisson_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, Moves&& moves) const {
   const bool averaged =
       connectivity_.cols() == 4 ? average_dilatation<4, 1>(law, m, u) : average_dilatation<10, 4>(law, m, u);
+  const std::size_t points = connectivity_.cols() == 4 ? 1 : 4;
+  std::vector<double> slopes;
+  if (averaged && has_own_poisson() && bulk_pa_ > 0) {
+    slopes = mean_slope(law, m, u, [&](Index e) {
+      if (!moves(e)) return 0.0;
+      VolumetricPart part;
+      law.volumetric_part(of_element(m, e), Mat3::Zero(), false, part);
+      return part.modulus_d_poisson / bulk_pa_;
+    });
+  }
   return forces_of(u, [&](std::size_t point, const Mat3& h) {
-    Mat3 stress = law.stress_d_poisson(m, h);
+    const Index e = static_cast<Index>(point / points);
+    const Moduli& here = of_element(m, e);
+    const bool moving = moves(e);
+    Mat3 stress = Mat3::Zero();
+    if (moving) stress = law.stress_d_poisson(here, h);
     if (averaged) {
       VolumetricPart part;
-      law.volumetric_part(m, h, false, part);
-      stress += part.modulus_d_poisson * (mean_[point] - part.theta) * part.gradient;
+      law.volumetric_part(here, h, false, part);
+      if (moving) stress += part.modulus_d_poisson * (mean_[point] - part.theta) * part.gradient;
+      if (!slopes.empty()) stress += part.modulus * slopes[point] * part.gradient;
     }
     return stress;
   });
+}
+
+VectorX Assembly::forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const {
+  return forces_d_poisson_of(law, m, u, [this](Index e) {
+    return !has_own_poisson() || std::isnan(region_poisson_(region_[static_cast<std::size_t>(e)]));
+  });
+}
+
+VectorX Assembly::forces_d_region_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u, int region) const {
+  if (!has_own_poisson() || std::isnan(region_poisson_(region))) return VectorX::Zero(u.size());
+  return forces_d_poisson_of(law, m, u, [&](Index e) { return region_[static_cast<std::size_t>(e)] == region; });
 }
 
 VectorX Assembly::forces_d_log_stiffness(const MaterialLaw& law, const Moduli& m, const VectorX& u, int region) const {
   const bool quadratic = connectivity_.cols() == 10;
   const bool averaged = quadratic ? average_dilatation<10, 4>(law, m, u) : average_dilatation<4, 1>(law, m, u);
   const std::size_t points = quadratic ? 4 : 1;
-  // The projection M p = s moves with the weights as well: M dp = ds - dM p, both of this region alone.
-  std::vector<double> mean_slope;
-  if (averaged) {
-    VolumetricPart part;
-    VectorX sum = VectorX::Zero(patches_.empty() ? pressures_ : static_cast<Index>(patches_.size()));
-    const auto quadrature = tet_quadrature_4();
-    const auto add = [&](Index e, int q, const auto&, double weight, const Mat3& h) {
-      if (region_[e] != region) return true;
-      law.volumetric_part(m, h, false, part);
-      const double off = weight * (part.theta - mean_[static_cast<std::size_t>(e) * points + q]);
-      if (!quadratic) {
-        sum(patch_of_[e]) += off / patches_[patch_of_[e]].volume;
-      } else {
-        for (int a = 0; a < 4; ++a) sum(pressure_of_[4 * static_cast<std::size_t>(e) + a]) += quadrature[q].barycentric(a) * off;
-      }
-      return true;
-    };
-    if (quadratic)
-      for_each_point<10, 4>(u, add);
-    else
-      for_each_point<4, 1>(u, add);
-    if (quadratic) mass_factor_.solve_in_place(sum);
-    mean_slope.assign(weights_.size(), 0);
-    for (std::size_t k = 0; k < mean_slope.size(); ++k) {
-      if (!quadratic) mean_slope[k] = sum(patch_of_[k]);
-      for (int a = 0; quadratic && a < 4; ++a) mean_slope[k] += quadrature[k % 4].barycentric(a) * sum(pressure_of_[4 * (k / 4) + a]);
-    }
-  }
+  std::vector<double> slopes;
+  if (averaged) slopes = mean_slope(law, m, u, [&](Index e) { return region_[e] == region ? bulk_weight(e) : 0.0; });
   return forces_of(u, [&](std::size_t point, const Mat3& h) {
+    const Moduli& here = of_element(m, static_cast<Index>(point / points));
     Mat3 stress = Mat3::Zero();
     const bool inside = region_[point / points] == region;
-    if (inside) law.energy_and_stress(m, h, stress);
+    if (inside) law.energy_and_stress(here, h, stress);
     if (averaged) {
       VolumetricPart part;
-      law.volumetric_part(m, h, false, part);
-      stress += part.modulus * ((inside ? mean_[point] - part.theta : 0.0) + mean_slope[point]) * part.gradient;
+      law.volumetric_part(here, h, false, part);
+      stress += part.modulus * ((inside ? mean_[point] - part.theta : 0.0) + slopes[point]) * part.gradient;
     }
     return stress;
   });
@@ -443,7 +527,11 @@ VectorX Assembly::forces_d_log_stiffness(const MaterialLaw& law, const Moduli& m
 
 // Further parameters never enter a volumetric part (VolumetricPart knows only its derivative to nu).
 VectorX Assembly::forces_d_extra(const MaterialLaw& law, const Moduli& m, const VectorX& u, int index) const {
-  return forces_of(u, [&](std::size_t, const Mat3& h) { return law.stress_d_extra(m, h, index); });
+  prepare_regions(law, m);
+  const std::size_t points = connectivity_.cols() == 4 ? 1 : 4;
+  return forces_of(u, [&](std::size_t point, const Mat3& h) {
+    return law.stress_d_extra(of_element(m, static_cast<Index>(point / points)), h, index);
+  });
 }
 
 }  // namespace palpate::fem

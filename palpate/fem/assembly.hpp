@@ -40,7 +40,11 @@ class Assembly {
   /// Factors on the regions' energies. With averaged dilatation they weigh the projection too, so that the energy stays one
   /// function of u. Linear in the factors otherwise. @throws Error unless there is one positive number a region
   void set_region_stiffness(const VectorX& stiffness);
+  /// Poisson ratios of regions that have their own (NaN: that of the moduli asked with; empty: all of them). Averaged dilatations
+  /// are then weighed with each region's bulk term as well. @throws Error unless there is one number a region, in (-1, 0.5)
+  void set_region_poisson(const VectorX& poisson);
   int region_count() const { return static_cast<int>(stiffness_.size()); }  ///< 0: they were not given
+  bool has_own_poisson() const { return region_poisson_.size() > 0; }
 
   Index node_count() const { return nodes_; }
   Index element_count() const { return static_cast<Index>(connectivity_.rows()); }
@@ -65,8 +69,10 @@ class Assembly {
   /// The tangent of a linear law is not linear in (lambda, mu).
   bool is_mixed() const { return pressures_ > 0; }
 
-  /// d(internal forces)/dnu at constant E and u.
+  /// d(internal forces)/dnu at constant E and u; of the regions without a nu of their own.
   VectorX forces_d_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u) const;
+  /// d(internal forces)/d(a region's own nu).
+  VectorX forces_d_region_poisson(const MaterialLaw& law, const Moduli& m, const VectorX& u, int region) const;
   /// d(internal forces)/d log of a region's stiffness at constant u.
   VectorX forces_d_log_stiffness(const MaterialLaw& law, const Moduli& m, const VectorX& u, int region) const;
   /// d(internal forces)/d extra[index] at constant u.
@@ -82,13 +88,27 @@ class Assembly {
   void tangent_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
   template <typename Stress>
   VectorX forces_of(const VectorX& u, Stress&& stress) const;
+  template <typename Slope>
+  std::vector<double> mean_slope(const MaterialLaw& law, const Moduli& m, const VectorX& u, Slope&& weight_slope) const;
+  template <typename Moves>
+  VectorX forces_d_poisson_of(const MaterialLaw& law, const Moduli& m, const VectorX& u, Moves&& moves) const;
+  /// Readies what of_element and bulk_weight say.
+  void prepare_regions(const MaterialLaw& law, const Moduli& m) const;
+  const Moduli& of_element(const Moduli& m, Index e) const {
+    return region_poisson_.size() == 0 ? m : region_moduli_[static_cast<std::size_t>(region_[static_cast<std::size_t>(e)])];
+  }
+  /// What a point weighs where dilatations are averaged, over its weight elsewhere.
+  double bulk_weight(Index e) const {
+    return bulk_share_.size() == 0 ? 1.0 : bulk_share_(region_[static_cast<std::size_t>(e)]);
+  }
   template <int N, int Q>
   bool average_dilatation(const MaterialLaw& law, const Moduli& m, const VectorX& u) const;
 
   void build_pattern();
   void build_patches();
   void build_pressures(const TetMesh& mesh);
-  void factorise_pressure_mass();
+  void factorise_pressure_mass() const;
+  void weigh_dilatations() const;
   template <int N, int Q>
   void add_pressure_blocks(const MaterialLaw& law, const Moduli& m, const VectorX& u, BlockValues& blocks) const;
 
@@ -98,6 +118,10 @@ class Assembly {
   std::vector<double> volumes_;    // element, quadrature point; empty: weights_
   std::vector<int> region_;        // element; empty: one region
   VectorX stiffness_;              // a region
+  VectorX region_poisson_;         // a region, NaN: it has none of its own; empty: all
+  mutable std::vector<Moduli> region_moduli_;  // a region, where some have their own nu: at the moduli of the last call
+  mutable VectorX bulk_share_;     // a region: its bulk term over the largest; empty: 1
+  mutable double bulk_pa_ = 0;     // the largest one, at the E of the last call
   std::vector<Index> block_of_;    // element, pairs a >= b
   BlockPattern pattern_;
   double volume_ = 0;
@@ -108,7 +132,7 @@ class Assembly {
     std::vector<Index> blocks;  // pairs a >= b of its nodes, as in block_of_
     double volume = 0;
   };
-  std::vector<Patch> patches_;
+  mutable std::vector<Patch> patches_;  // volumes follow bulk_share_
   std::vector<Index> patch_of_;  // element
   std::vector<Index> slot_;      // element, node: its place in the patch's nodes
   // Pressures at the corners (none: pointwise or linear elements).
@@ -116,7 +140,7 @@ class Assembly {
   std::vector<Index> pressure_of_;     // element, corner in the mesh's order
   std::vector<Index> pressure_block_;  // element, corner, node: block of B
   std::vector<Index> mass_block_;      // element, corner pairs a, b: block of M, -1 above the diagonal
-  SparseFactor mass_factor_;
+  mutable SparseFactor mass_factor_;
   mutable double modulus_ = 0;  // kappa of the last tangent
   mutable int expected_negative_ = 0;
   mutable std::vector<double> mean_;  // averaged theta at each quadrature point, scratch

@@ -180,6 +180,7 @@ ContactStatics& ContactStatics::operator=(ContactStatics&&) noexcept = default;
 const std::vector<RigidContact>& ContactStatics::contacts() const { return impl_->system.contacts; }
 const TetMesh& ContactStatics::mesh() const { return impl_->system.mesh; }
 void ContactStatics::set_region_stiffness(const VectorX& stiffness) { impl_->system.set_region_stiffness(stiffness); }
+void ContactStatics::set_region_poisson(const VectorX& poisson) { impl_->system.set_region_poisson(poisson); }
 
 ContactLoads ContactStatics::no_loads() const {
   ContactLoads loads;
@@ -313,6 +314,7 @@ ContactLoadsAlong ContactStatics::no_loads_along(Index parameters) const {
   ContactLoadsAlong along;
   along.log_young = along.poisson = along.log_layer = VectorX::Zero(parameters);
   along.log_stiffness = MatrixX::Zero(system.assembly.region_count(), parameters);
+  along.region_poisson = MatrixX::Zero(system.assembly.has_own_poisson() ? system.assembly.region_count() : 0, parameters);
   along.force_coefficients = MatrixX::Zero(static_cast<Index>(system.boundary.forces.cols()), parameters);
   along.motion_coefficients = MatrixX::Zero(static_cast<Index>(system.motions.cols()), parameters);
   along.motion.assign(system.contacts.size(), MatrixX::Zero(6, parameters));

@@ -106,6 +106,7 @@ struct ContactEquilibrium {
 struct ContactLoadsAlong {
   VectorX log_young, poisson, log_layer;            ///< q; log_layer: of all contacts together
   MatrixX log_stiffness;                            ///< a region x q; no rows where there is one region
+  MatrixX region_poisson;                           ///< a region x q; no rows where none has its own
   MatrixX force_coefficients, motion_coefficients;  ///< rows as in ContactLoads, q columns
   std::vector<MatrixX> motion, wrench;              ///< 6 x q, one a contact
   std::vector<VectorX> radius;                      ///< q, one a contact
@@ -153,6 +154,8 @@ class ContactStatics {
   /// Solves from here on are with these (ContactOptions::statics.region). The layers are as much stiffer as what lies behind
   /// them. @throws Error unless there is one positive number a region
   void set_region_stiffness(const VectorX& stiffness);
+  /// The same of StaticsOptions::region_poisson. @throws Error unless there is one in (-1, 0.5), or NaN, a region
+  void set_region_poisson(const VectorX& poisson);
 
   /// All zeros, of the right sizes.
   ContactLoads no_loads() const;

@@ -97,7 +97,7 @@ void Assembly::build_pressures(const TetMesh& mesh) {
   factorise_pressure_mass();
 }
 
-void Assembly::factorise_pressure_mass() {
+void Assembly::factorise_pressure_mass() const {
   std::vector<Eigen::Triplet<double>> triplets;
   const auto quadrature = tet_quadrature_4();
   for (Index e = 0; e < element_count(); ++e)
@@ -109,7 +109,7 @@ void Assembly::factorise_pressure_mass() {
           if (i >= j)
             triplets.emplace_back(
                 i, j,
-                weights_[4 * static_cast<std::size_t>(e) + q] * quadrature[q].barycentric(a) * quadrature[q].barycentric(b));
+                bulk_weight(e) * weights_[4 * static_cast<std::size_t>(e) + q] * quadrature[q].barycentric(a) * quadrature[q].barycentric(b));
         }
   Eigen::SparseMatrix<double> mass(pressures_, pressures_);
   mass.setFromTriplets(triplets.begin(), triplets.end());

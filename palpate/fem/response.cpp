@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/fem/response.hpp"
 
+#include <cmath>
+
 #include "palpate/core/error.hpp"
 #include "palpate/fem/loading_branch.hpp"
 #include "palpate/fem/response_contact.hpp"
@@ -28,7 +30,15 @@ struct Response::Impl {
     if (rows.cols() != dofs) throw Error("needs " + std::to_string(dofs) + " columns", "Response watched");
     if (forces.rows() == 0) forces.resize(dofs, 0);
     motions = static_cast<Index>(boundary.motions.cols() + static_cast<Eigen::Index>(options.driven.size()));
-    for (int region : options.statics.region) parameters = std::max<Index>(parameters, 2 + region);
+    Index further = 0;
+    for (int region : options.statics.region) further = std::max<Index>(further, region);
+    parameters += further;
+    if (options.statics.region_poisson.size() > 0) {
+      const VectorX& own = options.statics.region_poisson;
+      if (own.size() != 1 + further || !std::isnan(own(0)) || own.tail(further).array().isNaN().any())
+        throw Error("needs NaN for the first region, whose nu is the one asked for, and a number for every further one", "Response::Options::statics.region_poisson");
+      parameters += further;
+    }
     const VectorX& load = options.branch_force_over_young;
     if (load.size() > 0 && load.size() != forces.cols())
       throw Error("needs " + std::to_string(forces.cols()) + " values, has " + std::to_string(load.size()),
@@ -73,6 +83,11 @@ struct Response::Impl {
     every.force.leftCols(k).setIdentity();
     every.motion.rightCols(motions).setIdentity();
     return every;
+  }
+
+  void set_regions(const ResponseQuery& q) {
+    if (q.stiffness.size() > 0) statics->set_region_stiffness(q.stiffness);
+    if (q.region_poisson.size() > 0) statics->set_region_poisson(q.region_poisson);
   }
 
   /// `unit` holds some watched rows (or none of them), then the conjugate ones.
@@ -139,7 +154,7 @@ struct Response::Impl {
     if (touching) {
       out = touching->solve(q, directions(q), start);
     } else {
-      if (q.stiffness.size() > 0) statics->set_region_stiffness(q.stiffness);
+      set_regions(q);
       const VectorX* first_m = start.displacement_m;
       if (first_m == nullptr && start.from) first_m = &start.from->displacement_m;
       const Equilibrium e = statics->solve(q.young_modulus_pa, q.poisson_ratio, q.force, q.motion, first_m, q.extra);
@@ -155,12 +170,13 @@ struct Response::Impl {
       if (q.derivatives) {
         const LoadDirections along = directions(q);
         const SensitivityAlong d = statics->sensitivity_along(e, along.force, along.motion);
-        const Index ratios = parameters - 2, columns = parameters + static_cast<Index>(along.force.cols());
+        const Index own = std::max<Index>(0, static_cast<Index>(d.d_region_poisson.cols()) - 1), ratios = parameters - 2 - own;
+        const Index columns = parameters + static_cast<Index>(along.force.cols());
         solution->derivative.resize(e.displacement_m.size(), columns);
-        solution->derivative << d.d_log_young, d.d_poisson, d.d_log_stiffness.rightCols(ratios), d.d_along;
+        solution->derivative << d.d_log_young, d.d_poisson, d.d_log_stiffness.rightCols(ratios), d.d_region_poisson.rightCols(own), d.d_along;
         out.d_reaction.resize(motions, columns);
         out.d_reaction << d.reaction_d_log_young, d.reaction_d_poisson, d.reaction_d_log_stiffness.rightCols(ratios),
-            d.reaction_d_along;
+            d.reaction_d_region_poisson.rightCols(own), d.reaction_d_along;
       }
       out.solution = std::move(solution);
     }
@@ -220,7 +236,7 @@ Certificate Response::certify(const ResponseState& state, const ResponseQuery& q
   impl_->check(query);
   const Statics& statics = *impl_->statics;
   const double young = query.young_modulus_pa, nu = query.poisson_ratio;
-  if (query.stiffness.size() > 0) impl_->statics->set_region_stiffness(query.stiffness);
+  impl_->set_regions(query);
   Certificate out;
   const Equilibrium from_rest = statics.solve(young, nu, query.force, query.motion, nullptr, query.extra);
   ++impl_->solves;

@@ -43,7 +43,8 @@ struct ResponseQuery {
   VectorX motion;                              ///< m: of Boundary::motions, then of every driven contact
   bool derivatives = true;                     ///< false: without any, at a part of the time
   std::optional<LoadDirections> along = {};    ///< nothing: every coefficient by itself, forces first
-  VectorX stiffness = {};                      ///< a region: its moduli over those asked for; empty: as they were last
+  VectorX stiffness = {};                      ///< a region: its E over the one asked for; empty: as they were last
+  VectorX region_poisson = {};                 ///< the same of StaticsOptions::region_poisson
   VectorX extra = {};                          ///< the material's further parameters, in its table's order
 };
 
@@ -64,8 +65,8 @@ struct ResponseStart {
   ResponseSolutionPtr nearby;  ///< on a path: end of this same load step at parameters nearby
 };
 
-/// Columns of every derivative: log E, nu, log of the stiffness of every further region (the first one's is E), then the directions
-/// that were asked for.
+/// Columns of every derivative: log E, nu, log of the stiffness of every further region (the first one's is E), nu of every further
+/// region where they have their own (Options::statics.region_poisson), then the directions that were asked for.
 struct ResponseState {
   bool converged = false;
   std::string reason;

@@ -77,6 +77,7 @@ ResponseState TouchingResponse::solve(const ResponseQuery& query, const LoadDire
   for (std::size_t t = 0; t < driven_.size(); ++t)
     loads.motion[driven_[t].contact].head<3>() += query.motion(node_motions_ + static_cast<Index>(t)) * driven_[t].direction;
   if (query.stiffness.size() > 0) statics_.set_region_stiffness(query.stiffness);
+  if (query.region_poisson.size() > 0) statics_.set_region_poisson(query.region_poisson);
 
   std::optional<ContactEquilibrium> guess;
   if (start.on_path && start.nearby && start.nearby->touching) {
@@ -115,7 +116,9 @@ ResponseState TouchingResponse::solve(const ResponseQuery& query, const LoadDire
     ContactLoadsAlong moved = statics_.no_loads_along(count);
     moved.log_young(0) = moved.poisson(1) = 1;
     // The first region's stiffness is E itself.
-    for (Index r = 1; r < moved.log_stiffness.rows(); ++r) moved.log_stiffness(r, 1 + r) = 1;
+    const Index regions = static_cast<Index>(moved.log_stiffness.rows());
+    for (Index r = 1; r < regions; ++r) moved.log_stiffness(r, 1 + r) = 1;
+    for (Index r = 1; r < moved.region_poisson.rows(); ++r) moved.region_poisson(r, regions + r) = 1;
     moved.force_coefficients.rightCols(along.force.cols()) = along.force;
     moved.motion_coefficients.rightCols(along.motion.cols()) = along.motion.topRows(node_motions_);
     for (std::size_t t = 0; t < driven_.size(); ++t)

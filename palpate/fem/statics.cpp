@@ -17,6 +17,7 @@ Statics::Statics(Statics&&) noexcept = default;
 Statics& Statics::operator=(Statics&&) noexcept = default;
 
 void Statics::set_region_stiffness(const VectorX& stiffness) { impl_->set_region_stiffness(stiffness); }
+void Statics::set_region_poisson(const VectorX& poisson) { impl_->set_region_poisson(poisson); }
 
 Equilibrium Statics::solve(double young_modulus_pa, double poisson_ratio, const VectorX& force_coefficients,
                            const VectorX& motion_coefficients, const VectorX* start, const VectorX& extra) const {
@@ -56,12 +57,14 @@ Sensitivity Statics::sensitivity(const Equilibrium& at) const {
   out.d_poisson = std::move(along.d_poisson);
   out.d_extra = std::move(along.d_extra);
   out.d_log_stiffness = std::move(along.d_log_stiffness);
+  out.d_region_poisson = std::move(along.d_region_poisson);
   out.d_force = along.d_along.leftCols(k);
   out.d_motion = along.d_along.rightCols(m);
   out.reaction_d_log_young = std::move(along.reaction_d_log_young);
   out.reaction_d_poisson = std::move(along.reaction_d_poisson);
   out.reaction_d_extra = std::move(along.reaction_d_extra);
   out.reaction_d_log_stiffness = std::move(along.reaction_d_log_stiffness);
+  out.reaction_d_region_poisson = std::move(along.reaction_d_region_poisson);
   out.reaction_d_force = along.reaction_d_along.leftCols(k);
   out.reaction_d_motion = along.reaction_d_along.rightCols(m);
   return out;

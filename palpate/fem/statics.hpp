@@ -53,7 +53,8 @@ struct StaticsOptions {
   int threads = 1;
   int loads_expected = 0;  ///< of a linear material: about how many one matrix will be solved for, one after the other
   std::vector<int> region;   ///< an element: its region, 0 and up; empty: one region
-  VectorX region_stiffness;  ///< a region: its moduli over those asked for (nu is shared); empty: 1
+  VectorX region_stiffness;  ///< a region: its E over the one asked for; empty: 1
+  VectorX region_poisson;    ///< a region: its own nu (NaN: the one asked for); empty: all share the one asked for
 };
 
 /// A state of the body. `converged` false is a result, not an exception; `reason` says why in plain words.
@@ -84,12 +85,14 @@ struct Sensitivity {
   VectorX d_poisson;             ///< 3n: du / d nu
   MatrixX d_extra;               ///< 3n x e: du / d extra
   MatrixX d_log_stiffness;       ///< 3n x r: du / d log of a region's stiffness (no columns where there is one region)
+  MatrixX d_region_poisson;      ///< 3n x r: du / d own nu of a region (no columns where none has its own)
   MatrixX d_force;               ///< 3n x k: du / d a
   MatrixX d_motion;              ///< 3n x m: du / d b
   VectorX reaction_d_log_young;  ///< m
   VectorX reaction_d_poisson;    ///< m
   MatrixX reaction_d_extra;      ///< m x e
   MatrixX reaction_d_log_stiffness;  ///< m x r
+  MatrixX reaction_d_region_poisson;  ///< m x r
   MatrixX reaction_d_force;      ///< m x k
   MatrixX reaction_d_motion;     ///< m x m
 };
@@ -97,9 +100,9 @@ struct Sensitivity {
 /// The same along a few directions of the coefficients: (a, b) moves by column c of (force_directions, motion_directions).
 struct SensitivityAlong {
   VectorX d_log_young, d_poisson;                    ///< 3n
-  MatrixX d_extra, d_log_stiffness, d_along;         ///< 3n x e, 3n x r, 3n x c
+  MatrixX d_extra, d_log_stiffness, d_region_poisson, d_along;  ///< 3n x e, 3n x r, 3n x r (or none), 3n x c
   VectorX reaction_d_log_young, reaction_d_poisson;  ///< m
-  MatrixX reaction_d_extra, reaction_d_log_stiffness, reaction_d_along;  ///< m x e, m x r, m x c
+  MatrixX reaction_d_extra, reaction_d_log_stiffness, reaction_d_region_poisson, reaction_d_along;  ///< m x the same
 };
 
 /// What watched rows W u and the motions' reactions of a linear material are for unit coefficients, at E = 1 Pa:
@@ -115,7 +118,7 @@ struct UnitResponses {
   double residual = 0;              ///< largest of any column, relative
 };
 
-/// Description (mesh, element, material, boundary), immutable but for the regions' stiffness, plus the symbolic analysis that
+/// Description (mesh, element, material, boundary), immutable but for the regions' moduli, plus the symbolic analysis that
 /// all solves share. Calls are const but share scratch memory and the last factor: use one Statics a thread.
 class Statics {
  public:
@@ -130,6 +133,8 @@ class Statics {
 
   /// Solves from here on are with these. @throws Error unless there is one positive number a region
   void set_region_stiffness(const VectorX& stiffness);
+  /// The same of StaticsOptions::region_poisson. @throws Error unless there is one in (-1, 0.5), or NaN, a region
+  void set_region_poisson(const VectorX& poisson);
 
   /// @param extra  values of the material's further parameters (e.g. alpha of the foam law), in its table's order
   /// Newton's method with a line search on the potential energy; when it fails from `start`, the loads are stepped from

@@ -39,7 +39,7 @@ double von_mises_of(const Mat3& cauchy) {
 }  // namespace
 
 VectorX von_mises(const TetMesh& mesh, const std::string& material, double young_modulus_pa, double poisson_ratio,
-                  const VectorX& extra, const VectorX& displacement_m, const VectorX& stiffness) {
+                  const VectorX& extra, const VectorX& displacement_m, const VectorX& stiffness, const VectorX& poisson) {
   const MaterialLaw& law = material_law(material);
   VectorX further = extra;
   if (further.size() == 0) {  // as the solvers take them, too
@@ -58,7 +58,9 @@ VectorX von_mises(const TetMesh& mesh, const std::string& material, double young
     for (int k = 0; k < 3; ++k) to.col(k) = d.col(k + 1) - d.col(0);
   }
   NodeRows<3> x(nodes, 3), u(nodes, 3);
+  Moduli here = constants;
   for (Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
+    if (poisson.size() > 0 && poisson(t) != here.poisson) here = moduli(young_modulus_pa, poisson(t), further);
     for (Index k = 0; k < nodes; ++k) {
       const Index node = mesh.tetrahedra(t, k);
       x.row(k) = mesh.nodes_m.row(node);
@@ -70,7 +72,7 @@ VectorX von_mises(const TetMesh& mesh, const std::string& material, double young
       const Mat3 by_reference = u.transpose().lazyProduct(d_reference[p]);
       const Mat3 gradient = by_reference * jacobian.inverse();
       Mat3 first = Mat3::Zero();
-      if (!std::isfinite(law.energy_and_stress(constants, gradient, first))) continue;
+      if (!std::isfinite(law.energy_and_stress(here, gradient, first))) continue;
       const Mat3 f = Mat3::Identity() + gradient;
       // A law of small strains knows no difference between the stresses.
       const Mat3 cauchy = law.is_linear() ? first : Mat3(first * f.transpose() / f.determinant());

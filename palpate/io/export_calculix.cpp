@@ -22,9 +22,17 @@ std::string deck(const ExportModel& model, const std::string& output) {
     for (Eigen::Index k = 0; k < mesh.tetrahedra.cols(); ++k) text += ", " + std::to_string(mesh.tetrahedra(t, k) + 1);
     text += "\n";
   }
-  text += fmt::format("*MATERIAL, NAME=LEARNED\n*ELASTIC\n{:.13g}, {:.13g}\n", model.young_modulus_pa, model.poisson_ratio);
-  if (model.density_kg_m3 > 0) text += fmt::format("*DENSITY\n{:.13g}\n", model.density_kg_m3);
-  text += "*SOLID SECTION, ELSET=EALL, MATERIAL=LEARNED\n";
+  const auto material = [&](const std::string& name, const std::string& elements, double young_pa, double poisson) {
+    text += fmt::format("*MATERIAL, NAME={}\n*ELASTIC\n{:.13g}, {:.13g}\n", name, young_pa, poisson);
+    if (model.density_kg_m3 > 0) text += fmt::format("*DENSITY\n{:.13g}\n", model.density_kg_m3);
+    text += fmt::format("*SOLID SECTION, ELSET={}, MATERIAL={}\n", elements, name);
+  };
+  if (model.regions.empty()) material("LEARNED", "EALL", model.young_modulus_pa, model.poisson_ratio);
+  for (std::size_t r = 0; r < model.regions.size(); ++r) {  // names of regions may be no words of a deck
+    const ExportRegion& one = model.regions[r];
+    text += fmt::format("** region {}: {}\n*ELSET, ELSET=E{}\n{}\n", r + 1, one.name, r + 1, joined_indices(elements_of(model, r), ",\n", 1));
+    material(fmt::format("LEARNED{}", r + 1), fmt::format("E{}", r + 1), one.young_modulus_pa, one.poisson_ratio);
+  }
   if (!model.fixed.empty()) {
     text += "*NSET, NSET=FIXED\n" + joined_indices(model.fixed, ",\n", 1) + "\n*BOUNDARY\nFIXED, 1, 3\n";
   }

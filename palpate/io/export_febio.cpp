@@ -5,6 +5,16 @@
 #include "palpate/io/export_formats.hpp"
 
 namespace palpate::io {
+namespace {
+
+/// A comment of XML ends at two of them, and a name may hold anything.
+std::string without_dashes(std::string name) {
+  for (char& c : name)
+    if (c == '-' || c == '<' || c == '>' || c == '&') c = '_';
+  return name;
+}
+
+}  // namespace
 
 ExportFiles export_febio(const ExportModel& model) {
   const auto& mesh = model.mesh;
@@ -12,26 +22,40 @@ ExportFiles export_febio(const ExportModel& model) {
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<febio_spec version=\"4.0\">\n  <Module type=\"solid\"/>\n  <Control>\n"
       "    <analysis>STATIC</analysis>\n    <time_steps>10</time_steps>\n    <step_size>0.1</step_size>\n"
       "    <solver type=\"solid\"/>\n  </Control>\n";
-  text += fmt::format(
-      "  <Material>\n    <material id=\"1\" name=\"learned\" type=\"isotropic elastic\">\n      <density>{:.15g}</density>\n"
-      "      <E>{:.15g}</E>\n      <v>{:.15g}</v>\n    </material>\n  </Material>\n  <Mesh>\n    <Nodes name=\"all\">\n",
-      model.density_kg_m3 > 0 ? model.density_kg_m3 : 1.0, model.young_modulus_pa, model.poisson_ratio);
+  const std::vector<ExportRegion> one{{"", model.young_modulus_pa, model.poisson_ratio}};
+  const std::vector<ExportRegion>& parts = model.regions.empty() ? one : model.regions;
+  const auto numbered = [&](const char* name, std::size_t r) { return model.regions.empty() ? std::string(name) : fmt::format("{}{}", name, r + 1); };
+  text += "  <Material>\n";
+  for (std::size_t r = 0; r < parts.size(); ++r) {
+    if (!model.regions.empty()) text += "    <!-- region " + std::to_string(r + 1) + ": " + without_dashes(parts[r].name) + " -->\n";
+    text += fmt::format(
+        "    <material id=\"{}\" name=\"{}\" type=\"isotropic elastic\">\n      <density>{:.15g}</density>\n"
+        "      <E>{:.15g}</E>\n      <v>{:.15g}</v>\n    </material>\n",
+        r + 1, numbered("learned", r), model.density_kg_m3 > 0 ? model.density_kg_m3 : 1.0, parts[r].young_modulus_pa, parts[r].poisson_ratio);
+  }
+  text += "  </Material>\n  <Mesh>\n    <Nodes name=\"all\">\n";
   for (Eigen::Index i = 0; i < mesh.nodes_m.rows(); ++i)
     text += fmt::format("      <node id=\"{}\">{:.15g},{:.15g},{:.15g}</node>\n", i + 1, mesh.nodes_m(i, 0),
                         mesh.nodes_m(i, 1), mesh.nodes_m(i, 2));
-  text += fmt::format("    </Nodes>\n    <Elements type=\"{}\" name=\"object\">\n",
-                      mesh.tetrahedra.cols() == 10 ? "tet10" : "tet4");
-  for (Eigen::Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
-    text += fmt::format("      <elem id=\"{}\">", t + 1);
-    for (Eigen::Index k = 0; k < mesh.tetrahedra.cols(); ++k)
-      text += (k > 0 ? "," : "") + std::to_string(mesh.tetrahedra(t, k) + 1);
-    text += "</elem>\n";
+  text += "    </Nodes>\n";
+  for (std::size_t r = 0; r < parts.size(); ++r) {
+    text += fmt::format("    <Elements type=\"{}\" name=\"{}\">\n", mesh.tetrahedra.cols() == 10 ? "tet10" : "tet4", numbered("object", r));
+    for (Eigen::Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
+      if (!model.regions.empty() && model.region[static_cast<std::size_t>(t)] != static_cast<int>(r)) continue;
+      text += fmt::format("      <elem id=\"{}\">", t + 1);
+      for (Eigen::Index k = 0; k < mesh.tetrahedra.cols(); ++k)
+        text += (k > 0 ? "," : "") + std::to_string(mesh.tetrahedra(t, k) + 1);
+      text += "</elem>\n";
+    }
+    text += "    </Elements>\n";
   }
-  text += "    </Elements>\n";
   if (!model.fixed.empty()) text += "    <NodeSet name=\"fixed\">" + joined_indices(model.fixed, ",", 1) + "</NodeSet>\n";
   for (std::size_t i = 0; i < model.forces_n.size(); ++i)
     text += fmt::format("    <NodeSet name=\"load{}\">{}</NodeSet>\n", i + 1, model.forces_n[i].first + 1);
-  text += "  </Mesh>\n  <MeshDomains>\n    <SolidDomain name=\"object\" mat=\"learned\"/>\n  </MeshDomains>\n";
+  text += "  </Mesh>\n  <MeshDomains>\n";
+  for (std::size_t r = 0; r < parts.size(); ++r)
+    text += fmt::format("    <SolidDomain name=\"{}\" mat=\"{}\"/>\n", numbered("object", r), numbered("learned", r));
+  text += "  </MeshDomains>\n";
   if (!model.fixed.empty())
     text +=
         "  <Boundary>\n    <bc name=\"held\" node_set=\"fixed\" type=\"zero displacement\">\n      <x_dof>1</x_dof>\n"

@@ -5,6 +5,17 @@
 #include "palpate/io/export_formats.hpp"
 
 namespace palpate::io {
+namespace {
+
+/// One number for all elements, or one for each.
+std::string by_element(const ExportModel& model, double whole, double ExportRegion::* of_region) {
+  if (model.regions.empty()) return fmt::format("{:.15g}", whole);
+  std::string numbers;
+  for (const int r : model.region) numbers += fmt::format("{}{:.15g}", numbers.empty() ? "" : " ", model.regions[static_cast<std::size_t>(r)].*of_region);
+  return numbers;
+}
+
+}  // namespace
 
 ExportFiles export_sofa(const ExportModel& model) {
   const Vec3& g = model.gravity_m_s2;
@@ -19,9 +30,10 @@ ExportFiles export_sofa(const ExportModel& model) {
       "    <TetrahedronSetGeometryAlgorithms template=\"Vec3d\"/>\n    <MechanicalObject name=\"nodes\" "
       "template=\"Vec3d\"/>\n"
       "    <MeshMatrixMass massDensity=\"{:.15g}\"/>\n"
-      "    <TetrahedronFEMForceField template=\"Vec3d\" method=\"large\" youngModulus=\"{:.15g}\" "
-      "poissonRatio=\"{:.15g}\"/>\n",
-      g.x(), g.y(), g.z(), model.density_kg_m3, model.young_modulus_pa, model.poisson_ratio);
+      "    <TetrahedronFEMForceField template=\"Vec3d\" method=\"large\" youngModulus=\"{}\" "
+      "poissonRatio=\"{}\"/>\n",
+      g.x(), g.y(), g.z(), model.density_kg_m3, by_element(model, model.young_modulus_pa, &ExportRegion::young_modulus_pa),
+      by_element(model, model.poisson_ratio, &ExportRegion::poisson_ratio));
   if (!model.fixed.empty())
     text += "    <FixedProjectiveConstraint indices=\"" + joined_indices(model.fixed, " ", 0) + "\"/>\n";
   if (!model.forces_n.empty()) {

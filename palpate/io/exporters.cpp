@@ -14,20 +14,20 @@ namespace palpate::io {
 
 std::span<const Exporter> exporters() {
   static const std::array<Exporter, 8> table = {{
-      {"calculix", "object.inp", "CalculiX: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, export_calculix},
-      {"abaqus", "object.inp", "Abaqus: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, export_abaqus},
-      {"febio", "object.feb", "FEBio 4: tet4 or tet10, isotropic elastic; nothing to correct", true, false, export_febio},
-      {"sofa", "object.scn", "SOFA: TetrahedronFEMForceField, method large (corotational); nothing to correct", false, true,
+      {"calculix", "object.inp", "CalculiX: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, true, export_calculix},
+      {"abaqus", "object.inp", "Abaqus: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, true, export_abaqus},
+      {"febio", "object.feb", "FEBio 4: tet4 or tet10, isotropic elastic; nothing to correct", true, false, true, export_febio},
+      {"sofa", "object.scn", "SOFA: TetrahedronFEMForceField, method large (corotational); nothing to correct", false, true, true,
        export_sofa},
       {"mujoco", "object.xml",
        "MuJoCo 3.13 or later: flex; E and nu are changed so that its energy, which uses 2 lambda, becomes ours", false, true,
-       export_mujoco},
+       false, export_mujoco},
       {"drake", "object.sdf", "Drake: SDF with deformable_properties, linear_corotated (its neohookean would act softer)",
-       false, true, export_drake},
+       false, true, false, export_drake},
       {"bullet", "object.py",
        "PyBullet: loadSoftBody with its Neo-Hookean law; its constants are changed so that small strains agree", false, true,
-       export_bullet},
-      {"usd", "object.usda", "USD: volume deformable body and material of UsdPhysics", false, true, export_usd},
+       false, export_bullet},
+      {"usd", "object.usda", "USD: volume deformable body and material of UsdPhysics", false, true, false, export_usd},
   }};
   return table;
 }
@@ -88,6 +88,28 @@ ExportModel with_linear_elements(const ExportModel& model) {
   return linear;
 }
 
+namespace {
+
+void check_regions(const Exporter& exporter, const ExportModel& model) {
+  const int count = static_cast<int>(model.regions.size());
+  if (static_cast<Eigen::Index>(model.region.size()) != model.mesh.tetrahedra.rows() ||
+      std::any_of(model.region.begin(), model.region.end(), [&](int r) { return r < 0 || r >= count; }))
+    throw Error("needs one of the regions for each element", "export: region");
+  for (const ExportRegion& one : model.regions)
+    if (!(one.young_modulus_pa > 0) || !(one.poisson_ratio >= 0 && one.poisson_ratio < 0.5))
+      throw Error("needs E above 0 and nu in [0, 0.5)", "export: region " + one.name);
+  if (exporter.by_region) return;
+  std::vector<std::string> taking;
+  for (const Exporter& other : exporters())
+    if (other.by_region) taking.push_back(other.name);
+  throw Error(fmt::format("its file holds one stiffness an object, and this one has {} regions; {} take them, or estimate it without "
+                          "(`--regions none`)",
+                          count, fmt::join(taking, ", ")),
+              "--to " + exporter.name);
+}
+
+}  // namespace
+
 ExportFiles export_files(const Exporter& exporter, const ExportModel& model) {
   const auto nodes = model.mesh.nodes_m.rows();
   if (model.mesh.tetrahedra.rows() == 0) throw Error("has no tetrahedra", "export: mesh");
@@ -95,6 +117,7 @@ ExportFiles export_files(const Exporter& exporter, const ExportModel& model) {
     throw Error("names nodes that are not there", "export: mesh");
   if (!(model.young_modulus_pa > 0)) throw Error("must be positive", "export: young_modulus_pa");
   if (!(model.poisson_ratio >= 0 && model.poisson_ratio < 0.5)) throw Error("must be in [0, 0.5)", "export: poisson_ratio");
+  if (!model.regions.empty()) check_regions(exporter, model);
   if (exporter.needs_density && !(model.density_kg_m3 > 0))
     throw Error(exporter.name + " simulates motion: give the object's density, kg/m3", "export: density_kg_m3");
   const auto outside = [&](Index node) { return node < 0 || node >= nodes; };
@@ -112,6 +135,13 @@ std::string joined_indices(const std::vector<Index>& indices, const char* separa
   std::string text;
   for (const Index index : indices) text += (text.empty() ? "" : separator) + std::to_string(index + first);
   return text;
+}
+
+std::vector<Index> elements_of(const ExportModel& model, std::size_t region) {
+  std::vector<Index> elements;
+  for (std::size_t e = 0; e < model.region.size(); ++e)
+    if (model.region[e] == static_cast<int>(region)) elements.push_back(static_cast<Index>(e));
+  return elements;
 }
 
 std::string ascii_vtk(const ExportModel& model) {

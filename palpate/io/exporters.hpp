@@ -13,11 +13,19 @@
 
 namespace palpate::io {
 
+/// A part of the object with moduli of its own.
+struct ExportRegion {
+  std::string name;
+  double young_modulus_pa = 0, poisson_ratio = 0;
+};
+
 /// What a simulator needs of an object. E and nu are those of small strains.
 struct ExportModel {
   std::string name = "object";
   TetMesh mesh;  ///< linear or quadratic
-  double young_modulus_pa = 0, poisson_ratio = 0;
+  double young_modulus_pa = 0, poisson_ratio = 0;  ///< in regions: the first one's
+  std::vector<ExportRegion> regions;               ///< empty: one
+  std::vector<int> region;                         ///< an element: its region; empty: one
   double density_kg_m3 = 0;  ///< 0 = unknown
   std::vector<Index> fixed;  ///< nodes that supports hold
   Vec3 gravity_m_s2 = Vec3::Zero();
@@ -33,6 +41,7 @@ struct Exporter {
   std::string about;           ///< what is written, and what was done so that E and nu mean there what they mean here
   bool quadratic = false;      ///< takes ten-node tetrahedra; others get the corners
   bool needs_density = false;  ///< simulates motion
+  bool by_region = false;      ///< takes regions of different moduli
   ExportFiles (*write)(const ExportModel& model) = nullptr;
 };
 
@@ -42,7 +51,7 @@ const Exporter& exporter_named(const std::string& name);
 
 /// Checks the model, gives the exporter what it takes and returns its files.
 /// @throws Error for E <= 0, nu outside [0, 0.5), a missing density where one is needed, no tetrahedra, indices out of
-/// range.
+/// range, regions that do not fit the elements or that the simulator does not take (naming those that do).
 ExportFiles export_files(const Exporter& exporter, const ExportModel& model);
 
 /// Corners of quadratic tetrahedra alone, nodes renumbered; `fixed` and loads that name midpoints go to the edge's ends.

@@ -309,6 +309,7 @@ void RecordingWriter::Pages::set_head(const Recording& recording) {
   line.put("mesh", model.mesh).put("element", model.element).put("refine", model.refine).word("material", model.material);
   line.put("poisson_range", fmt::format("[{}, {}]", model.poisson_lower, model.poisson_upper));
   if (model.poisson_fixed) line.number("poisson_fixed", *model.poisson_fixed);
+  if (model.poisson_by_region) line.put("poisson_by_region", "true");
   head += "model: " + line.str() + "\n";
 }
 

@@ -38,6 +38,20 @@ double value_of(const Identification& answer, const char* name) {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
+/// A parameter of every region, in their order.
+std::vector<double> of_regions(const Identification& answer, const char* name) {
+  std::vector<double> out;
+  for (const Parameter& one : answer.parameters)
+    if (one.name == name) out.push_back(one.value);
+  return out;
+}
+
+MatrixX by_element(const std::vector<double>& of_region, const std::vector<int>& region) {
+  MatrixX out(static_cast<Index>(region.size()), 1);
+  for (std::size_t e = 0; e < region.size(); ++e) out(static_cast<Index>(e)) = of_region.at(static_cast<std::size_t>(region[e]));
+  return out;
+}
+
 }  // namespace
 
 void write_result(const Identification& answer, const fs::path& folder) {
@@ -99,16 +113,10 @@ void write_model(const Identification& answer, const TetMesh& volume, const fs::
   mesh.points_m = volume.nodes_m;
   mesh.tetrahedra = volume.tetrahedra;
   if (std::isfinite(young)) mesh.cell_fields["young_modulus_pa"] = MatrixX::Constant(volume.tetrahedra.rows(), 1, young);
-  if (!region.empty()) {
-    std::vector<double> by_region;
-    for (const Parameter& one : answer.parameters)
-      if (one.name == "young_modulus") by_region.push_back(one.value);
-    MatrixX& values = mesh.cell_fields["young_modulus_pa"];
-    values.resize(volume.tetrahedra.rows(), 1);
-    for (Eigen::Index e = 0; e < values.rows(); ++e)
-      values(e) = by_region.at(static_cast<std::size_t>(region.at(static_cast<std::size_t>(e))));
-  }
+  if (!region.empty()) mesh.cell_fields["young_modulus_pa"] = by_element(of_regions(answer, "young_modulus"), region);
   if (std::isfinite(poisson)) mesh.cell_fields["poisson_ratio"] = MatrixX::Constant(volume.tetrahedra.rows(), 1, poisson);
+  if (const auto own = of_regions(answer, "poisson_ratio"); !std::isfinite(poisson) && !region.empty() && own.size() > 1)
+    mesh.cell_fields["poisson_ratio"] = by_element(own, region);
   write_mesh(folder / "object.vtu", mesh);
   write_mesh(folder / "object.msh", mesh);
   write_mesh(folder / "surface.obj", geometry::boundary_surface(volume).surface);

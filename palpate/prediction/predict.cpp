@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 #include "palpate/fem/response.hpp"
@@ -20,11 +22,8 @@ Band positive_band(double value, double std) {
   return {value, std, std::min(a, b), std::max(a, b)};
 }
 
-/// Standard deviation of a quantity with these derivatives to (log E, nu).
-double std_of(double d_log_young, double d_poisson, const Eigen::Matrix2d& covariance) {
-  const Eigen::Vector2d d(d_log_young, d_poisson);
-  return std::sqrt(std::max(0.0, d.dot(covariance * d)));
-}
+/// Standard deviation of a quantity with these derivatives to the moduli.
+double std_of(const VectorX& d, const MatrixX& covariance) { return std::sqrt(std::max(0.0, d.dot(covariance * d))); }
 
 /// The patch's mean motion along the push, work-conjugate to its force.
 double travel_of(const fem::ResponseState& state, const Vec3& direction) { return direction.dot(state.conjugate_m.head<3>()); }
@@ -34,39 +33,57 @@ VectorX d_travel_of(const fem::ResponseState& state, const Vec3& direction) {
 
 }  // namespace
 
+double Elasticity::highest_young_modulus_pa() const {
+  return young_modulus_pa * (region_stiffness.size() > 0 ? std::max(1.0, region_stiffness.maxCoeff()) : 1.0);
+}
+
+double Elasticity::highest_poisson_ratio() const {
+  return region_poisson.size() > 1 ? std::max(poisson_ratio, region_poisson.tail(region_poisson.size() - 1).maxCoeff()) : poisson_ratio;
+}
+
 Elasticity elasticity_of(const Identification& answer) {
   Elasticity elasticity;
   elasticity.material = answer.material;
-  int young = -1, poisson = -1;
+  std::vector<Index> young, poisson;  // places among the parameters
   std::vector<double> extra;
+  const auto value = [&](Index at) { return answer.parameters[static_cast<std::size_t>(at)].value; };
   for (std::size_t i = 0; i < answer.parameters.size(); ++i) {
-    const Parameter& parameter = answer.parameters[i];
-    if (!parameter.region.empty()) continue;
-    if (parameter.name == "young_modulus") {
-      young = int(i);
-      elasticity.young_modulus_pa = parameter.value;
-    } else if (parameter.name == "poisson_ratio") {
-      poisson = int(i);
-      elasticity.poisson_ratio = parameter.value;
-    } else {
-      extra.push_back(parameter.value);
+    const Parameter& one = answer.parameters[i];
+    if (one.name == "young_modulus")
+      young.push_back(static_cast<Index>(i));
+    else if (one.name == "poisson_ratio")
+      poisson.push_back(static_cast<Index>(i));
+    else if (one.region.empty())
+      extra.push_back(one.value);
+  }
+  if (young.empty() || poisson.empty() || (poisson.size() > 1 && poisson.size() != young.size()))
+    throw Error("holds no Young's modulus and Poisson ratio of the whole object, or of all its regions", "result: parameters");
+  const Index regions = static_cast<Index>(young.size());
+  elasticity.young_modulus_pa = value(young[0]);
+  elasticity.poisson_ratio = value(poisson[0]);
+  if (regions > 1) {
+    elasticity.region_stiffness.resize(regions);
+    for (Index r = 0; r < regions; ++r) {
+      const Index at = young[static_cast<std::size_t>(r)];
+      elasticity.regions.push_back(answer.parameters[static_cast<std::size_t>(at)].region);
+      elasticity.region_stiffness(r) = value(at) / elasticity.young_modulus_pa;
     }
   }
-  const bool by_region = std::any_of(answer.parameters.begin(), answer.parameters.end(), [](const Parameter& parameter) {
-    return parameter.name == "young_modulus" && !parameter.region.empty();
-  });
-  if (young < 0 && by_region)
-    throw Error("E was estimated by region, and only objects of one stiffness are taken on so far: estimate it without regions, or "
-                "take the moduli and elements from model/object.vtu",
-                "result: regions");
-  if (young < 0 || poisson < 0)
-    throw Error("holds no Young's modulus and Poisson ratio of the whole object", "result: parameters");
+  if (poisson.size() > 1) {
+    elasticity.region_poisson = VectorX::Constant(regions, std::numeric_limits<double>::quiet_NaN());
+    for (Index r = 1; r < regions; ++r) elasticity.region_poisson(r) = value(poisson[static_cast<std::size_t>(r)]);
+  }
   elasticity.extra = Eigen::Map<const VectorX>(extra.data(), Index(extra.size()));
-  const Eigen::Index size = answer.covariance.rows();
-  const int index[] = {young, poisson};
-  for (int a = 0; a < 2; ++a)
-    for (int b = 0; b < 2; ++b)
-      if (index[a] < size && index[b] < size) elasticity.covariance(a, b) = answer.covariance(index[a], index[b]);
+  // Of log E of each region, as an answer has it, to ratios.
+  std::vector<Index> places{young[0], poisson[0]};
+  places.insert(places.end(), young.begin() + 1, young.end());
+  places.insert(places.end(), poisson.begin() + 1, poisson.end());
+  const Index size = static_cast<Index>(places.size());
+  elasticity.covariance = MatrixX::Zero(size, size);
+  if (*std::max_element(places.begin(), places.end()) >= answer.covariance.rows()) return elasticity;
+  MatrixX over_first = MatrixX::Identity(size, size);
+  over_first.block(2, 0, regions - 1, 1).setConstant(-1);
+  elasticity.covariance = over_first * MatrixX(answer.covariance(places, places)) * over_first.transpose();
   if (!elasticity.covariance.allFinite()) elasticity.covariance.setZero();
   return elasticity;
 }
@@ -80,8 +97,13 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
   const Eigen::Index columns = boundary.forces.cols(), motions = boundary.motions.cols();
   if (push.background.size() != 0 && push.background.size() != columns - 3)
     throw Error("has another size than the boundary's other columns", "push.background");
+  if (elasticity.region_stiffness.size() > 0 && static_cast<Index>(elasticity.region.size()) != static_cast<Index>(mesh.tetrahedra.rows()))
+    throw Error("needs one region an element", "elasticity.region");
   fem::Response::Options response_options;
   response_options.statics = std::move(options);
+  if (elasticity.region_stiffness.size() > 0) response_options.statics.region = elasticity.region;
+  response_options.statics.region_stiffness = elasticity.region_stiffness;
+  response_options.statics.region_poisson = elasticity.region_poisson;
   const fem::Response response(mesh, elasticity.material, std::move(boundary),
                                Eigen::SparseMatrix<double>(0, 3 * mesh.nodes_m.rows()), response_options);
   const double e = elasticity.young_modulus_pa, nu = elasticity.poisson_ratio;
@@ -90,11 +112,11 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
   fem::ResponseQuery query{e, nu, VectorX::Zero(columns), VectorX::Zero(motions)};
   query.extra = elasticity.extra;
   if (push.background.size() > 0) query.force.tail(columns - 3) = push.background;
-  // Derivatives: log E, nu, the push's force.
+  // Derivatives: the moduli, the push's force.
   fem::LoadDirections pushing{MatrixX::Zero(columns, 1), MatrixX::Zero(motions, 1)};
   pushing.force.col(0).head(3) = push.direction;
   query.along = pushing;
-  constexpr Index by_young = 0, by_poisson = 1, by_force = 2;
+  const Index moduli = static_cast<Index>(elasticity.covariance.rows()), by_force = moduli;
   const auto fail = [&](const fem::ResponseState& at) {
     out.reason = at.reason;
     return out;
@@ -102,6 +124,7 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
   // The state from which the push starts: under the background alone.
   const fem::ResponseState before = response.solve(query);
   if (!before.converged) return fail(before);
+  if (before.parameters != moduli) throw Error("has not one row and column for each of the moduli", "elasticity.covariance");
   const double start_m = travel_of(before, push.direction);
 
   // Travel imposed: Newton on the force, with the exact compliance of each state.
@@ -133,48 +156,56 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
     force_n += short_m / compliance_m_n;
   }
 
-  // Derivatives to (log E, nu) of the displacement since the start; with the travel imposed, the force gives way so that it
-  // stays.
+  // Derivatives to the moduli of the displacement since the start; with the travel imposed, the force gives way so that it stays.
   const double travel_m = travel_of(at, push.direction) - start_m;
-  const MatrixX& change = at.solution->derivative;
-  const MatrixX& from = before.solution->derivative;
-  VectorX whole[2] = {change.col(by_young), change.col(by_poisson)};  // of the displacement from rest: what stress depends on
-  VectorX d[2] = {whole[0] - from.col(by_young), whole[1] - from.col(by_poisson)};
-  const VectorX d_way = d_travel_of(at, push.direction) - d_travel_of(before, push.direction);
-  double d_force[2] = {0, 0}, d_travel[2];
-  const VectorX push_column = change.col(by_force);
-  for (int p = 0; p < 2; ++p) {
-    d_travel[p] = d_way(p);
-    if (!push.travel_m) continue;
-    d_force[p] = -d_travel[p] / compliance_m_n;
-    d[p] += d_force[p] * push_column;
-    whole[p] += d_force[p] * push_column;
-    d_travel[p] = 0;
+  MatrixX whole = at.solution->derivative.leftCols(moduli);  // of the displacement from rest: what stress depends on
+  MatrixX d = whole - before.solution->derivative.leftCols(moduli);
+  VectorX d_travel = (d_travel_of(at, push.direction) - d_travel_of(before, push.direction)).head(moduli);
+  VectorX d_force = VectorX::Zero(moduli);
+  if (push.travel_m) {
+    d_force = -d_travel / compliance_m_n;
+    const MatrixX gives_way = at.solution->derivative.col(by_force) * d_force.transpose();
+    d += gives_way;
+    whole += gives_way;
+    d_travel.setZero();
   }
-  const Eigen::Matrix2d& covariance = elasticity.covariance;
+  const MatrixX& covariance = elasticity.covariance;
   out.converged = true;
   out.reason = at.reason;
   out.inverted_elements = at.inverted_elements;
-  out.force_n = positive_band(force_n, std_of(d_force[0], d_force[1], covariance));
-  out.travel_m = positive_band(travel_m, std_of(d_travel[0], d_travel[1], covariance));
+  out.force_n = positive_band(force_n, std_of(d_force, covariance));
+  out.travel_m = positive_band(travel_m, std_of(d_travel, covariance));
   const VectorX& displaced_m = at.solution->displacement_m;
   out.displacement_m = displaced_m - before.solution->displacement_m;
   out.displacement_std_m.resize(out.displacement_m.size());
-  for (Eigen::Index i = 0; i < out.displacement_m.size(); ++i)
-    out.displacement_std_m(i) = std_of(d[0](i), d[1](i), covariance);
+  for (Eigen::Index i = 0; i < out.displacement_m.size(); ++i) out.displacement_std_m(i) = std_of(d.row(i).transpose(), covariance);
 
-  // Stress and stiffness: differences along the exact derivative of the state, over a tenth of a standard deviation.
-  const auto stress = [&](double log_step, double nu_step, double sign) {
-    const VectorX u = displaced_m + sign * (log_step * whole[0] + nu_step * whole[1]);
-    return fem::von_mises(mesh, elasticity.material, e * std::exp(sign * log_step), nu + sign * nu_step, elasticity.extra, u);
+  // Stress: differences along the exact derivative of the state.
+  const auto stress = [&](Index moved, double step) {
+    Elasticity there = elasticity;
+    if (moved == 0) there.young_modulus_pa *= std::exp(step);
+    if (moved == 1) there.poisson_ratio += step;
+    const Index ratios = static_cast<Index>(elasticity.regions.size()) - 1, own = moved - 2 - ratios;
+    if (moved >= 2 && own < 0) there.region_stiffness(moved - 1) *= std::exp(step);
+    if (moved >= 2 && own >= 0) there.region_poisson(1 + own) += step;
+    VectorX stiffness, poisson;
+    if (there.region_stiffness.size() > 0) stiffness = there.region_stiffness(there.region);
+    if (there.region_poisson.size() > 0) {
+      there.region_poisson(0) = there.poisson_ratio;
+      poisson = there.region_poisson(there.region);
+    }
+    return fem::von_mises(mesh, elasticity.material, there.young_modulus_pa, there.poisson_ratio, elasticity.extra,
+                          displaced_m + step * whole.col(moved), stiffness, poisson);
   };
-  out.von_mises_pa = stress(0, 0, 1);
-  const double log_step = 1e-4, nu_step = 1e-5;
-  const VectorX d_stress_young = (stress(log_step, 0, 1) - stress(log_step, 0, -1)) / (2 * log_step);
-  const VectorX d_stress_poisson = (stress(0, nu_step, 1) - stress(0, nu_step, -1)) / (2 * nu_step);
+  out.von_mises_pa = stress(0, 0);
+  MatrixX d_stress(out.von_mises_pa.size(), moduli);
+  for (Index k = 0; k < moduli; ++k) {
+    const bool is_poisson = k == 1 || k >= 1 + std::max<Index>(1, static_cast<Index>(elasticity.regions.size()));
+    const double step = is_poisson ? 1e-5 : 1e-4;
+    d_stress.col(k) = (stress(k, step) - stress(k, -step)) / (2 * step);
+  }
   out.von_mises_std_pa.resize(out.von_mises_pa.size());
-  for (Eigen::Index i = 0; i < out.von_mises_pa.size(); ++i)
-    out.von_mises_std_pa(i) = std_of(d_stress_young(i), d_stress_poisson(i), covariance);
+  for (Eigen::Index i = 0; i < out.von_mises_pa.size(); ++i) out.von_mises_std_pa(i) = std_of(d_stress.row(i).transpose(), covariance);
   Eigen::Index most = 0;
   out.von_mises_pa.maxCoeff(&most);
   out.largest_von_mises_pa = positive_band(out.von_mises_pa(most), out.von_mises_std_pa(most));
@@ -184,8 +215,7 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
     if (u.norm() <= largest) continue;
     largest = u.norm();
     const Vec3 way = largest > 0 ? Vec3(u / largest) : Vec3(Vec3::Zero());
-    out.largest_displacement_m =
-        positive_band(largest, std_of(way.dot(d[0].segment<3>(i)), way.dot(d[1].segment<3>(i)), covariance));
+    out.largest_displacement_m = positive_band(largest, std_of(d.middleRows<3>(i).transpose() * way, covariance));
   }
   out.stiffness_n_m = 1 / compliance_m_n;
   return out;

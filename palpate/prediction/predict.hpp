@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a learned object does under a push that nobody has made yet, with bands from what is known of its elasticity: one
-// equilibrium at the posterior's centre, and the exact derivatives of it to (log E, nu) carry the covariance on.
+// equilibrium at the posterior's centre, and the exact derivatives of it to the moduli carry the covariance on.
 #pragma once
 
 #include <Eigen/SparseCore>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "palpate/core/identification.hpp"
 #include "palpate/core/mesh.hpp"
@@ -13,14 +14,22 @@
 
 namespace palpate::prediction {
 
-/// Elasticity with its covariance of (log E, nu).
+/// Elasticity with its covariance. Of an object in R regions E and nu are those of the first one.
 struct Elasticity {
   std::string material = "neo_hookean";
   double young_modulus_pa = 0, poisson_ratio = 0;
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  std::vector<std::string> regions;  ///< R names; empty: one
+  VectorX region_stiffness;          ///< R: E over the first region's; empty: one region
+  VectorX region_poisson;            ///< R: NaN, then nu of every further region; empty: they share one
+  std::vector<int> region;           ///< an element of the mesh: its region; not told by an answer (fem/regions.hpp)
+  /// Of (log E, nu), then log of every further region's E over the first one's, then their nu where they have their own.
+  MatrixX covariance = MatrixX::Zero(2, 2);
   VectorX extra;  ///< further parameters of the law, taken as known
+
+  double highest_young_modulus_pa() const;
+  double highest_poisson_ratio() const;
 };
-/// @throws Error when the answer holds no Young's modulus or Poisson ratio of the whole object.
+/// @throws Error when the answer holds no Young's modulus or Poisson ratio.
 Elasticity elasticity_of(const Identification& answer);
 
 /// A push on one patch: either its force or its travel is given. Both act along `direction`.
@@ -51,7 +60,7 @@ struct Prediction {
 
 /// @param boundary  supports, and forces whose first three columns are unit resultants of the patch along x, y and z (what
 ///                  follows is background)
-/// @throws Error for a push with neither or both of force and travel, or without unit direction; as fem::Statics does.
+/// @throws Error for regions without elements of theirs, for a push with neither or both of force and travel, or without unit direction; as fem::Statics does.
 Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Boundary boundary, const NewPush& push,
                    fem::StaticsOptions options = {});
 

@@ -134,7 +134,7 @@ Sheet posterior(Canvas* canvas, const json& page) {
   for (const json& p : page["parameters"]) {
     if (p["name"] != "young_modulus" || !p["value"].is_number()) continue;
     for (const json& q : page["parameters"]) {
-      if (q["name"] != "poisson_ratio" || !q["value"].is_number()) continue;
+      if (q["name"] != "poisson_ratio" || !q["value"].is_number() || (q["region"] != "" && q["region"] != p["region"])) continue;
       const Spot at = axes.at(p["value"].get<double>() * factor, q["value"].get<double>());
       const std::array<Spot, 2> across = {Spot{at.x - 5, at.y}, {at.x + 5, at.y}},
                                 down = {Spot{at.x, at.y - 5}, {at.x, at.y + 5}};

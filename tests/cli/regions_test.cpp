@@ -2,10 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // `palpate estimate --regions by-site` from a folder to result.json: a block of two halves on a table, pushed at one place of each.
 // Truth and fit share their mesh: what meshes do to regions is tested where they are fitted.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <cmath>
+#include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "estimation/pushed_block.hpp"
@@ -91,6 +95,65 @@ TEST_F(TwoHalves, EachSiteHasTheEOfItsHalf) {
   }
   EXPECT_FALSE(says(result, "not_homogeneous"));
   EXPECT_FALSE(says(result, "model_does_not_fit"));
+}
+
+std::string outcome_of(const std::string& arguments, int& exit_code) {
+  FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " 2>&1").c_str(), "r");
+  std::string text;
+  for (int c = std::fgetc(pipe); c != EOF; c = std::fgetc(pipe)) text += static_cast<char>(c);
+  exit_code = WEXITSTATUS(pclose(pipe));
+  return text;
+}
+
+double poisson_of(const nlohmann::json& result, const std::string& region) {
+  for (const auto& one : result["parameters"])
+    if (one["name"] == "poisson_ratio" && one["region"] == region) return one["value"];
+  return std::nan("");
+}
+
+// Truth has one nu: two of them agree with it, and cost width.
+TEST_F(TwoHalves, MayHavePoissonRatiosOfTheirOwn) {
+  const nlohmann::json result = estimated("--regions by-site --poisson-by-region");
+  ASSERT_EQ(result["parameters"].size(), 4u);
+  for (const auto& one : result["parameters"]) {
+    if (one["name"] != "poisson_ratio") continue;
+    EXPECT_LT(one["lower_95"].get<double>(), 0.3) << one.dump();
+    EXPECT_GT(one["upper_95"].get<double>(), 0.3) << one.dump();
+  }
+  EXPECT_NE(poisson_of(result, "left"), poisson_of(result, "right"));
+  int code = 0;
+  EXPECT_THAT(outcome_of("estimate '" + (files / "block").string() + "' -o '" + (files / "no").string() + "' --poisson-by-region", code),
+              testing::HasSubstr("the object has one region"));
+  EXPECT_EQ(code, 3);
+}
+
+// What was learned of two halves is predicted and exported with both.
+TEST_F(TwoHalves, ArePredictedAndExportedWithBoth) {
+  for (const char* own : {"", " --poisson-by-region"}) {
+    estimated(std::string("--regions by-site") + own);
+    const std::string out = (files / "out").string();
+    double travel_m[2] = {};
+    int code = 0;
+    for (const int half : {0, 1}) {
+      const std::string text = outcome_of("predict '" + out + "' --radius 0.008 --force 1 --json --contact " + (half == 0 ? "0.015" : "0.045") + " 0.02 0.03", code);
+      ASSERT_EQ(code, 0) << text;
+      const nlohmann::json predicted = nlohmann::json::parse(text.substr(text.find('{')));
+      travel_m[half] = predicted["travel_m"]["value"];
+      EXPECT_GT(predicted["travel_m"]["std"].get<double>(), 0);
+      EXPECT_EQ(predicted["regions"].size(), 2u);
+    }
+    EXPECT_NEAR(travel_m[0] / travel_m[1], right_pa / left_pa, 0.25);  // beside the other half it is a little stiffer
+    const bool ccx = std::system("command -v ccx > /dev/null 2>&1") == 0;
+    const std::string text = outcome_of("export '" + out + "' --to calculix -o '" + (files / "deck").string() + "'" + (ccx ? " --verify" : ""), code);
+    EXPECT_EQ(code, 0) << text;
+    if (ccx) {
+      EXPECT_THAT(text, testing::HasSubstr("ccx moves every node as we do"));
+    }
+    EXPECT_THAT(outcome_of("export '" + out + "' --to drake --density 100 -o '" + (files / "drake").string() + "'", code),
+                testing::HasSubstr("calculix, abaqus, febio, sofa take them"));
+    EXPECT_EQ(code, 3);
+    EXPECT_FALSE(std::filesystem::exists(files / "drake/object.sdf"));
+  }
 }
 
 TEST_F(TwoHalves, AsOneTheyAreCalledNotHomogeneous) {

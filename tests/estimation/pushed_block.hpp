@@ -3,6 +3,7 @@
 // fit's, of quadratic elements, so that no error of the fit's own mesh hides.
 #pragma once
 
+#include <optional>
 #include <random>
 
 #include "palpate/estimation/fit.hpp"
@@ -21,6 +22,7 @@ struct PushedBlock {
   std::string material = "neo_hookean";
   int finer = 2;         ///< than the fit's mesh
   double free_half = 1;  ///< stiffness of x > 30 mm over that of the rest
+  std::optional<double> free_poisson;  ///< its nu; nothing: that of the rest
 };
 
 inline void put_two_halves(SimulatedObject& object) {
@@ -79,13 +81,16 @@ inline SimulatedObject coarse_block(const std::string& material = "neo_hookean")
   return simulated(fem::to_quadratic(kuhn_block(4, 3, 2, block_size_m)), material);
 }
 
-inline Inputs clouds_of(const PushedBlock& truth, const Recording& recording = pushed_block_recording()) {
+inline Inputs clouds_of(const PushedBlock& truth, Recording recording = pushed_block_recording()) {
   Unknowns unknowns;
+  const bool halves = truth.free_half != 1 || truth.free_poisson;
+  recording.model.poisson_by_region = truth.free_poisson.has_value();
   SimulatedObject object = simulated(fem::to_quadratic(kuhn_block(4 * truth.finer, 3 * truth.finer, 2 * truth.finer, block_size_m)), truth.material);
-  if (truth.free_half != 1) put_two_halves(object);
+  if (halves) put_two_halves(object);
   ForwardModel model(recording, object, unknowns);
   VectorX at = unknowns.prior_mean();
-  if (truth.free_half != 1) at(first_ratio) = std::log(truth.free_half);
+  if (halves) at(first_ratio) = std::log(truth.free_half);
+  if (truth.free_poisson) at(unknowns.first_own_poisson()) = *truth.free_poisson;
   at(log_young) = std::log(truth.young_pa);
   at(poisson) = truth.poisson;
   std::mt19937 random(truth.seed);

@@ -4,6 +4,7 @@
 // both is not believed.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "palpate/estimation/fit.hpp"
@@ -75,6 +76,82 @@ TEST(RegionFit, OneStiffnessForEqualHalvesAgreesWithTwo) {
   EXPECT_NEAR(two.parameters[2].value / two.parameters[0].value, 1, 0.25);
   EXPECT_GT(two.parameters[0].std, one.parameters[0].std);
   EXPECT_NEAR(std::log(two.parameters[0].value / one.parameters[0].value), 0, 3 * two.parameters[0].std / two.parameters[0].value);
+}
+
+// Both halves are pressed on their own, so that each bulges where it is seen.
+Recording both_halves_pressed(bool own) {
+  Recording recording = glued_block_recording({Vec3(0, 0, -0.8), Vec3(0, 0, -1.6)}, 0.015, 0.02);
+  recording.pushes.push_back(glued_block_recording({Vec3(0, 0, -0.8), Vec3(0, 0, -1.6)}, 0.045, 0.02).pushes[0]);
+  recording.pushes[1].name = "free";
+  recording.model.poisson_by_region = own;
+  return recording;
+}
+
+/// On a mesh that errs by a fraction of what noise does; the truth's is half as fine again.
+Identification fit_both(const PushedBlock& truth, bool own) {
+  SimulatedObject object = simulated(fem::to_quadratic(kuhn_block(8, 6, 4, block_size_m)), "linear");
+  put_two_halves(object);
+  FitOptions options;
+  options.cross_checks = false;
+  const Recording recording = both_halves_pressed(own);
+  return fit(recording, object, clouds_of(truth, recording), options);
+}
+
+TEST(RegionFit, IntervalsHoldThePoissonRatiosOfBothHalves) {
+  constexpr int seeds = 8;
+  std::array<int, 4> held{};
+  double squares = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    PushedBlock truth;
+    truth.seed = static_cast<unsigned>(seed);
+    truth.material = "linear";
+    truth.finer = 3;
+    truth.sigma_m = 4e-4;
+    truth.points = 400;
+    truth.young_pa = 2e4 * (1 + 0.02 * seed);
+    truth.free_half = std::exp(0.1 * (seed - 4.5));
+    truth.poisson = 0.15 + 0.02 * seed;
+    truth.free_poisson = 0.46 - 0.04 * seed;
+    const Identification answer = fit_both(truth, true);
+    ASSERT_EQ(answer.termination, Termination::converged) << answer.message;
+    ASSERT_EQ(answer.parameters.size(), 4u);
+    const std::array<double, 4> true_values{truth.young_pa, truth.poisson, truth.free_half * truth.young_pa, *truth.free_poisson};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Parameter& one = answer.parameters[k];
+      EXPECT_EQ(one.name, k % 2 == 0 ? "young_modulus" : "poisson_ratio");
+      EXPECT_EQ(one.region, k < 2 ? "clamped half" : "free half");
+      EXPECT_TRUE(one.determined) << one.name << one.region;
+      held[k] += holds(one, true_values[k]);
+      squares += std::pow((one.value - true_values[k]) / one.std, 2);
+      EXPECT_NEAR(std::sqrt(answer.covariance(Index(k), Index(k))) / (k % 2 == 0 ? one.std / one.value : one.std), 1, 0.05);
+    }
+    EXPECT_GT(answer.covariance.ldlt().vectorD().minCoeff(), 0);
+    if (seed > 1) continue;
+    const Parameter shared = fit_both(truth, false).parameters[1];  // one ratio for both is wrong, and looks sure of itself
+    EXPECT_GT(std::abs(shared.value - truth.poisson), 4 * shared.std);
+  }
+  for (const int count : held) EXPECT_GE(count, 6);  // 0.95 of eight less three binomial standard deviations
+  EXPECT_NEAR(squares / (4 * seeds), 1, 3 * std::sqrt(2.0 / (4 * seeds)));
+}
+
+TEST(RegionFit, PoissonRatioOfARegionThatSaysNothingStaysItsPrior) {
+  PushedBlock truth;
+  truth.free_poisson = 0.2;
+  SimulatedObject object = coarse_block();
+  put_two_halves(object);
+  Recording recording = pushed_block_recording();
+  for (auto& step : recording.pushes[0].steps) step.loads[0].contact_m.x() = 0.015;  // the free half is taken along
+  recording.model.poisson_by_region = true;
+  recording.model.poisson_lower = 0.1;
+  recording.model.poisson_upper = 0.4;
+  const Identification answer = fit(recording, object, clouds_of(truth, recording), {});
+  ASSERT_EQ(answer.parameters.size(), 4u);
+  const Parameter& free = answer.parameters[3];
+  EXPECT_FALSE(free.determined);
+  EXPECT_NEAR(free.value, 0.25, 0.05);
+  EXPECT_GE(free.lower_95, 0.1);
+  EXPECT_LE(free.upper_95, 0.4);
+  EXPECT_TRUE(says(answer, "nu_not_determined"));
 }
 
 TEST(RegionFit, RegionThatNoPushReachesIsNotDetermined) {

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -19,10 +20,10 @@ inline bool calculix_is_there() { return std::system("command -v ccx > /dev/null
 
 /// Displacements (3n, node-major; seven digits) of C3D4 or C3D10 elements, by the mesh's columns. Linear, or NLGEOM with its
 /// Neo-Hookean law (C10 = mu / 2, D1 = 2 / K). NaN where ccx gave no result.
-/// @param other, other_young_pa  elements that are of another E
+/// @param other, other_young_pa, other_poisson  elements that are of another E, and nu where one is given
 inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Index>& held, const VectorX& load,
                                       bool nonlinear, double young_pa, double poisson, const std::vector<Index>& other = {},
-                                      double other_young_pa = 0) {
+                                      double other_young_pa = 0, std::optional<double> other_poisson = std::nullopt) {
   const auto nodes = mesh.tetrahedra.cols();
   const test::TemporaryFolder folder("ccx");
   {
@@ -37,17 +38,17 @@ inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Ind
       for (int a = 0; a < nodes; ++a) out << ", " << mesh.tetrahedra(e, a) + 1;
       out << "\n";
     }
-    const auto material = [&](const char* name, const char* elements, double stiffness_pa) {
-      const Moduli m = moduli(stiffness_pa, poisson);
+    const auto material = [&](const char* name, const char* elements, double stiffness_pa, double nu) {
+      const Moduli m = moduli(stiffness_pa, nu);
       out << "*MATERIAL, NAME=" << name << "\n";
       if (nonlinear)
         out << "*HYPERELASTIC, NEO HOOKE\n" << m.mu / 2 << ", " << 2 / (m.lambda + 2.0 / 3 * m.mu) << "\n";
       else
-        out << "*ELASTIC\n" << stiffness_pa << ", " << poisson << "\n";
+        out << "*ELASTIC\n" << stiffness_pa << ", " << nu << "\n";
       out << "*SOLID SECTION, ELSET=" << elements << ", MATERIAL=" << name << "\n";
     };
     if (other.empty()) {
-      material("SOFT", "BODY", young_pa);
+      material("SOFT", "BODY", young_pa, poisson);
     } else {
       std::vector<char> is_other(static_cast<std::size_t>(mesh.tetrahedra.rows()), 0);
       for (Index e : other) is_other[static_cast<std::size_t>(e)] = 1;
@@ -56,8 +57,8 @@ inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Ind
         for (std::size_t e = 0; e < is_other.size(); ++e)
           if (is_other[e] == which) out << e + 1 << ",\n";
       }
-      material("SOFT", "THESE", young_pa);
-      material("OTHER", "THOSE", other_young_pa);
+      material("SOFT", "THESE", young_pa, poisson);
+      material("OTHER", "THOSE", other_young_pa, other_poisson.value_or(poisson));
     }
     out << "*BOUNDARY\n";
     for (Index i : held) out << i + 1 << ", 1, 3, 0.\n";

@@ -6,6 +6,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <optional>
+#include <utility>
+
 #include "fem_meshes.hpp"
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
@@ -44,8 +48,8 @@ TEST_P(CalculiX, AgreesNodeByNode) {
   EXPECT_LT(difference, 2e-6);  // its file carries seven digits
 }
 
-// The upper part of the cube is of another stiffness, up to a slanted face through its middle.
-TEST_P(CalculiX, AgreesWithTwoStiffnesses) {
+// The upper part of the cube is of another stiffness, and of another nu, up to a slanted face through its middle.
+TEST_P(CalculiX, AgreesWithTwoMaterials) {
   if (!calculix_is_there()) GTEST_SKIP() << "CalculiX (ccx) is not installed";
   const Case c = GetParam();
   TetMesh mesh = distorted(block_mesh(4, 4, 4, {0.15, 0.15, 0.15}), 0.006, 22);
@@ -63,17 +67,20 @@ TEST_P(CalculiX, AgreesWithTwoStiffnesses) {
     options.region.push_back(at.z() > 0.05 + 0.4 * at.x() ? 1 : 0);
     if (options.region.back() == 1) upper.push_back(e);
   }
-  for (const double ratio : {5.0, 0.4}) {
+  const std::optional<double> shared;
+  for (const auto& [ratio, upper_poisson] : {std::pair(5.0, shared), std::pair(0.4, shared), std::pair(0.4, std::optional(0.1)),
+                                             std::pair(2.0, std::optional(0.48))}) {
     options.region_stiffness = Eigen::Vector2d(1, ratio);
+    if (upper_poisson) options.region_poisson = Eigen::Vector2d(std::nan(""), *upper_poisson);
     const VectorX theirs =
-        calculix_displacements(mesh, held, b.forces * force, c.nonlinear, young, c.poisson, upper, ratio * young);
+        calculix_displacements(mesh, held, b.forces * force, c.nonlinear, young, c.poisson, upper, ratio * young, upper_poisson);
     ASSERT_TRUE(theirs.allFinite()) << "ccx gave no result";
     const Equilibrium e = Statics(mesh, c.nonlinear ? "neo_hookean_isochoric" : "linear", b, options)
                               .solve(young, c.poisson, force, VectorX());
     ASSERT_TRUE(e.converged) << e.reason;
     const double largest = e.displacement_m.cwiseAbs().maxCoeff();
     EXPECT_GT(largest, 5e-4);
-    EXPECT_LT((theirs - e.displacement_m).cwiseAbs().maxCoeff(), 3e-6 * largest) << "ratio " << ratio;
+    EXPECT_LT((theirs - e.displacement_m).cwiseAbs().maxCoeff(), 3e-6 * largest) << "ratio " << ratio << ", nu " << upper_poisson.value_or(c.poisson);
   }
 }
 

@@ -208,6 +208,39 @@ TEST(ContactRegions, DerivativesToTheirStiffnessAreThoseOfDifferences) {
       }
 }
 
+// The same of nu: the first region's is the whole's.
+TEST(ContactRegions, DerivativesToTheirPoissonRatiosAreThoseOfDifferences) {
+  const HeldBlock block;
+  for (const char* material : {"linear", "neo_hookean"})
+    for (const Dilatation dilatation : {Dilatation::pointwise, Dilatation::averaged}) {
+      ContactOptions options = exact(1e-12);
+      options.statics.dilatation = dilatation;
+      for (Index e = 0; e < block.mesh.tetrahedra.rows(); ++e)
+        options.statics.region.push_back(block.mesh.nodes_m.row(block.mesh.tetrahedra(e, 0)).x() < 0.051 ? 0 : 1);
+      options.statics.region_poisson = Eigen::Vector2d(std::nan(""), 0.2);
+      ContactStatics body(block.mesh, material, block.boundary, {tool_on_top(sphere_shape(0.03), Touch::friction, false)}, options);
+      ContactLoads loads = body.no_loads();
+      loads.motion[0].head<3>() = Vec3(0.001, 0, -0.004);
+      const auto solve = [&](double first, double second) {
+        body.set_region_poisson(Eigen::Vector2d(std::nan(""), 0.2 + second));
+        ContactEquilibrium e = body.solve(2e4, 0.35 + first, loads);
+        EXPECT_TRUE(e.converged) << e.reason;
+        return e;
+      };
+      constexpr double h = 1e-6;
+      for (int region = 0; region < 2; ++region) {
+        const ContactEquilibrium ahead = region == 0 ? solve(h, 0) : solve(0, h), behind = region == 0 ? solve(-h, 0) : solve(0, -h);
+        const ContactEquilibrium at = solve(0, 0);
+        ContactLoadsAlong along = body.no_loads_along(1);
+        (region == 0 ? along.poisson(0) : along.region_poisson(1, 0)) = 1;
+        const ContactPathSensitivity s = body.sensitivity_along(at, along, body.rest_along(1));
+        const Differences d(ahead, behind, h);
+        EXPECT_LT((d.displacement - s.displacement.col(0)).norm(), 1e-3 * d.displacement.norm()) << material << region;
+        EXPECT_LT((d.wrench - s.wrench[0].col(0)).norm(), 1e-3 * d.wrench.norm() + 1e-4 * at.touches[0].wrench.norm()) << material << region;
+      }
+    }
+}
+
 // A guess saves work and leaves the answer and its derivatives as they are.
 TEST(ContactGuess, SavesWorkAndNotDigits) {
   const LyingBlock block(0, 0.4);

@@ -1,7 +1,9 @@
 // label: oracle
 // SPDX-License-Identifier: Apache-2.0
-// Regions of other stiffness: a bar of two halves is two springs in a row.
+// Regions of other stiffness: a bar of two halves is two springs in a row. Regions of other Poisson ratios.
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 #include "fem/fem_meshes.hpp"
 #include "palpate/core/error.hpp"
@@ -74,6 +76,74 @@ TEST(RegionStiffness, OneFactorEverywhereIsAnotherYoungModulus) {
       const Sensitivity one = stiff.sensitivity(a);
       EXPECT_LT((one.d_log_stiffness.rowwise().sum() - one.d_log_young).norm(), 1e-7 * one.d_log_young.norm()) << material;
     }
+}
+
+// What averaged dilatations become where the regions' bulk terms differ: with one nu what they are without regions, with two what
+// plain quadratic elements say, which this mesh is fine enough for.
+TEST(RegionPoisson, AveragedDilatationsAreWeighedWithEachRegionsBulkTerm) {
+  const TetMesh mesh = to_quadratic(block_mesh(8, 6, 6, Vec3(0.1, 0.075, 0.075)));
+  Boundary boundary;
+  for (Index n = 0; n < mesh.nodes_m.rows(); ++n)
+    if (mesh.nodes_m(n, 2) < 1e-9) boundary.constraints.push_back({n, Mat3::Identity(), 3});
+  boundary.forces = spread_over_patch(mesh, {0.05, 0.04, 0.075}, 0.03);
+  const Vec3 force_n(0.5, 0, -3);
+  for (const char* material : {"linear", "neo_hookean"}) {
+    StaticsOptions options;
+    for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) options.region.push_back(element_centre(mesh, e).x() < 0.05 ? 0 : 1);
+    const auto solved = [&](Dilatation dilatation, double poisson) {
+      options.dilatation = dilatation;
+      options.region_poisson = Eigen::Vector2d(std::nan(""), poisson);
+      const Equilibrium at = Statics(mesh, material, boundary, options).solve(1e4, 0.4, force_n, VectorX(0));
+      EXPECT_TRUE(at.converged) << at.reason;
+      return at.displacement_m;
+    };
+    StaticsOptions plain;
+    plain.dilatation = Dilatation::averaged;
+    const VectorX shared = Statics(mesh, material, boundary, plain).solve(1e4, 0.4, force_n, VectorX(0)).displacement_m;
+    EXPECT_LT((solved(Dilatation::averaged, 0.4) - shared).norm(), 1e-7 * shared.norm()) << material;
+    for (const double poisson : {0.0, 0.2}) {
+      const VectorX averaged = solved(Dilatation::averaged, poisson), pointwise = solved(Dilatation::pointwise, poisson);
+      EXPECT_LT((averaged - pointwise).norm(), 0.01 * pointwise.norm()) << material << poisson;
+      EXPECT_GT((averaged - shared).norm(), 0.05 * pointwise.norm()) << material << poisson;
+    }
+  }
+}
+
+// What was remembered of the factors must not survive a change.
+TEST(RegionPoisson, ChangesAreFollowed) {
+  const Bar bar;
+  for (const char* material : {"linear", "neo_hookean"})
+    for (const Dilatation dilatation : {Dilatation::pointwise, Dilatation::averaged}) {
+      StaticsOptions options;
+      options.dilatation = dilatation;
+      options.region = bar.halves();
+      options.region_poisson = Eigen::Vector2d(std::nan(""), 0.2);
+      Statics moved(bar.mesh, material, bar.boundary, options);
+      const VectorX force = VectorX::Constant(1, 8.0);
+      moved.sensitivity(moved.solve(1e4, 0.3, force, VectorX(0)));
+      moved.set_region_poisson(Eigen::Vector2d(std::nan(""), 0.45));
+      const auto there = moved.solve(1e4, 0.3, force, VectorX(0));
+      moved.set_region_poisson({});
+      const auto shared = moved.solve(1e4, 0.3, force, VectorX(0));
+      options.region_poisson = Eigen::Vector2d(std::nan(""), 0.45);
+      const auto anew = Statics(bar.mesh, material, bar.boundary, options).solve(1e4, 0.3, force, VectorX(0));
+      options.region_poisson = {};
+      const auto plain = Statics(bar.mesh, material, bar.boundary, options).solve(1e4, 0.3, force, VectorX(0));
+      EXPECT_LT((there.displacement_m - anew.displacement_m).norm(), 1e-7 * anew.displacement_m.norm()) << material;
+      EXPECT_LT((shared.displacement_m - plain.displacement_m).norm(), 1e-7 * plain.displacement_m.norm()) << material;
+    }
+}
+
+TEST(RegionPoisson, WhatDoesNotFitIsRefused) {
+  const Bar bar;
+  StaticsOptions options;
+  options.region = bar.halves();
+  Statics statics(bar.mesh, "linear", bar.boundary, options);
+  EXPECT_THROW(statics.set_region_poisson(Eigen::Vector2d(0.3, 0.5)), Error);
+  EXPECT_THROW(statics.set_region_poisson(Vec3(0.3, 0.3, 0.3)), Error);
+  options.dilatation = Dilatation::averaged;
+  options.region_poisson = Eigen::Vector2d(std::nan(""), -0.2);
+  EXPECT_THROW(Statics(bar.mesh, "linear", bar.boundary, options).solve(1e4, 0.3, VectorX::Constant(1, 1.0), VectorX(0)), Error);
 }
 
 TEST(RegionStiffness, WhatDoesNotFitIsRefused) {

@@ -4,6 +4,8 @@
 // sliding supports, driven plates and free bodies.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "fem_meshes.hpp"
 #include "palpate/fem/materials.hpp"
 #include "palpate/fem/regions.hpp"
@@ -26,6 +28,33 @@ std::vector<Case> cases() {
   return all;
 }
 
+// Held below, driven down at one edge of the top, pressed aside.
+Boundary held_and_driven(const TetMesh& m) {
+  Boundary b;
+  std::vector<Eigen::Triplet<double>> motion;
+  for (Index i = 0; i < m.nodes_m.rows(); ++i) {
+    const Vec3 x = node_position(m, i);
+    if (x.z() < 1e-9) b.constraints.push_back({i, Mat3::Identity(), 3});
+    if (x.z() > 0.15 - 1e-9 && x.x() < 0.02) {
+      b.constraints.push_back({i, Mat3::Identity(), 3});
+      motion.emplace_back(3 * i + 2, 0, 1.0);
+    }
+  }
+  b.motions.resize(3 * m.nodes_m.rows(), 1);
+  b.motions.setFromTriplets(motion.begin(), motion.end());
+  b.forces = spread_over_patch(m, {0.1, 0.05, 0.07}, 0.03);
+  return b;
+}
+
+std::vector<int> layers(const TetMesh& m) {
+  std::vector<int> region;
+  for (Index e = 0; e < m.tetrahedra.rows(); ++e) {
+    const double height = element_centre(m, e).z();
+    region.push_back(height < 0.05 ? 1 : height < 0.09 ? 0 : 2);
+  }
+  return region;
+}
+
 class SensitivityContract : public testing::TestWithParam<Case> {
  protected:
   TetMesh mesh() const {
@@ -42,10 +71,17 @@ class SensitivityContract : public testing::TestWithParam<Case> {
   // Parameters in one vector: log E, nu, extra, force coefficients, motion coefficients.
   struct Point {
     double log_young = std::log(20000.0), poisson = 0.35;
-    VectorX extra, force, motion, log_stiffness;
+    VectorX extra, force, motion, log_stiffness, region_poisson;
   };
+  static Point pressed_aside() {
+    Point p;
+    p.force = Vec3(-2, 1, 0.5);
+    p.motion = VectorX::Constant(1, -0.01);
+    return p;
+  }
   static Equilibrium solve(Statics& s, const Point& p, const VectorX* start = nullptr) {
     if (p.log_stiffness.size() > 0) s.set_region_stiffness(p.log_stiffness.array().exp());
+    if (p.region_poisson.size() > 0) s.set_region_poisson(p.region_poisson);
     return s.solve(std::exp(p.log_young), p.poisson, p.force, p.motion, start, p.extra);
   }
   void compare(Statics statics, Point p) const {
@@ -75,6 +111,15 @@ class SensitivityContract : public testing::TestWithParam<Case> {
     for (Index k = 0; k < p.log_stiffness.size(); ++k)
       check("stiffness of a region", 1e-4, s.d_log_stiffness.col(k), s.reaction_d_log_stiffness.col(k),
             [k](Point& x, double h) { x.log_stiffness(k) += h; });
+    ASSERT_EQ(s.d_region_poisson.cols(), p.region_poisson.size());
+    for (Index k = 0; k < p.region_poisson.size(); ++k) {
+      if (std::isnan(p.region_poisson(k))) {
+        EXPECT_TRUE(s.d_region_poisson.col(k).isZero(0) && s.reaction_d_region_poisson.col(k).isZero(0));
+        continue;
+      }
+      check("nu of a region", 1e-4, s.d_region_poisson.col(k), s.reaction_d_region_poisson.col(k),
+            [k](Point& x, double h) { x.region_poisson(k) += h; });
+    }
     for (Index k = 0; k < p.force.size(); ++k)
       check("force", 3e-3, s.d_force.col(k), s.reaction_d_force.size() ? VectorX(s.reaction_d_force.col(k)) : VectorX(),
             [k](Point& x, double h) { x.force(k) += h; });
@@ -124,29 +169,23 @@ TEST_P(SensitivityContract, ObliqueSlideAndDrivenTop) {
 // Three parts of different stiffness, one of them between the others, under a force and a motion.
 TEST_P(SensitivityContract, RegionsOfDifferentStiffness) {
   const TetMesh m = mesh();
-  Boundary b;
-  std::vector<Eigen::Triplet<double>> motion;
-  for (Index i = 0; i < m.nodes_m.rows(); ++i) {
-    const Vec3 x = node_position(m, i);
-    if (x.z() < 1e-9) b.constraints.push_back({i, Mat3::Identity(), 3});
-    if (x.z() > 0.15 - 1e-9 && x.x() < 0.02) {
-      b.constraints.push_back({i, Mat3::Identity(), 3});
-      motion.emplace_back(3 * i + 2, 0, 1.0);
-    }
-  }
-  b.motions.resize(3 * m.nodes_m.rows(), 1);
-  b.motions.setFromTriplets(motion.begin(), motion.end());
-  b.forces = spread_over_patch(m, {0.1, 0.05, 0.07}, 0.03);
   StaticsOptions options = tight();
-  for (Index e = 0; e < m.tetrahedra.rows(); ++e) {
-    const double height = element_centre(m, e).z();
-    options.region.push_back(height < 0.05 ? 1 : height < 0.09 ? 0 : 2);
-  }
-  Point p;
-  p.force = Vec3(-2, 1, 0.5);
-  p.motion = VectorX::Constant(1, -0.01);
+  options.region = layers(m);
+  Point p = pressed_aside();
   p.log_stiffness = Vec3(0.4, -0.3, 0.7);
-  compare(Statics(m, std::string(GetParam().law->name()), b, options), p);
+  compare(Statics(m, std::string(GetParam().law->name()), held_and_driven(m), options), p);
+}
+
+// And of different Poisson ratios, the first one's that of the whole.
+TEST_P(SensitivityContract, RegionsOfDifferentPoissonRatios) {
+  const TetMesh m = mesh();
+  StaticsOptions options = tight();
+  options.region = layers(m);
+  options.region_poisson = Vec3(std::nan(""), 0.2, 0.45);
+  Point p = pressed_aside();
+  p.log_stiffness = Vec3(0.4, -0.3, 0.7);
+  p.region_poisson = options.region_poisson;
+  compare(Statics(m, std::string(GetParam().law->name()), held_and_driven(m), options), p);
 }
 
 TEST_P(SensitivityContract, FreeBodyBetweenTwoPushes) {

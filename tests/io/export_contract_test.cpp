@@ -15,6 +15,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 #include "palpate/io/exporters.hpp"
 #include "palpate/io/mesh_file.hpp"
@@ -45,6 +46,14 @@ ExportModel bar(bool quadratic = false, double nu = 0.3) {
   return model;
 }
 
+/// Its upper half stiffer and of another nu.
+ExportModel in_halves(ExportModel model) {
+  model.regions = {{"lower -- <half>", model.young_modulus_pa, model.poisson_ratio}, {"upper", 3 * model.young_modulus_pa, 0.15}};
+  for (Eigen::Index t = 0; t < model.mesh.tetrahedra.rows(); ++t)
+    model.region.push_back(fem::element_centre(model.mesh, static_cast<Index>(t)).z() < 0.04 ? 0 : 1);
+  return model;
+}
+
 /// The same static problem in our own solver.
 VectorX solved(const ExportModel& model) {
   fem::Boundary boundary;
@@ -54,7 +63,13 @@ VectorX solved(const ExportModel& model) {
   for (const auto& [node, force] : model.forces_n)
     for (int d = 0; d < 3; ++d) boundary.forces.coeffRef(3 * node + d, 0) += force(d);
   boundary.motions.resize(size, 0);
-  const fem::Statics statics(model.mesh, "linear", boundary);
+  fem::StaticsOptions options;
+  options.region = model.region;
+  if (!model.regions.empty()) {
+    options.region_stiffness = Eigen::Vector2d(1, model.regions[1].young_modulus_pa / model.young_modulus_pa);
+    options.region_poisson = Eigen::Vector2d(std::nan(""), model.regions[1].poisson_ratio);
+  }
+  const fem::Statics statics(model.mesh, "linear", boundary, options);
   const auto at = statics.solve(model.young_modulus_pa, model.poisson_ratio, VectorX::Ones(1), VectorX(0));
   EXPECT_TRUE(at.converged);
   return at.displacement_m;
@@ -118,6 +133,38 @@ TEST_P(EveryExporter, ChangesWithEAndNu) {
   EXPECT_NE(all_text(export_files(GetParam(), other_nu)), as_is);
 }
 
+TEST_P(EveryExporter, TakesRegionsOrSaysWhoDoes) {
+  const ExportModel model = in_halves(bar());
+  if (!GetParam().by_region) {
+    try {
+      export_files(GetParam(), model);
+      FAIL() << "wrote one stiffness for two";
+    } catch (const Error& error) {
+      EXPECT_THAT(error.message(), HasSubstr("has 2 regions; calculix, "));
+    }
+    return;
+  }
+  const std::string text = all_text(export_files(GetParam(), model));
+  for (const std::size_t r : {0, 1}) {
+    ExportModel other = model, other_nu = model;
+    other.regions[r].young_modulus_pa *= 1.1;
+    other_nu.regions[r].poisson_ratio += 0.05;
+    EXPECT_NE(all_text(export_files(GetParam(), other)), text);
+    EXPECT_NE(all_text(export_files(GetParam(), other_nu)), text);
+  }
+  for (const auto& [name, bytes] : export_files(GetParam(), model)) {
+    if (bytes.starts_with("<")) {
+      EXPECT_NO_THROW(parse_xml(bytes, name)) << name;
+    }
+  }
+  ExportModel wrong = model;
+  wrong.region.pop_back();
+  EXPECT_THROW(export_files(GetParam(), wrong), Error);
+  wrong = model;
+  wrong.regions[1].poisson_ratio = 0.5;
+  EXPECT_THROW(export_files(GetParam(), wrong), Error);
+}
+
 INSTANTIATE_TEST_SUITE_P(Exporters, EveryExporter,
                          testing::ValuesIn(std::vector<Exporter>(exporters().begin(), exporters().end())),
                          [](const auto& one) { return one.param.name; });
@@ -166,8 +213,9 @@ TEST(Exporters, MidpointsGiveTheirLoadToTheEdgesEnds) {
 /// The file is solved by CalculiX itself; displacements of both elements agree with ours.
 TEST(Exporters, CalculixSolvesItsFileToTheSameDisplacements) {
   if (std::system("command -v ccx > /dev/null 2>&1") != 0) GTEST_SKIP() << "no ccx";
-  for (const bool quadratic : {false, true}) {
+  for (const auto& [quadratic, halves] : {std::pair(false, false), std::pair(true, false), std::pair(false, true), std::pair(true, true)}) {
     ExportModel model = bar(quadratic, quadratic ? 0.45 : 0.3);
+    if (halves) model = in_halves(model);
     // Rounding leaves such numbers in real meshes; their many letters once were cut off in the middle of the exponent.
     model.mesh.nodes_m = (model.mesh.nodes_m.array() == 0).select(-2.77555756156289e-17, model.mesh.nodes_m.array());
     const TemporaryFolder folder("ccx");

@@ -80,7 +80,7 @@ cameras:
     noise: {model: constant, sigma_m: 0.002, bias_std_m: 0.003}
 markers: {rest_m: {a: [0, 0, 0.11], "b c": [0.1, 0, 0.11]}, rest_std_m: 0.001}
 robot: {urdf: arm.urdf, joints: [elbow, shoulder]}
-model: {material: neo_hookean, element: tet10, refine: auto, poisson_range: [0.3, 0.49]}
+model: {material: neo_hookean, element: tet10, refine: auto, poisson_range: [0.3, 0.49], poisson_by_region: true}
 pushes:
   - name: one
     site: head
@@ -235,6 +235,7 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
   EXPECT_EQ(back.tools[0].compliance_std_m_per_n, recording.tools[0].compliance_std_m_per_n);
   EXPECT_EQ(back.time_offset_std_s, recording.time_offset_std_s);
   EXPECT_EQ(back.pushes[0].steps[1].loads[0].force_rate_n_s, recording.pushes[0].steps[1].loads[0].force_rate_n_s);
+  EXPECT_TRUE(back.model.poisson_by_region);
   ASSERT_EQ(back.regions.size(), recording.regions.size());
   for (std::size_t r = 0; r < back.regions.size(); ++r) {
     EXPECT_EQ(back.regions[r].name, recording.regions[r].name);

@@ -6,7 +6,11 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "io/broken_bytes.hpp"
 #include "io/recording_folder.hpp"
@@ -178,6 +182,37 @@ TEST(Model, IsReadyForSimulators) {
   EXPECT_NEAR(young, mu * (3 * lambda + 2 * mu) / (lambda + mu), 1e-9 * young);
   EXPECT_NEAR(nu, lambda / (2 * (lambda + mu)), 1e-12);
   EXPECT_EQ(material["density_kg_m3"], 1100);
+}
+
+TEST(Model, HoldsTheModuliOfEveryElement) {
+  const TemporaryFolder folder("model");
+  const MeshData tets = cube();
+  Identification answer = whole_answer();
+  const auto parameter = [](const char* name, const char* region, double value) {
+    Parameter one{name, region, "1"};
+    one.value = value;
+    return one;
+  };
+  answer.parameters = {parameter("young_modulus", "a", 1e4), parameter("poisson_ratio", "a", 0.2), parameter("young_modulus", "b", 3e4),
+                       parameter("poisson_ratio", "b", 0.4)};
+  std::vector<int> region(static_cast<std::size_t>(tets.tetrahedra.rows()), 0);
+  region.back() = 1;
+  write_model(answer, {tets.points_m, tets.tetrahedra}, folder.path() / "model", region);
+  // Gmsh's file is text: a number an element under the field's name.
+  std::istringstream lines(folder.get("model/object.msh"));
+  std::map<std::string, std::vector<double>> fields;
+  std::string field;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("\"")) field = line.substr(1, line.size() - 2);
+    if (line.starts_with("$End")) field.clear();
+    double element = 0, value = 0;
+    std::istringstream words(line);
+    if (!field.empty() && words >> element >> value && words.eof()) fields[field].push_back(value);
+  }
+  for (std::size_t e = 0; e < region.size(); ++e) {
+    EXPECT_NEAR(fields["young_modulus_pa"].at(e), region[e] == 0 ? 1e4 : 3e4, 1e-9);
+    EXPECT_NEAR(fields["poisson_ratio"].at(e), region[e] == 0 ? 0.2 : 0.4, 1e-12);
+  }
 }
 
 }  // namespace

@@ -132,6 +132,7 @@ void expect_same_object(const Recording& a, const Recording& b) {
   EXPECT_EQ(a.model.poisson_lower, b.model.poisson_lower);
   EXPECT_EQ(a.model.poisson_upper, b.model.poisson_upper);
   EXPECT_EQ(a.model.poisson_fixed, b.model.poisson_fixed);
+  EXPECT_EQ(a.model.poisson_by_region, b.model.poisson_by_region);
   EXPECT_EQ(a.joint_names, b.joint_names);
   ASSERT_EQ(a.robot.has_value(), b.robot.has_value());
   if (!a.robot) return;

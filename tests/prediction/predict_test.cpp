@@ -11,6 +11,7 @@
 #include "fem/fem_meshes.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/regions.hpp"
 
 namespace palpate::prediction {
 namespace {
@@ -155,6 +156,98 @@ TEST_P(Bands, AgreeWithDrawsThatAreSolvedAnew) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, Bands, testing::Values("linear", "neo_hookean"));
+
+/// The lower half twice as soft as the upper one.
+Elasticity in_halves(const Scene& scene, const std::string& material, bool own) {
+  Elasticity e = foam(material);
+  e.regions = {"upper", "lower"};
+  e.region_stiffness = Eigen::Vector2d(1, 0.5);
+  if (own) e.region_poisson = Eigen::Vector2d(std::nan(""), 0.15);
+  for (Index t = 0; t < scene.mesh.tetrahedra.rows(); ++t)
+    e.region.push_back(fem::element_centre(scene.mesh, t).z() > edge_m / 2 ? 0 : 1);
+  e.covariance = MatrixX::Zero(own ? 4 : 3, own ? 4 : 3);
+  e.covariance.diagonal().head<3>() << 4e-4, 1e-4, 9e-4;
+  e.covariance(0, 2) = e.covariance(2, 0) = -3e-4;
+  if (own) e.covariance(3, 3) = 4e-4;
+  return e;
+}
+
+/// nu / E is the same in both halves, so that they widen alike: springs in a row.
+TEST(Predict, HalvesAreSpringsInARow) {
+  const Scene scene = block(false);
+  NewPush push;
+  push.force_n = 5;
+  const Prediction found = predict(scene.mesh, in_halves(scene, "linear", true), scene.boundary, push);
+  ASSERT_TRUE(found.converged) << found.reason;
+  EXPECT_NEAR(found.travel_m.value, 5 / (edge_m * edge_m) * (0.5 * edge_m / 2e4 + 0.5 * edge_m / 1e4), 1e-9);
+  for (Index i = 0; i < found.von_mises_pa.size(); ++i) EXPECT_NEAR(found.von_mises_pa(i), 500, 1e-4);
+}
+
+TEST(Predict, BandsOfRegionsAgreeWithDrawsThatAreSolvedAnew) {
+  const Scene scene = block(true, 2);
+  for (const bool own : {false, true}) {
+    const Elasticity centre = in_halves(scene, "neo_hookean", own);
+    for (const bool travel_given : {false, true}) {
+      NewPush push;
+      if (travel_given)
+        push.travel_m = 0.008;
+      else
+        push.force_n = 12;
+      const Prediction found = predict(scene.mesh, centre, scene.boundary, push);
+      ASSERT_TRUE(found.converged) << found.reason;
+      Eigen::Index most = 0;
+      found.von_mises_pa.maxCoeff(&most);
+      std::mt19937 random(5);
+      std::normal_distribution<double> normal;
+      const Eigen::LLT<MatrixX> factor(centre.covariance);
+      constexpr int draws = 150;
+      double first = 0, first2 = 0, stress = 0, stress2 = 0;
+      for (int i = 0; i < draws; ++i) {
+        VectorX z(centre.covariance.rows());
+        for (double& value : z) value = normal(random);
+        z = factor.matrixL() * z;
+        Elasticity drawn = centre;
+        drawn.young_modulus_pa *= std::exp(z(0));
+        drawn.poisson_ratio += z(1);
+        drawn.region_stiffness(1) *= std::exp(z(2));
+        if (own) drawn.region_poisson(1) += z(3);
+        const Prediction one = predict(scene.mesh, drawn, scene.boundary, push);
+        ASSERT_TRUE(one.converged);
+        const double off = travel_given ? one.force_n.value - found.force_n.value : one.travel_m.value - found.travel_m.value;
+        const double stress_off = one.von_mises_pa(most) - found.von_mises_pa(most);
+        first += off, first2 += off * off, stress += stress_off, stress2 += stress_off * stress_off;
+      }
+      const double tolerance = 3 / std::sqrt(2.0 * (draws - 1));
+      const auto spread = [&](double sum, double squares) { return std::sqrt((squares - sum * sum / draws) / (draws - 1)); };
+      EXPECT_NEAR((travel_given ? found.force_n.std : found.travel_m.std) / spread(first, first2), 1, tolerance) << own;
+      EXPECT_NEAR(found.von_mises_std_pa(most) / spread(stress, stress2), 1, tolerance + 0.05) << own;
+    }
+  }
+}
+
+TEST(Predict, ElasticityOfRegionsHasTheCovarianceOfTheirRatios) {
+  Identification answer;
+  answer.material = "linear";
+  const auto parameter = [](const char* name, const char* region, double value) {
+    Parameter one{name, region, "1"};
+    one.value = value;
+    return one;
+  };
+  answer.parameters = {parameter("young_modulus", "a", 1e4), parameter("poisson_ratio", "a", 0.2), parameter("young_modulus", "b", 3e4),
+                       parameter("poisson_ratio", "b", 0.4)};
+  answer.covariance = Eigen::Vector4d(4, 1, 9, 2).asDiagonal();
+  answer.covariance(0, 2) = answer.covariance(2, 0) = 1;
+  const Elasticity e = elasticity_of(answer);
+  EXPECT_EQ(e.regions, (std::vector<std::string>{"a", "b"}));
+  EXPECT_NEAR(e.region_stiffness(1), 3, 1e-12);
+  EXPECT_TRUE(std::isnan(e.region_poisson(0)));
+  EXPECT_EQ(e.region_poisson(1), 0.4);
+  EXPECT_EQ(e.highest_young_modulus_pa(), 3e4);
+  EXPECT_EQ(e.highest_poisson_ratio(), 0.4);
+  EXPECT_NEAR(e.covariance(2, 2), 4 + 9 - 2, 1e-12);  // of log E_b - log E_a
+  EXPECT_NEAR(e.covariance(0, 2), 1 - 4, 1e-12);
+  EXPECT_NEAR(e.covariance(3, 3), 2, 1e-12);
+}
 
 TEST(Predict, AWeightBeforeThePushIsNoTravel) {
   Scene scene = block(true);

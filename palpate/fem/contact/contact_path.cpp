@@ -201,6 +201,9 @@ void advance(ContactSystem& system, const ContactEquilibrium& at, const ContactI
   if (by_region)
     for (Index k = 0; k < regions; ++k)
       change += system.assembly.forces_d_log_stiffness(system.law, p.m, s.u, static_cast<int>(k)) * to.log_stiffness.row(k);
+  for (Index k = 0; k < to.region_poisson.rows(); ++k)
+    if (!to.region_poisson.row(k).isZero(0))
+      change += system.assembly.forces_d_region_poisson(system.law, p.m, s.u, static_cast<int>(k)) * to.region_poisson.row(k);
   std::vector<MatrixX> gradient, twist;
   std::vector<std::vector<ContactTerms::Held>> held;
   std::vector<AnchorSensitivity> anchors(count);

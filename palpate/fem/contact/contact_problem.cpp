@@ -75,6 +75,7 @@ ContactSystem::ContactSystem(const TetMesh& mesh_in, const std::string& material
   if (assembly.region_count() > 0) {
     const VectorX given = options.statics.region_stiffness;
     set_region_stiffness(given.size() > 0 ? given : VectorX::Ones(assembly.region_count()));
+    set_region_poisson(options.statics.region_poisson);
   }
   double volume43 = 0;
   for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
@@ -90,6 +91,11 @@ ContactSystem::ContactSystem(const TetMesh& mesh_in, const std::string& material
 void ContactSystem::set_region_stiffness(const VectorX& stiffness) {
   assembly.set_region_stiffness(stiffness);
   terms.set_regions(options.statics.region, stiffness);
+  body_blocks_.clear();
+}
+
+void ContactSystem::set_region_poisson(const VectorX& poisson) {
+  assembly.set_region_poisson(poisson);
   body_blocks_.clear();
 }
 

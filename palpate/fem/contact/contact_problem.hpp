@@ -59,6 +59,7 @@ class ContactSystem {
                 ContactOptions options);
 
   void set_region_stiffness(const VectorX& stiffness);
+  void set_region_poisson(const VectorX& poisson);
   TouchingBody body(std::size_t contact, const Moduli& m, const Pose& pose, const std::vector<TouchMemory>& memory) const;
   ContactProblem problem(double young, double poisson, const ContactLoads& loads, const VectorX& extra) const;
   /// False where the law does not exist.

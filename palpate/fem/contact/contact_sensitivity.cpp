@@ -33,6 +33,7 @@ void widen(ContactPathSensitivity& d, Index q) {
   widen(d.loads.poisson, q);
   widen(d.loads.log_layer, q);
   widen(d.loads.log_stiffness, q);
+  widen(d.loads.region_poisson, q);
   widen(d.loads.force_coefficients, q);
   widen(d.loads.motion_coefficients, q);
   for (auto& each : d.loads.motion) widen(each, q);

@@ -45,23 +45,25 @@ SensitivityAlong StaticSystem::sensitivity(const Equilibrium& at, const MatrixX&
   if (u.size() != 3 * assembly.node_count()) throw Error("is not a state of this mesh", "sensitivity.at");
   const Index m = static_cast<Index>(motions.cols()), x = static_cast<Index>(p.m.extra.size());
   const Index along = static_cast<Index>(along_force.cols()), regions = assembly.region_count();
+  const Index own = assembly.has_own_poisson() ? regions : 0, first_own = 2 + x + regions, first_along = first_own + own;
   if (along_force.rows() != boundary.forces.cols() || along_motion.rows() != m || along_motion.cols() != along)
     throw Error("needs one row a coefficient, and as many columns for forces as for motions", "sensitivity_along");
   // K du = -df/dtheta (material), F a' - K M b' (a direction a', b')
-  MatrixX rhs(3 * assembly.node_count(), 2 + x + regions + along);
+  MatrixX rhs(3 * assembly.node_count(), first_along + along);
   VectorX internal;
   assembly.energy_and_forces(law, p.m, u, internal);
   rhs.col(0) = -internal;
   rhs.col(1) = -assembly.forces_d_poisson(law, p.m, u);
   for (Index i = 0; i < x; ++i) rhs.col(2 + i) = -assembly.forces_d_extra(law, p.m, u, static_cast<int>(i));
   for (int r = 0; r < regions; ++r) rhs.col(2 + x + r) = -assembly.forces_d_log_stiffness(law, p.m, u, r);
+  for (int r = 0; r < own; ++r) rhs.col(first_own + r) = -assembly.forces_d_region_poisson(law, p.m, u, r);
   rhs.rightCols(along) = boundary.forces * along_force;
   const MatrixX imposed = motions * along_motion;
   MatrixX du = MatrixX::Zero(rhs.rows(), rhs.cols()), reaction = MatrixX::Zero(m, rhs.cols());
   if (!rhs.isZero(0) || !imposed.isZero(0)) {  // nothing depends on anything at rest, and no factor is needed to know that
     const double scale = prepare_tangent(p, u);
     for (Index j = 0; j < along; ++j)
-      if (!imposed.col(j).isZero(0)) rhs.col(2 + x + regions + j) -= scale * assembly.multiply(blocks, imposed.col(j));
+      if (!imposed.col(j).isZero(0)) rhs.col(first_along + j) -= scale * assembly.multiply(blocks, imposed.col(j));
     du = law.is_linear() ? solve_linear_system(rhs) : solve_tangent_system(rhs);
     du /= scale;
     // Reactions: M' (K du - rhs), with K du of the whole displacement.
@@ -74,11 +76,13 @@ SensitivityAlong StaticSystem::sensitivity(const Equilibrium& at, const MatrixX&
   out.d_poisson = du.col(1);
   out.d_extra = du.middleCols(2, x);
   out.d_log_stiffness = du.middleCols(2 + x, regions);
+  out.d_region_poisson = du.middleCols(first_own, own);
   out.d_along = du.rightCols(along);
   out.reaction_d_log_young = reaction.col(0);
   out.reaction_d_poisson = reaction.col(1);
   out.reaction_d_extra = reaction.middleCols(2, x);
   out.reaction_d_log_stiffness = reaction.middleCols(2 + x, regions);
+  out.reaction_d_region_poisson = reaction.middleCols(first_own, own);
   out.reaction_d_along = reaction.rightCols(along);
   return out;
 }

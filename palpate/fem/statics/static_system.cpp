@@ -44,11 +44,12 @@ StaticSystem::StaticSystem(const TetMesh& mesh_in, const std::string& material, 
   node_area_m2 = surface_shares(mesh);
   diameter_m = (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm();
   if (options.region_stiffness.size() > 0) assembly.set_region_stiffness(options.region_stiffness);
+  if (options.region_poisson.size() > 0) assembly.set_region_poisson(options.region_poisson);
   assemble_linear();
 }
 
 void StaticSystem::assemble_linear() {
-  if (!law.is_linear() || assembly.is_mixed()) return;
+  if (!law.is_linear() || assembly.is_mixed() || assembly.has_own_poisson()) return;
   Moduli unit;
   const VectorX rest = VectorX::Zero(3 * assembly.node_count());
   unit.lambda = 1;
@@ -62,6 +63,18 @@ void StaticSystem::set_region_stiffness(const VectorX& stiffness) {
   if (stiffness.size() == options.region_stiffness.size() && stiffness == options.region_stiffness) return;
   assembly.set_region_stiffness(stiffness);
   options.region_stiffness = stiffness;
+  forget_factors();
+}
+
+void StaticSystem::set_region_poisson(const VectorX& poisson) {
+  const VectorX& now = options.region_poisson;
+  if (poisson.size() == now.size() && ((poisson.array() == now.array()) || (poisson.array().isNaN() && now.array().isNaN())).all()) return;
+  assembly.set_region_poisson(poisson);
+  options.region_poisson = poisson;
+  forget_factors();
+}
+
+void StaticSystem::forget_factors() {
   factored_u.resize(0);
   linear_poisson = std::numeric_limits<double>::quiet_NaN();
   assemble_linear();

@@ -36,6 +36,7 @@ class StaticSystem {
   StaticSystem(const TetMesh& mesh, const std::string& material, Boundary boundary, StaticsOptions options);
 
   void set_region_stiffness(const VectorX& stiffness);
+  void set_region_poisson(const VectorX& poisson);
   Equilibrium solve(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX* start,
                     const VectorX& extra);
   Equilibrium solve_stepwise(double young, double poisson, const VectorX& a, const VectorX& b, const VectorX& extra);
@@ -92,7 +93,9 @@ class StaticSystem {
   /// The tangent at a state in `blocks`, ready to be solved with. @returns what it is to be multiplied with: a linear material's is
   /// at E = 1. @throws Error where it is singular
   double prepare_tangent(const StaticProblem& p, const VectorX& u);
-  /// The two parts of a linear material's stiffness, which do not depend on nu.
+  /// What was factorised is of other regions' moduli.
+  void forget_factors();
+  /// The two parts of a linear material's stiffness, which do not depend on nu (where regions share it).
   void assemble_linear();
   void factorise_linear(double poisson, int* factorisations);
   /// With the matrix of `factorise_linear`. @throws Error when it is not positive definite

@@ -10,7 +10,7 @@ namespace palpate::fem {
 void StaticSystem::factorise_linear(double poisson, int* factorisations) {
   if (linear_poisson == poisson) return;
   const Moduli unit = moduli(1.0, poisson);
-  if (assembly.is_mixed()) {
+  if (assembly.is_mixed() || assembly.has_own_poisson()) {
     assembly.tangent(law, unit, VectorX::Zero(3 * assembly.node_count()), blocks);
   } else {
     blocks.resize(blocks_mu.size());
