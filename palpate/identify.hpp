@@ -58,6 +58,7 @@ reconstruction::BuiltObject build_from_views(const Recording& recording, const r
                                              reconstruction::Completion completion = reconstruction::Completion::mirrored,
                                              const OnProgress& progress = {});
 
+/// What views alone do not settle of a shape that they showed: what later stages have to doubt.
 struct ShapeOfViews {
   double strip_m = 0;  ///< height above the table below which no view showed an object that was seen from all around; else 0
   int symmetries = 0;  ///< of one that was seen from one side, its own that were found

@@ -104,6 +104,9 @@ std::vector<Index> nested_dissection_order(const QuotientGraph& graph) {
   const std::lock_guard<std::mutex> lock(one_caller);
   const int status =
       METIS_NodeND(&groups, begin.data(), neighbour.data(), weight.data(), options, order.data(), position.data());
+  if (status == METIS_ERROR_MEMORY)
+    throw Error("no memory is left for the order in which " + std::to_string(graph.first_unknown.back()) + " unknowns are eliminated: end other programs, or take fewer tetrahedra",
+                "SparseFactor::analyse");
   if (status != METIS_OK) throw Error("METIS could not order the graph", "SparseFactor::analyse");
   return order;
 }
