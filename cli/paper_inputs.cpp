@@ -116,7 +116,7 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
       out.doubt = doubt ? std::move(doubt) : std::make_shared<estimation::ShapeDoubt>(other_shapes(as_given, unseen, views.symmetries));
       out.doubt->side = unseen_side(as_given, recording, seen);
     }
-    if (auto finer = estimation::finer_model(recording, out.object))
+    if (auto finer = estimation::finer_model(recording, out.object, fill_anew(as_given, recording)))
       out.finer = std::make_shared<estimation::FinerModel>(std::move(*finer));
     if (keep) shared->built = Prepared{recording, out.object, {}, out.finer, nullptr};
   }
