@@ -266,6 +266,8 @@ Recording with_overrides(Recording recording, const IdentifyOptions& options) {
          "regions are those of the recording (recorded), one around each pushed site (by-site), or none");
   demand(!options.poisson_by_region || recording.regions.size() > 1, "poisson_by_region",
          "the object has one region: let the recording name its regions, or take one around each pushed site (by-site)");
+  demand(!options.poisson_by_region || !model.poisson_fixed, "poisson_by_region",
+         "the Poisson ratio is taken as known (poisson_fixed), and all regions share it: leave out the one or the other");
   demand(options.mesh_tolerance > 0 && std::isfinite(options.mesh_tolerance), "mesh_tolerance",
          "must be positive: a share of E, such as 0.01");
   demand(model.refine == "none" || model.refine == "auto", "model.refine " + model.refine, "refinement is none or auto");

@@ -125,6 +125,11 @@ TEST_F(TwoHalves, MayHavePoissonRatiosOfTheirOwn) {
   EXPECT_THAT(outcome_of("estimate '" + (files / "block").string() + "' -o '" + (files / "no").string() + "' --poisson-by-region", code),
               testing::HasSubstr("the object has one region"));
   EXPECT_EQ(code, 3);
+  EXPECT_THAT(outcome_of("estimate '" + (files / "block").string() + "' -o '" + (files / "no").string() +
+                             "' --regions by-site --poisson-by-region --poisson-ratio 0.3",
+                         code),
+              testing::HasSubstr("leave out the one or the other"));
+  EXPECT_EQ(code, 3);
 }
 
 // What was learned of two halves is predicted and exported with both.
