@@ -39,9 +39,7 @@ io::ExportModel model_of(const Options& given, const LearnedObject& learned) {
   model.poisson_ratio = elasticity.poisson_ratio;
   for (std::size_t r = 0; r < elasticity.regions.size(); ++r) {
     const Index at = static_cast<Index>(r);
-    const bool own = r > 0 && elasticity.region_poisson.size() > 0;
-    model.regions.push_back({elasticity.regions[r], elasticity.region_stiffness(at) * elasticity.young_modulus_pa,
-                             own ? elasticity.region_poisson(at) : elasticity.poisson_ratio});
+    model.regions.push_back({elasticity.regions[r], elasticity.young_modulus_of(at), elasticity.poisson_ratio_of(at)});
   }
   model.region = elasticity.region;
   model.density_kg_m3 = given.density_kg_m3 > 0 ? given.density_kg_m3 : learned.object.density_kg_m3;

@@ -93,10 +93,9 @@ nlohmann::json regions_json(const prediction::Elasticity& elasticity) {
   nlohmann::json list = nlohmann::json::array();
   for (std::size_t r = 0; r < elasticity.regions.size(); ++r) {
     const Index at = static_cast<Index>(r);
-    const bool own = r > 0 && elasticity.region_poisson.size() > 0;
     list.push_back({{"region", elasticity.regions[r]},
-                    {"young_modulus_pa", elasticity.region_stiffness(at) * elasticity.young_modulus_pa},
-                    {"poisson_ratio", own ? elasticity.region_poisson(at) : elasticity.poisson_ratio}});
+                    {"young_modulus_pa", elasticity.young_modulus_of(at)},
+                    {"poisson_ratio", elasticity.poisson_ratio_of(at)}});
   }
   return list;
 }

@@ -33,6 +33,12 @@ VectorX d_travel_of(const fem::ResponseState& state, const Vec3& direction) {
 
 }  // namespace
 
+double Elasticity::young_modulus_of(Index of) const { return region_stiffness(of) * young_modulus_pa; }
+
+double Elasticity::poisson_ratio_of(Index of) const {
+  return of > 0 && region_poisson.size() > 0 ? region_poisson(of) : poisson_ratio;
+}
+
 double Elasticity::highest_young_modulus_pa() const {
   return young_modulus_pa * (region_stiffness.size() > 0 ? std::max(1.0, region_stiffness.maxCoeff()) : 1.0);
 }

@@ -26,6 +26,8 @@ struct Elasticity {
   MatrixX covariance = MatrixX::Zero(2, 2);
   VectorX extra;  ///< further parameters of the law, taken as known
 
+  double young_modulus_of(Index of) const;  ///< a region, Pa
+  double poisson_ratio_of(Index of) const;
   double highest_young_modulus_pa() const;
   double highest_poisson_ratio() const;
 };
