@@ -53,12 +53,11 @@ std::string to_words(const acquisition::ClockOffset& clock) {
                                   : fmt::format("{:+.1f} ms taken off", 1e3 * taken_s));
 }
 
-Recording load_recording_unchecked(Session& session, const fs::path& path, const fs::path& given,
-                                   std::vector<acquisition::ClockOffset>* clocks) {
+LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
   must_exist(path, "a recording is a folder with recording.yaml in it, or a bag (docs/recording-format.md)");
   if (!io::is_bag(path)) {
     if (!given.empty()) throw Error("is a recording; only a bag needs a mapping", path.string());
-    return io::read_recording_unchecked(path);
+    return {io::read_recording_unchecked(path), {}, {}};
   }
   const fs::path file = given.empty() ? mapping_of(path) : given;
   if (file.empty()) {
@@ -70,19 +69,13 @@ Recording load_recording_unchecked(Session& session, const fs::path& path, const
   const io::MessageSource bag = io::read_bag(path);
   const SensorStreams streams = io::read_streams(bag, mapping);
   acquisition::FromStreams made = acquisition::recording_from(mapping.plan, streams);
-  for (const acquisition::ClockOffset& clock : made.clocks)
-    if (clock.usable) session.say(fmt::format("clock      {}: {}", clock.sensor, to_words(clock)));
-  if (clocks != nullptr) *clocks = made.clocks;
-  for (const std::string& note : made.notes) session.warn(note);
   std::error_code code;
   if (fs::is_regular_file(path, code))
     made.recording.input_hashes[path.filename().string()] = io::sha256_hex(io::read_file(path));
-  return std::move(made.recording);
+  return {std::move(made.recording), std::move(made.clocks), std::move(made.notes)};
 }
 
-Recording load_recording(Session& session, const fs::path& path, const fs::path& mapping,
-                         std::vector<acquisition::ClockOffset>* clocks) {
-  Recording recording = load_recording_unchecked(session, path, mapping, clocks);
+void check_loaded(Recording& recording) {
   const auto problems = io::check_recording(recording);
   if (!problems.empty()) {
     const std::string more =
@@ -90,6 +83,22 @@ Recording load_recording(Session& session, const fs::path& path, const fs::path&
     throw Error(problems.front().what + more, problems.front().where);
   }
   for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
+}
+
+Recording load_recording_unchecked(Session& session, const fs::path& path, const fs::path& mapping,
+                                   std::vector<acquisition::ClockOffset>* clocks) {
+  LoadedRecording loaded = load_recording(path, mapping);
+  for (const acquisition::ClockOffset& clock : loaded.clocks)
+    if (clock.usable) session.say(fmt::format("clock      {}: {}", clock.sensor, to_words(clock)));
+  for (const std::string& note : loaded.notes) session.warn(note);
+  if (clocks != nullptr) *clocks = std::move(loaded.clocks);
+  return std::move(loaded.recording);
+}
+
+Recording load_recording(Session& session, const fs::path& path, const fs::path& mapping,
+                         std::vector<acquisition::ClockOffset>* clocks) {
+  Recording recording = load_recording_unchecked(session, path, mapping, clocks);
+  check_loaded(recording);
   return recording;
 }
 

@@ -11,8 +11,20 @@
 
 namespace palpate::cli {
 
-/// What a verb is given as its recording: a folder with recording.yaml, or a bag with a mapping (given, or mapping.yaml in
-/// the bag's folder). Says what was found in a bag: offsets of clocks, steps that were left out. @throws Error; also for
+/// A folder with recording.yaml, or a bag with a mapping (given, or mapping.yaml in the bag's folder).
+struct LoadedRecording {
+  Recording recording;
+  std::vector<acquisition::ClockOffset> clocks;  ///< of a bag
+  std::vector<std::string> notes;                ///< what was left out of it, in words
+};
+
+/// Says nothing, and does not check. @throws Error
+LoadedRecording load_recording(const std::filesystem::path& path, const std::filesystem::path& mapping);
+
+/// Adds to its warnings what is odd. @throws Error for the first of what check_recording finds
+void check_loaded(Recording& recording);
+
+/// What a verb is given as its recording, checked. Says what was found in a bag: offsets of clocks, steps that were left out. @throws Error; also for
 /// what check_recording finds.
 /// @param clocks  if given, the offsets that were estimated between a bag's clocks
 Recording load_recording(Session& session, const std::filesystem::path& path, const std::filesystem::path& mapping,

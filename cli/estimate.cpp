@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "cli/bag_recording.hpp"
+#include "cli/learned_object.hpp"
 #include "cli/live_report.hpp"
 #include "cli/material_names.hpp"
 #include "cli/number_checks.hpp"
@@ -17,9 +18,7 @@
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/identify.hpp"
-#include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
-#include "palpate/report/report.hpp"
 #include "palpate/report/words.hpp"
 #include "palpate/suggest.hpp"
 
@@ -189,10 +188,7 @@ int estimate(Session& session, const Options& given) {
     return exit_numbers;
   }
   answer.timing_s = clock.finish();
-  io::write_result(answer, given.out);
-  io::write_model(answer, found.volume, given.out / "model", found.region);
-  { const io::RecordingWriter object(given.out / "model", found.object); }
-  report::write_report(answer, &recording, given.out / "report.html");
+  write_learned_object(found, recording, given.out);
   if (!answer.parameters.empty()) tell(session, given, answer);
   session.say(fmt::format("written            {}", (given.out / "report.html").string()));
   session.result(io::result_json(answer));

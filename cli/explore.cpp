@@ -15,6 +15,7 @@
 #include "cli/earlier_exploration.hpp"
 #include "cli/exploration_file.hpp"
 #include "cli/later_robot.hpp"
+#include "cli/learned_object.hpp"
 #include "cli/live_report.hpp"
 #include "cli/material_names.hpp"
 #include "cli/new_folder.hpp"
@@ -29,7 +30,6 @@
 #include "palpate/core/error.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
-#include "palpate/report/report.hpp"
 #include "palpate/report/words.hpp"
 
 namespace palpate::cli {
@@ -224,10 +224,7 @@ int run(const Options& given, Session& session) {
   Identification& answer = found.identified.answer;
   answer.provenance["seed"] = std::to_string(session.seed);
   answer.provenance["recording path"] = fs::absolute(given.out / "recording").lexically_normal().string();
-  io::write_result(answer, given.out);
-  io::write_model(answer, found.identified.volume, given.out / "model", found.identified.region);
-  { const io::RecordingWriter object(given.out / "model", found.identified.object); }
-  report::write_report(answer, &found.recording, given.out / "report.html");
+  write_learned_object(found.identified, found.recording, given.out);
   session.say(report::answer(answer));
   for (const auto& verdict : answer.verdicts) session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
   session.say(

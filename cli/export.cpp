@@ -30,29 +30,6 @@ struct Options {
   bool verify = false;
 };
 
-io::ExportModel model_of(const Options& given, const LearnedObject& learned) {
-  io::ExportModel model;
-  const prediction::Elasticity elasticity = elasticity_of(learned);
-  model.name = "object";
-  model.mesh = *learned.object.rest.volume;
-  model.young_modulus_pa = elasticity.young_modulus_pa;
-  model.poisson_ratio = elasticity.poisson_ratio;
-  for (std::size_t r = 0; r < elasticity.regions.size(); ++r) {
-    const Index at = static_cast<Index>(r);
-    model.regions.push_back({elasticity.regions[r], elasticity.young_modulus_of(at), elasticity.poisson_ratio_of(at)});
-  }
-  model.region = elasticity.region;
-  model.density_kg_m3 = given.density_kg_m3 > 0 ? given.density_kg_m3 : learned.object.density_kg_m3;
-  // A shape that was measured with its weight on has sagged already: under gravity it would sag once more.
-  const bool sags = learned.object.rest.state == RestState::stress_free;
-  if (given.gravity.size() == 3)
-    model.gravity_m_s2 = Vec3(given.gravity[0], given.gravity[1], given.gravity[2]);
-  else
-    model.gravity_m_s2 = sags ? learned.object.environment.gravity_m_s2 : Vec3(Vec3::Zero());
-  model.fixed = held_nodes(learned.object);
-  return model;
-}
-
 /// A load that bends and shears whatever is there: a thousandth of E times the object's size squared, on every free node.
 void add_test_load(io::ExportModel& model) {
   const Vec3 size = model.mesh.nodes_m.colwise().maxCoeff() - model.mesh.nodes_m.colwise().minCoeff();
@@ -132,7 +109,9 @@ int run(const Options& given, Session& session) {
   const io::Exporter& exporter = io::exporter_named(given.to);
   must_take_files(given.out);
   const LearnedObject learned = load_learned_object(given.result);
-  const io::ExportModel model = model_of(given, learned);
+  std::optional<Vec3> gravity_m_s2;
+  if (given.gravity.size() == 3) gravity_m_s2 = Vec3(given.gravity[0], given.gravity[1], given.gravity[2]);
+  const io::ExportModel model = export_model(learned, given.density_kg_m3, gravity_m_s2);
   const io::ExportFiles files = io::export_files(exporter, model);
   fs::create_directories(given.out);
   nlohmann::json names = nlohmann::json::array();

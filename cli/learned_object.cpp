@@ -10,10 +10,32 @@
 #include "palpate/fem/regions.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
+#include "palpate/report/report.hpp"
 
 namespace palpate::cli {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// That supports hold altogether (bonded ones).
+std::vector<Index> held_nodes(const Recording& object) {
+  std::set<Index> nodes;
+  for (const Support& support : object.supports) {
+    if (support.contact != ContactLaw::bonded) continue;
+    for (const Index node : fem::support_nodes(*object.rest.volume, support)) nodes.insert(node);
+  }
+  return {nodes.begin(), nodes.end()};
+}
+
+}  // namespace
+
+void write_learned_object(const Identified& found, const Recording& recording, const fs::path& out) {
+  io::write_result(found.answer, out);
+  io::write_model(found.answer, found.volume, out / "model", found.region);
+  { const io::RecordingWriter object(out / "model", found.object); }
+  report::write_report(found.answer, &recording, out / "report.html");
+}
 
 LearnedObject load_learned_object(const fs::path& given) {
   must_be_result(given);
@@ -47,13 +69,26 @@ prediction::Elasticity elasticity_of(const LearnedObject& learned) {
   return elasticity;
 }
 
-std::vector<Index> held_nodes(const Recording& object) {
-  std::set<Index> nodes;
-  for (const Support& support : object.supports) {
-    if (support.contact != ContactLaw::bonded) continue;
-    for (const Index node : fem::support_nodes(*object.rest.volume, support)) nodes.insert(node);
+io::ExportModel export_model(const LearnedObject& learned, double density_kg_m3, const std::optional<Vec3>& gravity_m_s2) {
+  io::ExportModel model;
+  const prediction::Elasticity elasticity = elasticity_of(learned);
+  model.mesh = *learned.object.rest.volume;
+  model.young_modulus_pa = elasticity.young_modulus_pa;
+  model.poisson_ratio = elasticity.poisson_ratio;
+  for (std::size_t r = 0; r < elasticity.regions.size(); ++r) {
+    const Index at = static_cast<Index>(r);
+    model.regions.push_back({elasticity.regions[r], elasticity.young_modulus_of(at), elasticity.poisson_ratio_of(at)});
   }
-  return {nodes.begin(), nodes.end()};
+  model.region = elasticity.region;
+  model.density_kg_m3 = density_kg_m3 > 0 ? density_kg_m3 : learned.object.density_kg_m3;
+  // A shape that was measured with its weight on has sagged already: under gravity it would sag once more.
+  const bool sags = learned.object.rest.state == RestState::stress_free;
+  if (gravity_m_s2)
+    model.gravity_m_s2 = *gravity_m_s2;
+  else if (sags)
+    model.gravity_m_s2 = learned.object.environment.gravity_m_s2;
+  model.fixed = held_nodes(learned.object);
+  return model;
 }
 
 }  // namespace palpate::cli

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <filesystem>
-#include <vector>
+#include <optional>
 
 #include "palpate/core/identification.hpp"
 #include "palpate/core/recording.hpp"
+#include "palpate/identify.hpp"
+#include "palpate/io/exporters.hpp"
 #include "palpate/prediction/predict.hpp"
 
 namespace palpate::cli {
@@ -16,6 +18,11 @@ struct LearnedObject {
   Recording object;  ///< rest.volume is the simulated mesh; no pushes
 };
 
+/// OUT/result.json, OUT/fit, OUT/model and OUT/report.html.
+/// @param recording  that was identified
+/// @throws Error where they cannot be written
+void write_learned_object(const Identified& found, const Recording& recording, const std::filesystem::path& out);
+
 /// @throws Error when OUT holds no result, or one without a model.
 LearnedObject load_learned_object(const std::filesystem::path& out);
 
@@ -23,7 +30,9 @@ LearnedObject load_learned_object(const std::filesystem::path& out);
 /// @throws Error where the result tells other regions apart than the model
 prediction::Elasticity elasticity_of(const LearnedObject& learned);
 
-/// Nodes that supports hold altogether (bonded ones).
-std::vector<Index> held_nodes(const Recording& object);
+/// As other simulators are to have it.
+/// @param density_kg_m3  0: the recording's
+/// @param gravity_m_s2   nothing: the recording's, where the object was measured without its weight
+io::ExportModel export_model(const LearnedObject& learned, double density_kg_m3 = 0, const std::optional<Vec3>& gravity_m_s2 = {});
 
 }  // namespace palpate::cli

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/predicted_push.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/load_columns.hpp"
+#include "palpate/fem/boundary.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
+#include "palpate/report/words.hpp"
+
+namespace palpate::cli {
+namespace {
+
+Tool tool_of(const AskedPush& asked, const Recording& object) {
+  Tool tool;
+  const auto found =
+      std::find_if(object.tools.begin(), object.tools.end(), [&](const Tool& one) { return one.name == asked.tool; });
+  if (!asked.tool.empty()) {
+    if (found == object.tools.end()) throw Error("the recording had no tool of this name", asked.option + "tool " + asked.tool);
+    tool = *found;
+  } else if (asked.radius_m > 0) {
+    tool.name = "disc";
+    tool.shape = ToolShape::disc;
+  } else if (object.tools.size() == 1) {
+    tool = object.tools.front();
+  } else {
+    throw Error(fmt::format("say what pushes: this (a name of the recording's) or {}radius, in metres", asked.option), asked.option + "tool");
+  }
+  if (asked.radius_m > 0) tool.radius_m = asked.radius_m;
+  return tool;
+}
+
+fem::Boundary boundary_of(const Recording& object, const Tool& tool, const Load& load, VectorX& background) {
+  const TetMesh& mesh = *object.rest.volume;
+  fem::Boundary boundary;
+  const auto patch = estimation::load_columns(mesh, tool, load);
+  // Of a shape that was seen while it sagged, the weight is in the shape.
+  const bool heavy = object.rest.state == RestState::stress_free && object.environment.gravity_m_s2.norm() > 0;
+  std::vector<Eigen::Triplet<double>> entries;
+  const auto put = [&](const Eigen::SparseMatrix<double>& columns, int first) {
+    for (int c = 0; c < 3; ++c)
+      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, c); it; ++it)
+        entries.emplace_back(int(it.row()), first + c, it.value());
+  };
+  put(patch, 0);
+  if (heavy) {
+    if (!(object.density_kg_m3 > 0))
+      throw Error("gravity acts, so the density is needed", "model/recording.yaml: density_kg_m3");
+    put(fem::body_force(mesh), 3);
+    background = object.density_kg_m3 * object.environment.gravity_m_s2;
+  }
+  boundary.forces.resize(3 * mesh.nodes_m.rows(), heavy ? 6 : 3);
+  boundary.forces.setFromTriplets(entries.begin(), entries.end());
+  boundary.inertia_relief = object.free;
+  if (object.free) {
+    boundary.motions.resize(3 * mesh.nodes_m.rows(), 0);
+  } else {
+    estimation::HeldBody held = estimation::hold(mesh, object.supports, {});
+    boundary.constraints = std::move(held.constraints);
+    boundary.motions = std::move(held.motions);
+  }
+  return boundary;
+}
+
+double mesh_size_m(const TetMesh& mesh) { return (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm(); }
+
+std::string words(const Vec3& at) { return fmt::format("{:.4g} {:.4g} {:.4g}", at.x(), at.y(), at.z()); }
+
+/// A place beside the surface would be pressed by the part of the patch that reaches it: it is moved there, or refused.
+void put_on_surface(const TetMesh& mesh, const AskedPush& asked, PredictedPush& push) {
+  Load& load = push.load;
+  const TriMesh surface = geometry::boundary_surface(mesh).surface;
+  const auto foot = geometry::TriangleTree(surface).closest(load.contact_m);
+  const double off_m = std::sqrt(foot.squared_distance_m2), near_m = 0.01 * mesh_size_m(mesh);
+  if (off_m > std::max(near_m, 0.5 * push.tool.radius_m))
+    throw Error(fmt::format("lies {} away from the object's surface; the nearest place on it is {}", report::quantity(off_m, "m"), words(foot.point_m)),
+                asked.option + "contact " + words(load.contact_m));
+  if (off_m > near_m) push.warnings.push_back(fmt::format("the contact is moved by {} onto the surface, to {}", report::quantity(off_m, "m"), words(foot.point_m)));
+  load.contact_m = foot.point_m;
+  const auto corner = [&](int k) { return Vec3(surface.vertices_m.row(surface.triangles(foot.triangle, k))); };
+  const Vec3 outwards = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+  if (load.direction.dot(outwards) > 0)
+    throw Error("points out of the object there, and a tool can only push; into it is about " + words(-outwards.normalized()),
+                asked.option + "direction " + words(load.direction));
+}
+
+/// A solver looks long for an equilibrium that no material has.
+void must_be_bearable(const AskedPush& push, const Tool& tool, const TetMesh& mesh, double young_modulus_pa) {
+  const double size_m = mesh_size_m(mesh);
+  if (push.travel_m && *push.travel_m > size_m)
+    throw Error(fmt::format("is further than the object is large ({}); it is in metres", report::quantity(size_m, "m")),
+                fmt::format("{}travel {:g}", push.option, *push.travel_m));
+  const bool round = tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc;
+  const double area_m2 = round && tool.radius_m > 0 ? EIGEN_PI * tool.radius_m * tool.radius_m : size_m * size_m;
+  constexpr double most_over_young = 10;
+  if (push.force_n && *push.force_n > most_over_young * young_modulus_pa * area_m2)
+    throw Error(fmt::format("is {:.2g} times what E ({}) bears on the pressed patch; no such object stands that. It is in newtons",
+                            *push.force_n / (young_modulus_pa * area_m2), report::quantity(young_modulus_pa, "Pa")),
+                fmt::format("{}force {:g}", push.option, *push.force_n));
+}
+
+}  // namespace
+
+PredictedPush predict_push(const LearnedObject& learned, const AskedPush& asked, int threads) {
+  const TetMesh& mesh = *learned.object.rest.volume;
+  PredictedPush out;
+  out.tool = tool_of(asked, learned.object);
+  Load& load = out.load;
+  load.tool = out.tool.name;
+  const bool somewhere = out.tool.shape != ToolShape::vertices;
+  if (asked.contact_m)
+    load.contact_m = *asked.contact_m;
+  else if (somewhere)
+    throw Error("say where it acts, X Y Z in metres", asked.option + "contact");
+  if (!(asked.direction.norm() > 0)) throw Error("must not be zero", asked.option + "direction");
+  load.direction = asked.direction.normalized();
+  if (somewhere) put_on_surface(mesh, asked, out);
+  prediction::NewPush push;
+  push.direction = load.direction;
+  push.force_n = asked.force_n;
+  push.travel_m = asked.travel_m;
+  if (push.force_n.has_value() == push.travel_m.has_value())
+    throw Error(fmt::format("give either this or {}travel", asked.option), asked.option + "force");
+  fem::Boundary boundary = boundary_of(learned.object, out.tool, load, push.background);
+  out.elasticity = elasticity_of(learned);
+  must_be_bearable(asked, out.tool, mesh, out.elasticity.highest_young_modulus_pa());
+  fem::StaticsOptions options;
+  options.threads = threads;
+  if (mesh.tetrahedra.cols() == 10 && out.elasticity.highest_poisson_ratio() > 0.45) options.dilatation = fem::Dilatation::averaged;
+  out.found = prediction::predict(mesh, out.elasticity, std::move(boundary), push, options);
+  if (!out.found.converged) return out;
+  if (!out.found.reason.empty()) out.warnings.push_back(out.found.reason);
+  if (!(std::abs(out.found.travel_m.value) > 1e-9 * mesh_size_m(mesh)))
+    throw Error("a support holds the object at this place: nothing moves there", asked.option + "contact " + words(load.contact_m));
+  if (out.elasticity.covariance.norm() == 0) out.warnings.push_back("the result holds no covariance: the bands have no width");
+  return out;
+}
+
+}  // namespace palpate::cli

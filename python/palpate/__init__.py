@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Elasticity of deformable objects from a robot's pushes: forces and depth images in; Young's modulus and Poisson ratio with
+intervals, verdicts, predictions and a simulation-ready model out.
+
+    import palpate
+    recording = palpate.read_recording("recording")      # a folder, or a bag of ROS
+    found = palpate.identify(recording)
+    print(found.answer.young_modulus, found.answer.poisson_ratio)
+    for verdict in found.answer.verdicts:
+        print(verdict.code, verdict.message)
+    palpate.write_result(found, recording, "out")        # what `palpate estimate -o out` leaves, with the report
+
+Numbers are SI and have their unit in their names; `T_a_b` maps coordinates of frame b into frame a; arrays are numpy's, a row a
+point. Data are plain objects (Recording, Push, Step, ...): lists are lists, and a call takes them as they are at that moment.
+`help(palpate.Recording)` lists fields. Where no answer can exist, `palpate.Error` names the field and the cure; what did not work
+out in numbers is a field of the result. The same input, seed and number of threads give the same digits.
+"""
+import json as _json
+
+from palpate import _nouns, _palpate
+from palpate._palpate import Error, __version__
+
+_classes = _nouns.classes()
+globals().update(_classes)
+
+from palpate.robot import Robot, explore, look_around, push  # noqa: E402  (needs the classes)
+
+__all__ = sorted(_classes) + ["Error", "OnlineEstimator", "Robot", "check_recording", "demo", "depth_sensors", "explore", "export", "exporters",
+                              "identify", "look_around", "materials", "predict", "push", "read_recording", "read_result", "read_robot",
+                              "read_scene", "read_surface", "read_volume", "result_json", "suggest", "write_recording", "write_result"]
+
+
+def read_recording(path, mapping=None):
+    """A recording from a folder (docs/recording-format.md) or a bag of ROS 1 or 2, checked.
+
+    mapping: what a bag's topics mean (mapping.yaml beside it, if not given; `palpate info BAG` suggests one).
+    What is odd about it, and what was left out of a bag, stands in its `warnings`. Raises Error naming file, line, field and cure.
+    """
+    return _palpate.read_recording(path, mapping)
+
+
+def read_scene(folder):
+    """What stands before a robot: a recording's object, supports, tools and priors, without its pushes, for `push` and `explore`."""
+    return _palpate.read_scene(folder)
+
+
+def write_recording(recording, folder):
+    """Writes a folder that read_recording gives back; it must not be there yet, or be empty. Raises Error."""
+    _palpate.write_recording(recording, folder)
+
+
+def check_recording(recording):
+    """[(where, what is wrong and the cure)]; empty: it can be used. `identify` asks the same."""
+    return _palpate.problems(recording)
+
+
+def read_surface(path):
+    """TriMesh from a PLY, STL, OBJ, VTU, ... file, in metres."""
+    return _palpate.read_surface(path)
+
+
+def read_volume(path):
+    """TetMesh from a VTU, VTK, MSH, INP, ... file, in metres."""
+    return _palpate.read_volume(path)
+
+
+def read_robot(path):
+    """RobotModel from a URDF file."""
+    return _palpate.read_robot(path)
+
+
+def identify(recording, *, method="palpate", material=None, element=None, refine=None, regions="recorded", poisson_range=None,
+             poisson_ratio=None, poisson_by_region=False, mesh_tolerance=0.01, slips=True, all_loads=False, compare_laws=False,
+             cross_checks=True, young_modulus_start_pa=None, max_iterations=60, threads=0, progress=None):
+    """Young's modulus and Poisson ratio of what was pushed: an Identified. The options are those of `palpate estimate`.
+
+    method:            'palpate', or 'paper' (the algorithm of Frank et al. 2010, as a baseline)
+    material, element, refine:  override recording.model; see materials()
+    regions:           parts with an E of their own: 'recorded', 'by-site' (one around each site that was pushed) or 'none'
+    poisson_range:     (lower, upper) of the uniform prior on nu
+    poisson_ratio:     nu, where it is known
+    poisson_by_region: every region has a nu of its own
+    mesh_tolerance:    fit again on a finer mesh while the mesh's own share of E is above this
+    slips:             fit again with a slip of the tool that was found
+    all_loads:         also loads under which a patch of even pressure caves in
+    compare_laws:      fit other laws to the same data, too
+    cross_checks:      refit parts of the recording: by push, by load, held-out prediction
+    threads:           0: as many as the machine has
+    progress:          called with (stage, share done); where it returns False the work stops and `answer.termination` is 'cancelled'
+
+    Raises Error where no answer can exist, KeyboardInterrupt on Ctrl-C. Other Python threads go on meanwhile.
+    """
+    options = dict(method=method, material=material, element=element, refine=refine, regions=regions, poisson_range=poisson_range,
+                   poisson_ratio=poisson_ratio, poisson_by_region=poisson_by_region, mesh_tolerance=mesh_tolerance, slips=slips,
+                   all_loads=all_loads, compare_laws=compare_laws, cross_checks=cross_checks,
+                   young_modulus_start_pa=young_modulus_start_pa, max_iterations=max_iterations, threads=threads)
+    return _palpate.identify(recording, options, progress)
+
+
+class OnlineEstimator:
+    """What is known while the robot pushes: one step after another in, E and nu so far out.
+
+        estimator = palpate.OnlineEstimator(scene)        # object, supports, tools, priors: a Recording without pushes
+        estimator.begin(palpate.Push(name="top"))
+        so_far = estimator.add(step)                      # an Identification without figures
+        found = estimator.answer()                        # what identify says of all so far
+
+    Options are those of `identify`. Raises Error where identify would; a step that is refused is not taken in.
+    """
+
+    def __init__(self, scene, **options):
+        self._estimator = _palpate.OnlineEstimator(scene, options)
+
+    def begin(self, push):
+        """A new push: its name, site and priors; steps in it are taken in without an estimate in between."""
+        self._estimator.begin(push)
+
+    def add(self, step, progress=None):
+        """One more step of the push; what is known by now. Until a load and an observation were seen there are no parameters."""
+        return self._estimator.add(step, progress)
+
+    @property
+    def estimate(self):
+        """After the last step."""
+        return self._estimator.estimate()
+
+    @property
+    def recording(self):
+        """All so far."""
+        return self._estimator.recording()
+
+    def answer(self, progress=None):
+        """An Identified: what `identify` says of all so far, with the mesh's error, checks of the parts and figures."""
+        return self._estimator.answer(progress)
+
+
+def write_result(found, recording, folder):
+    """Leaves what `palpate estimate -o` leaves: result.json, fit/, model/ (mesh and material) and report.html.
+
+    recording: that was identified, for the report.
+    """
+    _palpate.write_result(found, recording, folder)
+
+
+def read_result(folder):
+    """An Identified from a folder that write_result or `palpate estimate` wrote. Surfaces and points are in single precision."""
+    return _palpate.read_result(folder)
+
+
+def result_json(answer):
+    """The object of result.json (docs/result-format.md) as a dict."""
+    return _json.loads(_palpate.result_json(answer))
+
+
+def predict(found, *, contact_m=None, direction=(0, 0, -1), force_n=None, travel_m=None, radius_m=None, tool=None, threads=0):
+    """What a push that nobody has made does: a PushPrediction with bands of 95 %.
+
+    contact_m:         on the surface at rest, base frame (3 numbers)
+    direction:         of the push, into the object
+    force_n, travel_m: one of them, along the direction
+    radius_m:          of the pressed patch (the tool's)
+    tool:              a name of found.object.tools (its only one)
+    """
+    return _palpate.predict(found, dict(contact_m=contact_m, direction=direction, force_n=force_n, travel_m=travel_m, radius_m=radius_m,
+                                        tool=tool, threads=threads))
+
+
+def export(found, to, folder, *, density_kg_m3=0.0, gravity_m_s2=None):
+    """The learned object for a simulator, one of exporters(). Returns the names of the files, the one to open first."""
+    return _palpate.export(found, to, folder, density_kg_m3, gravity_m_s2)
+
+
+def suggest(recording, so_far=None, *, goal="both", tool=None, tip_link=None, contacts=24, tilts=2, views=0, young_modulus_pa=2e4,
+            force_limit_n=50.0, travel_limit_m=0.10, seed=1, threads=0, progress=None):
+    """Pushes that would tell the most, best first: a list of SuggestedPush. Empty: none that is possible is in view (`views` adds some).
+
+    so_far:            `found.answer`, what the pushes until now gave; None: before the first touch
+    goal:              whose interval is to shrink: 'young-modulus', 'poisson-ratio' or 'both'
+    tip_link:          of the recording's robot, z along the push: only what its joints reach is compared
+    contacts, tilts:   places that are compared, and slanted directions at each
+    views:             further places of the camera that are compared
+    young_modulus_pa:  guess before the first touch
+    """
+    return _palpate.suggest(recording, so_far, dict(goal=goal, tool=tool, tip_link=tip_link, contacts=contacts, tilts=tilts, views=views,
+                                                    young_modulus_pa=young_modulus_pa, force_limit_n=force_limit_n,
+                                                    travel_limit_m=travel_limit_m, seed=seed, threads=threads), progress)
+
+
+def demo(seed=1, progress=None):
+    """(recording, truth): the built-in recording of a foam cube, made by the lab, and E and nu of the truth."""
+    return _palpate.demo(seed, progress)
+
+
+def materials():
+    """Names of the laws."""
+    return _palpate.materials()
+
+
+def exporters():
+    """{name: what is written}"""
+    return _palpate.exporters()
+
+
+def depth_sensors():
+    """{name: source} of the noise models for DepthNoise.model; 'constant' with a sigma_m goes, too."""
+    return _palpate.depth_sensors()

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that pushes: what it must be able to do, one push of the protocol, and the loop that chooses the next best push."""
+import time
+
+from palpate import _palpate
+
+
+class Robot:
+    """Derive from it and drive your arm. Poses are 4 x 4, base frame, metres; the tip's z axis points along the tool, into the object.
+
+    What a call raises ends the push: the robot is stopped, and the caller of `push` or `explore` gets it.
+
+    travel_sigma_m: standard deviation of the encoders' tip position along a push
+    """
+
+    travel_sigma_m = 0.0005
+
+    def read(self):
+        """A RobotState. force_n is of the tool on the object, base frame; a constant bias is allowed."""
+        raise NotImplementedError
+
+    def move(self, T_base_tip, speed_m_s):
+        """Moves the tip on a straight line and returns when it stands. False: refused (a limit, a collision), and it did not move."""
+        raise NotImplementedError
+
+    def stop(self):
+        """Brings the arm to rest where it is."""
+        raise NotImplementedError
+
+    def take_depth_image(self):
+        """A DepthFrame, with camera, pose of the camera, noise and, where the robot is in view, its mask."""
+        raise NotImplementedError
+
+    def wait(self, duration_s):
+        """Lets time pass."""
+        time.sleep(duration_s)
+
+    def reaches(self, T_base_tip):
+        """False: no push is planned whose tip would have to stand there."""
+        return True
+
+    def look(self, view, views):
+        """Carries the camera to the `view`-th (from 0) of `views` places around the untouched object: a DepthFrame. None: it does not."""
+        return None
+
+
+_protocol = """
+    force_limit_n, travel_limit_m: where a push ends (50 N, 0.1 m, or what the robot's `limits`, a RobotLimits, say)
+    force_step_n:        between recorded steps
+    unloading_steps:     recorded on the way back
+    start_distance_m, search_distance_m: before the expected contact, where the approach starts; beyond it, how far to look
+    increment_m:         of the tip between two looks at the force
+    clearance_m, tool_length_m: of the way around the object between pushes
+    approach_speed_m_s, push_speed_m_s, sample_period_s, free_air_samples, settling_timeout_s
+    contact_std_m:       prior on the contact point that the recording will state
+    contact_threshold_n: change of the force that means contact, at least
+"""
+
+
+def push(robot, scene, contact_m, direction=(0, 0, -1), *, tool=None, name="", site="", on_step=None, progress=None, **options):
+    """One push by the protocol: look, approach until contact, raise the force step by step, let it settle, record; go back and look.
+
+    Returns (Push, PushReport); `recording.pushes.append(push)` makes it part of a recording.
+
+    scene:    a Recording with the object, what holds it, and tools
+    tool:     a name of scene.tools (its first)
+    on_step:  called with (name of the push, Step) after each
+    progress: called with nothing to tell now and then; KeyboardInterrupt stops the robot
+    """
+    options.update(contact_m=contact_m, direction=direction, tool=tool, name=name, site=site)
+    return _palpate.push(robot, scene, options, on_step, progress)
+
+
+def explore(robot, scene, folder=None, *, young_modulus_within=0.05, poisson_ratio_within=0.03, max_pushes=8, levels=4, goal="both", tool=None,
+            young_modulus_pa=2e4, contacts=24, tilts=2, seed=1, on_step=None, on_push=None, progress=None, **options):
+    """Push, estimate, take the next best push, until the intervals are narrow enough: an Explored.
+
+    scene:    a Recording with the object, what holds it, tools and priors
+    folder:   the recording is written there while it is made; a crash loses at most the step in flight
+    young_modulus_within, poisson_ratio_within: half of the 95 % interval, over E; of nu
+    levels:   force steps of a push
+    goal:     'young-modulus', 'poisson-ratio' or 'both'
+    young_modulus_pa: guess before the first touch
+    on_step:  called with (name of the push, Step);  on_push: with (name, [E of every region], nu) after each estimate
+    progress: as of `identify`
+
+    Further options: those of `push` and of `identify`.
+    """
+    options.update(young_modulus_within=young_modulus_within, poisson_ratio_within=poisson_ratio_within, max_pushes=max_pushes, levels=levels,
+                   goal=goal, tool=tool, young_modulus_pa=young_modulus_pa, contacts=contacts, tilts=tilts, seed=seed)
+    return _palpate.explore(robot, scene, folder, options, on_step, on_push, progress)
+
+
+def look_around(robot, views):
+    """One DepthFrame from each of so many places around the untouched object, for `scene.rest.views`."""
+    return _palpate.look_around(robot, views)
+
+
+push.__doc__ += _protocol

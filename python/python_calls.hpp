@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Long work on behalf of Python: without its lock, and with a word now and then to who asked for it.
+#pragma once
+
+#include <exception>
+#include <string_view>
+#include <utility>
+
+#include "palpate/core/progress.hpp"
+#include "python/convert.hpp"
+
+namespace palpate::python {
+
+/// The library's progress for one call. Looks for Ctrl-C, tells a callable of Python's, and keeps what either raised.
+class PythonProgress {
+ public:
+  explicit PythonProgress(py::object callable) : callable_(std::move(callable)) {}
+
+  OnProgress callback() {
+    return [this](std::string_view stage, double share) { return told(stage, share); };
+  }
+  bool go_on() { return told({}, 0); }  ///< asked where there is nothing to tell
+  void raise_what_was_raised() const {
+    if (raised_) std::rethrow_exception(raised_);
+  }
+
+ private:
+  bool told(std::string_view stage, double share) {
+    if (raised_) return false;
+    const py::gil_scoped_acquire lock;
+    try {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (stage.empty() || callable_.is_none()) return true;
+      const py::object answer = callable_(py::str(stage.data(), stage.size()), share);
+      return answer.is_none() || answer.cast<bool>();
+    } catch (const std::exception&) {
+      raised_ = std::current_exception();
+      return false;
+    }
+  }
+
+  py::object callable_;
+  std::exception_ptr raised_;
+};
+
+/// @param work  takes an OnProgress and touches nothing of Python's
+template <typename Work>
+auto without_lock(const py::object& progress, Work&& work) {
+  PythonProgress told(progress);
+  auto answer = [&] {
+    const py::gil_scoped_release unlocked;
+    return work(told.callback());
+  }();
+  told.raise_what_was_raised();
+  return answer;
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "python/robot.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "cli/paths.hpp"
+#include "palpate/io/recording.hpp"
+#include "python/arguments.hpp"
+#include "python/python_calls.hpp"
+
+namespace palpate::python {
+namespace {
+
+/// The library asks without Python's lock; every call takes it. What Python raises goes through the library, which stops the robot first.
+class PythonRobot : public acquisition::Robot {
+ public:
+  explicit PythonRobot(py::object robot) : robot_(std::move(robot)) {
+    for (const char* call : {"read", "move", "stop", "take_depth_image", "wait", "travel_sigma_m"})
+      if (!py::hasattr(robot_, call)) throw Error(std::string("has no `") + call + "`: derive it from palpate.Robot", "robot");
+    travel_sigma_m_ = from_python<double>(robot_.attr("travel_sigma_m"), Place("robot.travel_sigma_m"));
+  }
+  acquisition::RobotState read() override {
+    const py::gil_scoped_acquire lock;
+    auto state = from_python<acquisition::RobotState>(robot_.attr("read")(), Place("robot.read()"));
+    if (!state.force_n.allFinite() || !std::isfinite(state.time_s)) throw Error("holds a number that is not finite", "robot.read()");
+    return state;
+  }
+  acquisition::Motion move(const Pose& T_base_tip, double speed_m_s) override {
+    const py::gil_scoped_acquire lock;
+    const py::object moved = robot_.attr("move")(to_python(T_base_tip), speed_m_s);
+    return moved.is_none() || from_python<bool>(moved, Place("robot.move()")) ? acquisition::Motion::done : acquisition::Motion::refused;
+  }
+  void stop() override {
+    const py::gil_scoped_acquire lock;
+    robot_.attr("stop")();
+  }
+  DepthFrame take_depth_image() override {
+    const py::gil_scoped_acquire lock;
+    return from_python<DepthFrame>(robot_.attr("take_depth_image")(), Place("robot.take_depth_image()"));
+  }
+  void wait(double duration_s) override {
+    const py::gil_scoped_acquire lock;
+    robot_.attr("wait")(duration_s);
+  }
+  double travel_sigma_m() const override { return travel_sigma_m_; }
+  acquisition::RobotLimits limits() const override {
+    const py::gil_scoped_acquire lock;
+    if (!py::hasattr(robot_, "limits")) return {};
+    return from_python<acquisition::RobotLimits>(robot_.attr("limits"), Place("robot.limits"));
+  }
+  std::optional<DepthFrame> look(int view, int views) override {
+    const py::gil_scoped_acquire lock;
+    if (!py::hasattr(robot_, "look")) return {};
+    return from_python<std::optional<DepthFrame>>(robot_.attr("look")(view, views), Place("robot.look()"));
+  }
+  bool reaches(const Pose& T_base_tip) const {
+    const py::gil_scoped_acquire lock;
+    return !py::hasattr(robot_, "reaches") || from_python<bool>(robot_.attr("reaches")(to_python(T_base_tip)), Place("robot.reaches()"));
+  }
+
+ private:
+  py::object robot_;
+  double travel_sigma_m_ = 0;
+};
+
+acquisition::PushOptions push_options(Options& from) {
+  acquisition::PushOptions options;
+  from.take("force_limit_n", options.force_limit_n);
+  from.take("travel_limit_m", options.travel_limit_m);
+  from.take("force_step_n", options.force_step_n);
+  from.take("unloading_steps", options.unloading_steps);
+  from.take("start_distance_m", options.start_distance_m);
+  from.take("search_distance_m", options.search_distance_m);
+  from.take("increment_m", options.increment_m);
+  from.take("clearance_m", options.clearance_m);
+  from.take("tool_length_m", options.tool_length_m);
+  from.take("approach_speed_m_s", options.approach_speed_m_s);
+  from.take("push_speed_m_s", options.push_speed_m_s);
+  from.take("sample_period_s", options.sample_period_s);
+  from.take("free_air_samples", options.free_air_samples);
+  from.take("settling_timeout_s", options.settling_timeout_s);
+  from.take("contact_std_m", options.contact_std_m);
+  from.take("contact_threshold_n", options.contact.threshold_n);
+  return options;
+}
+
+/// @throws Error where the scene has no such tool
+std::string tool_of(const Recording& scene, std::string asked) {
+  if (scene.tools.empty()) throw Error("names no tool", "scene.tools");
+  if (asked.empty()) return scene.tools.front().name;
+  for (const Tool& tool : scene.tools)
+    if (tool.name == asked) return asked;
+  throw Error("is no tool of the scene; its first is '" + scene.tools.front().name + "'", "tool");
+}
+
+acquisition::PushPlan plan_of(const Recording& scene, const std::string& tool, const Vec3& contact_m, const Vec3& direction) {
+  acquisition::PushPlan plan;
+  plan.tool = tool;
+  plan.contact_m = contact_m;
+  plan.direction = direction;
+  plan.R_base_tip = acquisition::tip_along(direction);
+  plan.around = acquisition::keep_out(scene);
+  return plan;
+}
+
+void tell(const py::object& callable, const Push& push, const Step& step) {
+  const py::gil_scoped_acquire lock;
+  if (!callable.is_none()) callable(push.name, to_python(step));
+}
+
+LoopPush loop_push(const ExploredPush& push, const PushScene& scene) {
+  return {push.name, suggested(push.plan, scene), made_push(push.report), push.young_moduli, push.poisson_ratio};
+}
+
+}  // namespace
+
+MadePush made_push(const acquisition::PushReport& report) {
+  return {acquisition::to_words(report.stop), report.message, acquisition::is_at_a_limit(report.stop), report.contact_m, report.highest_force_n,
+          report.deepest_m, report.steps, report.unsettled, report.compared, report.came_back, report.changed_share, report.drift_n};
+}
+
+py::object push_with(const py::object& robot, const py::object& given, const py::dict& options, const py::object& on_step, const py::object& progress) {
+  const Recording scene = recording_of(given, "scene");
+  Vec3 contact_m = Vec3::Zero(), direction = -Vec3::UnitZ();
+  std::string tool, name, site;
+  Options from(options);
+  from.take("contact_m", contact_m);
+  from.take("direction", direction);
+  from.take("tool", tool);
+  from.take("name", name);
+  from.take("site", site);
+  const acquisition::PushOptions asked = push_options(from);
+  from.all_taken();
+  if (!contact_m.allFinite()) throw Error("must be finite", "contact_m");
+  if (!(direction.norm() > 0)) throw Error("must not be zero", "direction");
+  acquisition::PushPlan plan = plan_of(scene, tool_of(scene, tool), contact_m, direction.normalized());
+  plan.name = name.empty() ? "push " + std::to_string(scene.pushes.size() + 1) : name;
+  plan.site = site;
+  PythonRobot arm(robot);
+  PythonProgress asks(progress);
+  Push made;
+  acquisition::PushReport report;
+  {
+    const py::gil_scoped_release unlocked;
+    std::vector<Step> steps;
+    report = acquisition::run_push(
+        arm, plan, asked,
+        [&](const Push& push, const Step& step) {
+          made = push;
+          steps.push_back(step);
+          tell(on_step, push, step);
+        },
+        [&] { return asks.go_on(); });
+    made.steps = std::move(steps);
+    if (report.drift) take_off(*report.drift, made);
+  }
+  asks.raise_what_was_raised();
+  return py::make_tuple(to_python(made), to_python(made_push(report)));
+}
+
+py::object explore_with(const py::object& robot, const py::object& given, const py::object& folder, const py::dict& options, const py::object& on_step,
+                        const py::object& on_push, const py::object& progress) {
+  const Recording scene = recording_of(given, "scene");
+  ExploreOptions asked;
+  std::string tool, goal = "both";
+  int seed = 1;
+  Options from(options);
+  from.take("young_modulus_within", asked.young_modulus_within);
+  from.take("poisson_ratio_within", asked.poisson_ratio_within);
+  from.take("max_pushes", asked.max_pushes);
+  from.take("levels", asked.levels);
+  from.take("goal", goal);
+  from.take("tool", tool);
+  from.take("young_modulus_pa", asked.suggest.young_modulus_pa);
+  from.take("contacts", asked.suggest.candidates.contacts);
+  from.take("tilts", asked.suggest.candidates.tilts);
+  from.take("seed", seed);
+  asked.push = push_options(from);
+  asked.identify = identify_options(from);
+  from.all_taken();
+  asked.suggest.goal = estimation::push_goal(goal);
+  asked.suggest.tool = tool_of(scene, tool);
+  asked.suggest.threads = asked.identify.fit.threads;
+  asked.suggest.candidates.seed = asked.seed = static_cast<std::uint64_t>(seed);
+  check(asked);
+  PythonRobot arm(robot);
+  asked.suggest.candidates.reachable = [&](const Vec3& contact_m, const Vec3& direction) {
+    Pose pose = Pose::Identity();
+    pose.linear() = acquisition::tip_along(direction);
+    for (const double before_m : {asked.push.start_distance_m, 0.0}) {
+      pose.translation() = contact_m - before_m * direction;
+      if (!arm.reaches(pose)) return false;
+    }
+    return true;
+  };
+  std::optional<io::RecordingWriter> kept;
+  if (!folder.is_none()) {
+    cli::must_take_files(path_of(folder));
+    kept.emplace(path_of(folder), scene);
+  }
+  PythonProgress asks(progress);
+  ExploreHooks hooks;
+  hooks.plan = [&](const estimation::PushCandidate& at) {
+    acquisition::PushPlan plan = plan_of(scene, asked.suggest.tool, at.contact_m, at.direction);
+    plan.name = "push";
+    return plan;
+  };
+  hooks.on_push_begin = [&](const Push& push) {
+    if (kept) kept->begin_push(push);
+  };
+  hooks.on_step = [&](const Push& push, const Step& step) {
+    if (kept) kept->add_step(step);
+    tell(on_step, push, step);
+  };
+  hooks.on_push_end = [&](const acquisition::PushReport& report) {
+    if (kept && report.drift) kept->end_push(*report.drift);
+  };
+  hooks.on_push = [&](const ExploredPush& push) {
+    const py::gil_scoped_acquire lock;
+    if (!on_push.is_none()) on_push(push.name, to_python(push.young_moduli), to_python(push.poisson_ratio));
+  };
+  hooks.keep_going = [&] { return asks.go_on(); };
+  hooks.on_progress = asks.callback();
+  Loop out;
+  {
+    const py::gil_scoped_release unlocked;
+    Explored done = explore(arm, scene, asked, hooks);
+    for (const ExploredPush& push : done.pushes) out.pushes.push_back(loop_push(push, done.scene));
+    out.recording = std::move(done.recording);
+    out.found = std::move(done.identified);
+    out.fruitless = done.fruitless;
+    out.reached = done.reached;
+    out.message = std::move(done.message);
+  }
+  asks.raise_what_was_raised();
+  return to_python(out);
+}
+
+py::object look_around_with(const py::object& robot, int views) {
+  PythonRobot arm(robot);
+  PythonProgress asks{py::none()};
+  std::optional<std::vector<DepthFrame>> frames;
+  {
+    const py::gil_scoped_release unlocked;
+    frames = acquisition::look_around(arm, views, [&] { return asks.go_on(); });
+  }
+  asks.raise_what_was_raised();
+  if (!frames) throw Error("does not carry its camera around: it has no `look`, or that gives None", "robot");
+  return to_python(*frames);
+}
+
+}  // namespace palpate::python
