@@ -71,13 +71,20 @@ py::list problems(const py::object& given) {
   return list;
 }
 
+void check_recording(const Recording& recording) {
+  const auto problems = io::check_recording(recording);
+  if (problems.empty()) return;
+  const std::size_t more = problems.size() - 1;
+  throw Error(problems.front().what + (more > 0 ? " (" + std::to_string(more) + " more: palpate.check_recording lists them)" : ""), problems.front().where);
+}
+
 py::object identify_recording(const py::object& given, const py::dict& options, const py::object& progress) {
-  Recording recording = recording_of(given);
+  const Recording recording = recording_of(given);
   Options from(options);
   const IdentifyOptions asked = identify_options(from);
   from.all_taken();
   const Identified found = without_lock(progress, [&](const OnProgress& told) {
-    cli::check_loaded(recording);
+    check_recording(recording);
     Identified answer = identify(recording, asked, told);
     if (answer.answer.termination != Termination::cancelled) name_push_for_poisson(recording, answer, asked.fit.threads, told);
     return answer;
@@ -88,7 +95,7 @@ py::object identify_recording(const py::object& given, const py::dict& options, 
 void write_result(const py::object& found, const py::object& recording, const py::object& folder) {
   const fs::path out = path_of(folder);
   cli::must_take_files(out);
-  cli::write_learned_object(from_python<Identified>(found, Place("found")), recording_of(recording), out);
+  cli::write_learned_object(from_python<Identified>(found, Place("found")), from_python<Recording>(recording, Place("recording")), out);
 }
 
 cli::LearnedObject learned_of(const py::object& given) {

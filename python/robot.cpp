@@ -228,6 +228,7 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
     Explored done = explore(arm, scene, asked, hooks);
     for (const ExploredPush& push : done.pushes) out.pushes.push_back(loop_push(push, done.scene));
     out.recording = std::move(done.recording);
+    if (out.recording.source == "scene") out.recording.source.clear();  // it came from nowhere
     out.found = std::move(done.identified);
     out.fruitless = done.fruitless;
     out.reached = done.reached;
