@@ -145,14 +145,18 @@ Identification fit_within_pressure(const Recording& recording, const SimulatedOb
     }
   Identification answer;
   std::optional<double> young_pa;
+  std::optional<Slip> slip;
   for (int fits = 1;; ++fits) {
     answer = fit(now);
     young_pa = young_of(answer);
+    if (answer.slip) slip = answer.slip;
     if (!caves_in || !young_pa || fits == most_fits) break;
     const StepCounts within = at_most(steps_within_pressure(recording, *young_pa));
     if (within == now || !any_loaded(recording, within)) break;
     now = within;
   }
+  // Few loads may not tell from a law or a nuisance that the tool slid; what more of them told still holds.
+  if (!answer.slip && slip && young_pa && slip->step < now[slip->push]) answer.slip = slip;
   if (now != all && young_pa) answer.verdicts.push_back(left_out(recording, now, *young_pa));
   if (fitted != nullptr) *fitted = now;
   return answer;
