@@ -137,7 +137,7 @@ py::object predict(const py::object& found, const py::dict& options) {
 }
 
 py::object export_to(const py::object& found, const std::string& to, const py::object& folder, double density_kg_m3,
-                                   const py::object& gravity_m_s2) {
+                     const py::object& gravity_m_s2) {
   const io::Exporter& exporter = io::exporter_named(to);
   const fs::path out = path_of(folder);
   cli::must_take_files(out);

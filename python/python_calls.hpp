@@ -48,8 +48,13 @@ template <typename Work>
 auto without_lock(const py::object& progress, Work&& work) {
   PythonProgress told(progress);
   auto answer = [&] {
-    const py::gil_scoped_release unlocked;
-    return work(told.callback());
+    try {
+      const py::gil_scoped_release unlocked;
+      return work(told.callback());
+    } catch (...) {  // work that was asked to stop may say so by an error of its own
+      told.raise_what_was_raised();
+      throw;
+    }
   }();
   told.raise_what_was_raised();
   return answer;
