@@ -75,11 +75,11 @@ LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
   return {std::move(made.recording), std::move(made.clocks), std::move(made.notes)};
 }
 
-void check_loaded(Recording& recording) {
+void check_loaded(Recording& recording, const std::string& lister) {
   const auto problems = io::check_recording(recording);
   if (!problems.empty()) {
     const std::string more =
-        problems.size() > 1 ? fmt::format(" ({} more: `palpate info` lists them)", problems.size() - 1) : std::string();
+        problems.size() > 1 ? fmt::format(" ({} more: {} lists them)", problems.size() - 1, lister) : std::string();
     throw Error(problems.front().what + more, problems.front().where);
   }
   for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));

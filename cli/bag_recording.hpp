@@ -22,7 +22,8 @@ struct LoadedRecording {
 LoadedRecording load_recording(const std::filesystem::path& path, const std::filesystem::path& mapping);
 
 /// Adds to its warnings what is odd. @throws Error for the first of what check_recording finds
-void check_loaded(Recording& recording);
+/// @param lister  that lists all of it, for the message
+void check_loaded(Recording& recording, const std::string& lister = "`palpate info`");
 
 /// What a verb is given as its recording, checked. Says what was found in a bag: offsets of clocks, steps that were left out. @throws Error; also for
 /// what check_recording finds.

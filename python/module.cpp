@@ -71,20 +71,13 @@ py::list problems(const py::object& given) {
   return list;
 }
 
-void check_recording(const Recording& recording) {
-  const auto problems = io::check_recording(recording);
-  if (problems.empty()) return;
-  const std::size_t more = problems.size() - 1;
-  throw Error(problems.front().what + (more > 0 ? " (" + std::to_string(more) + " more: palpate.check_recording lists them)" : ""), problems.front().where);
-}
-
 py::object identify_recording(const py::object& given, const py::dict& options, const py::object& progress) {
-  const Recording recording = recording_of(given);
+  Recording recording = recording_of(given);
   Options from(options);
   const IdentifyOptions asked = identify_options(from);
   from.all_taken();
   const Identified found = without_lock(progress, [&](const OnProgress& told) {
-    check_recording(recording);
+    cli::check_loaded(recording, "palpate.check_recording");
     Identified answer = identify(recording, asked, told);
     if (answer.answer.termination != Termination::cancelled) name_push_for_poisson(recording, answer, asked.fit.threads, told);
     return answer;
