@@ -11,7 +11,6 @@
 #include "cli/paper_overview.hpp"
 #include "cli/paper_tables.hpp"
 #include "cli/paper_words.hpp"
-#include "palpate/core/version.hpp"
 #include "palpate/report/words.hpp"
 
 namespace palpate::cli {
@@ -106,8 +105,8 @@ std::string claims(const std::vector<SceneAnswers>& scenes) {
 
 }  // namespace
 
-std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& command,
-                       const std::set<int>& threads) {
+std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& version,
+                       const std::string& command, const std::set<int>& threads) {
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
       "<title>The paper's evaluation, remade</title><style>body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem "

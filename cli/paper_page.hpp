@@ -12,7 +12,8 @@
 namespace palpate::cli {
 
 /// One offline HTML file.
-std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& command,
-                       const std::set<int>& threads);
+/// @param version  of the program that made the answers
+std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& version,
+                       const std::string& command, const std::set<int>& threads);
 
 }  // namespace palpate::cli

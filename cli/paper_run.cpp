@@ -5,6 +5,8 @@
 
 #include <optional>
 
+#include "palpate/core/error.hpp"
+#include "palpate/core/version.hpp"
 #include "palpate/report/words.hpp"
 
 namespace palpate::cli {
@@ -37,6 +39,10 @@ TrialOptions options_of(const PaperPlan& plan, const lab::PaperScene& scene, std
 PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::filesystem::path& out) {
   const SeedFolder folder(out);
   PaperRuns runs = folder.collect();
+  if (!runs.version.empty() && runs.version != version)
+    throw Error(fmt::format("holds seeds of palpate {}, this is {}: answers of different programs are not joined; use another folder",
+                            runs.version, version),
+                out.string());
   const auto asked_of = [&](const lab::PaperScene& scene, int k) {
     const std::uint64_t seed = plan.first_seed + static_cast<std::uint64_t>(k);
     return SeedAsked{std::string(scene.name), seed, options_of(plan, scene, seed), plan.object, plan.quick};

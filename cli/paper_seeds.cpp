@@ -39,16 +39,45 @@ json header(const SeedAsked& asked, int threads) {
   return out;
 }
 
-json read_seed(const fs::path& file) {
-  const json seed = json::parse(io::read_file(file), nullptr, false);
-  if (!seed.is_object() || !seed.contains("options"))
-    throw Error("is no seed of palpate paper, or damaged; remove it and run that seed again", file.string());
-  if (seed.value("palpate", "") != version || seed.value("format", 0) != seed_format)
+/// @param place  the file, and the line where it has one seed a line
+json parsed(std::string_view bytes, const std::string& place) {
+  json seed = json::parse(bytes, nullptr, false);
+  if (!seed.is_object() || !seed.contains("options") || !seed.contains("name") || !seed.contains("seed"))
+    throw Error("is no seed of palpate paper, or damaged; remove it and run that seed again", place);
+  if (seed.value("format", 0) != seed_format)
     throw Error(fmt::format("is of palpate {} (format {}), this is {} (format {}): answers of different programs are not joined; use "
                             "another folder, or remove the file and run that seed again",
                             seed.value("palpate", "?"), seed.value("format", 0), version, seed_format),
-                file.string());
+                place);
   return seed;
+}
+
+struct KeptSeed {
+  json seed;
+  std::string place;
+};
+
+/// Files of one seed (.json) and of one a line (.jsonl: what `cat` makes of the former).
+std::vector<KeptSeed> kept_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".json" || entry.path().extension() == ".jsonl") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  std::vector<KeptSeed> out;
+  for (const fs::path& file : files) {
+    const std::string bytes = io::read_file(file);
+    if (file.extension() == ".json") {
+      out.push_back({parsed(bytes, file.string()), file.string()});
+      continue;
+    }
+    int line = 0;
+    for (std::size_t from = 0, to = 0; from < bytes.size(); from = to + 1) {
+      to = std::min(bytes.find('\n', from), bytes.size());
+      const std::string place = fmt::format("{}, line {}", file.string(), ++line);
+      if (to > from) out.push_back({parsed(std::string_view(bytes).substr(from, to - from), place), place});
+    }
+  }
+  return out;
 }
 
 /// Where a name stands in the tables, that what is collected has one order.
@@ -100,7 +129,7 @@ SeedFolder::SeedFolder(const fs::path& out) : seeds_(out / "seeds") {}
 bool SeedFolder::has(const SeedAsked& asked) const {
   const fs::path file = seeds_ / file_name(asked.name, asked.seed);
   if (!fs::exists(file)) return false;
-  const json there = read_seed(file).at("options"), wanted = options_json(asked);
+  const json there = parsed(io::read_file(file), file.string()).at("options"), wanted = options_json(asked);
   if (there == wanted) return true;
   throw Error(fmt::format("was made with other options ({}; now {}): give the same (--quick, --details-of, --object and how it is put), "
                           "or another folder",
@@ -125,39 +154,37 @@ json SeedFolder::keep(const SeedAsked& asked, const StudyAnswer& answer, int thr
 }
 
 PaperRuns SeedFolder::collect() const {
-  if (!fs::is_directory(seeds_)) return {};
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(seeds_))
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
   PaperRuns runs;
-  for (const fs::path& file : files) add_seed(runs, read_seed(file), file.string());
+  if (!fs::is_directory(seeds_)) return runs;
+  for (const KeptSeed& kept : kept_in(seeds_)) add_seed(runs, kept.seed, kept.place);
   return runs;
 }
 
 void SeedFolder::take_from(const fs::path& out) const {
   const fs::path from = out / "seeds";
-  if (!fs::is_directory(from) || fs::is_empty(from))
-    throw Error("holds no seeds of palpate paper: give a folder that an earlier run wrote with -o", out.string());
-  for (const auto& entry : fs::directory_iterator(from))  // before anything is written
-    if (entry.path().extension() == ".json") read_seed(entry.path());
+  const std::vector<KeptSeed> all = fs::is_directory(from) ? kept_in(from) : std::vector<KeptSeed>{};
+  if (all.empty()) throw Error("holds no seeds of palpate paper: give a folder that an earlier run wrote with -o", out.string());
   fs::create_directories(seeds_);
-  for (const auto& entry : fs::directory_iterator(from)) {
-    if (entry.path().extension() != ".json") continue;
-    const std::string bytes = io::read_file(entry.path());
-    const fs::path here = seeds_ / entry.path().filename();
+  for (const KeptSeed& kept : all) {
+    const fs::path here = seeds_ / file_name(kept.seed.at("name"), kept.seed.at("seed"));
     if (!fs::exists(here)) {
-      io::write_file(here, bytes);
-    } else if (io::read_file(here) != bytes) {
+      io::write_file(here, kept.seed.dump() + "\n");
+    } else if (parsed(io::read_file(here), here.string()) != kept.seed) {
       throw Error("has another answer than " + here.string() + ": a seed belongs to one piece only; leave one of the two folders out",
-                  entry.path().string());
+                  kept.place);
     }
   }
 }
 
 void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
-  const std::string name = seed.at("name");
+  const std::string name = seed.at("name"), made_by = seed.at("palpate");
   const auto number = seed.at("seed").get<std::uint64_t>();
+  if (!runs.version.empty() && runs.version != made_by)
+    throw Error(fmt::format("is of palpate {}, others are of {}: answers of different programs are not joined; use another folder, or "
+                            "remove the file and run that seed again",
+                            made_by, runs.version),
+                file);
+  runs.version = made_by;
   runs.threads.insert(seed.at("threads").get<int>());
   if (const Study* study = study_of(name)) {
     StudyAnswer answer{study, number, {}, seed.at("study").at("failed"), seed.at("study").at("seconds")};
@@ -198,11 +225,11 @@ void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
 
 json write_page(const PaperRuns& runs, const fs::path& out) {
   const std::string command = runs.command();
-  json told = {{"command", command}, {"palpate", version}, {"threads", runs.threads}, {"scenes", json::array()}, {"studies", json::array()}};
+  json told = {{"command", command}, {"palpate", runs.version}, {"threads", runs.threads}, {"scenes", json::array()}, {"studies", json::array()}};
   for (const SceneAnswers& each : runs.scenes) told["scenes"].push_back(json_of(each));
   for (const StudyAnswer& each : runs.studies) told["studies"].push_back(json_of(each));
   io::write_file(out / "paper.json", told.dump(2) + "\n");
-  io::write_file(out / "paper.html", paper_page(runs.scenes, runs.studies, command, runs.threads));
+  io::write_file(out / "paper.html", paper_page(runs.scenes, runs.studies, runs.version, command, runs.threads));
   return told;
 }
 

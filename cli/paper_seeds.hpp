@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What `palpate paper` has run: one file a scene (or study) and seed under OUT/seeds, whole when it is there. A run goes on from
-// them, and those of several folders are joined.
+// them, and those of several folders are joined. To be kept, many may stand in one file, a line each.
 #pragma once
 
 #include <cstdint>
@@ -35,6 +35,7 @@ struct SeedAsked {
 struct PaperRuns {
   std::vector<SceneAnswers> scenes;  ///< in the table's order, seeds rising
   std::vector<StudyAnswer> studies;  ///< the same
+  std::string version;               ///< of the program that made them; empty: there are none
   std::set<int> threads;
   std::string object;                ///< in the cow's place; empty: none
   std::string placed;                ///< the same, and how it is put

@@ -119,6 +119,15 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
   return by_region;
 }
 
+/// They are drawn on the error surface alone, and are half of what a seed's file would hold.
+void drop_paths(TrialAnswer& out) {
+  for (MethodAnswer* answer : {&out.paper, &out.palpate, &out.paper_coarse, &out.other}) answer->path.clear();
+  for (SiteAnswer& site : out.sites) {
+    site.paper.path.clear();
+    site.palpate.path.clear();
+  }
+}
+
 }  // namespace
 
 void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
@@ -205,6 +214,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   }
   if (options.surface_points > 1 && by_region.empty() && std::isfinite(out.paper.young_modulus_pa))
     out.surface = error_surface(given, out.paper, scene.apparent ? out.palpate.young_modulus_pa : out.young_modulus_pa, options.surface_points, fit, progress);
+  if (out.surface.error_m2.size() == 0) drop_paths(out);
 }
 
 }  // namespace palpate::cli

@@ -139,7 +139,7 @@ TEST(PaperClaims, LeaveOutWhatHasNoTruth) {
   const SceneAnswers balloon = scene("balloon", {trial(13e3, answer(99e3, 98e3, 100e3, 5000))});
   EXPECT_TRUE(claims_of({balloon}).empty());
   for (const Claim& claim : claims_of({balloon, scene("cube", {trial(13e3, answer(10.4e3, 9.8e3, 11e3, 90))})})) EXPECT_TRUE(claim.holds);
-  const std::string page = paper_page({balloon}, {}, "command", {1});
+  const std::string page = paper_page({balloon}, {}, "0.1.0", "command", {1});
   EXPECT_EQ(page.find("true E"), std::string::npos);
   EXPECT_NE(page.find("An apparent modulus has no truth"), std::string::npos);
   const auto json = json_of(balloon);
@@ -196,7 +196,7 @@ TEST(PaperPage, NamesAndMarksTheLowestPointOfTheGrid) {
   one.surface.error_m2 = MatrixX::Constant(3, 2, 4e-6);
   one.surface.error_m2(1, 1) = 1e-6;
   one.surface.at_found_m2 = 2e-6;
-  const std::string page = paper_page({scene("cube", {one})}, {}, "command", {1});
+  const std::string page = paper_page({scene("cube", {one})}, {}, "0.1.0", "command", {1});
   EXPECT_NE(page.find("at E = 12.0 kPa and &nu; = 0.400"), std::string::npos);
   EXPECT_NE(page.find("lowest of the grid"), std::string::npos);
   EXPECT_EQ(json_of(scene("cube", {one})).at("trials").at(0).at("grid_search").at("smallest_at").at("young_modulus_pa"), 12e3);
@@ -212,7 +212,7 @@ TEST(PaperPage, OfAnApparentModulusAllThreeFitsAreThere) {
 TEST(PaperPage, WithoutAnAnswerItSaysSo) {
   TrialAnswer none = trial(13e3, no_answer());
   none.unused.push_back({2.0, 0.004, {2.2, 1e-4}, {nan, nan}, {nan, nan}, 2e-3});
-  const std::string page = paper_page({scene("cube", {none})}, {}, "command", {1});
+  const std::string page = paper_page({scene("cube", {none})}, {}, "0.1.0", "command", {1});
   EXPECT_NE(page.find("palpate found no answer"), std::string::npos);
   EXPECT_NE(page.find("<td>2.20 N (+10 %)</td><td>none</td>"), std::string::npos);
   EXPECT_EQ(page.find("nan"), std::string::npos);

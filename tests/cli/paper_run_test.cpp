@@ -148,6 +148,39 @@ TEST(PaperRun, PiecesJoinedAreTheWhole) {
   EXPECT_FALSE(fs::exists(files / "empty"));
 }
 
+TEST(PaperRun, SeedsKeptALineEachAreTheSame) {
+  const test::TemporaryFolder files("paper_lines");
+  MadeUp whole;
+  run_plan(whole.plan, whole.work, files / "whole");
+  fs::create_directories(files / "kept" / "seeds");
+  std::string lines;
+  for (const auto& entry : fs::directory_iterator(files / "whole" / "seeds")) lines += contents(entry.path());
+  const fs::path kept = files / "kept" / "seeds" / "all.jsonl";
+  std::ofstream(kept) << lines;
+  const SeedFolder joined(files / "joined");
+  joined.take_from(files / "kept");
+  joined.take_from(files / "whole");  // the same again is the same
+  write_page(joined.collect(), files / "joined");
+  EXPECT_EQ(page_of(files / "joined"), page_of(files / "whole"));
+
+  // Of another version, they are a page of that version, and nothing is added to them.
+  std::string older = lines;
+  for (std::size_t at = 0; (at = older.find("\"palpate\":\"0.", at)) != std::string::npos; ++at) older.replace(at, 13, "\"palpate\":\"7.");
+  ASSERT_NE(older, lines);
+  std::ofstream(kept) << older;
+  const SeedFolder of_other(files / "other");
+  of_other.take_from(files / "kept");
+  write_page(of_other.collect(), files / "other");
+  EXPECT_THAT(contents(files / "other" / "paper.html"), HasSubstr("made again by palpate 7."));
+  EXPECT_THAT(message_of([&] { run_plan(whole.plan, whole.work, files / "other"); }), HasSubstr("holds seeds of palpate 7."));
+  of_other.take_from(files / "kept");
+  EXPECT_THAT(message_of([&] { of_other.take_from(files / "whole"); }), HasSubstr("another answer"));
+
+  std::ofstream(kept) << lines.substr(0, lines.size() - 100);
+  EXPECT_THAT(message_of([&] { SeedFolder(files / "cut").take_from(files / "kept"); }), HasSubstr("all.jsonl, line 9: is no seed"));
+  EXPECT_FALSE(fs::exists(files / "cut"));
+}
+
 TEST(PaperRun, AFailedSeedIsARowAndTheRunGoesOn) {
   const test::TemporaryFolder files("paper_failed");
   MadeUp run;
