@@ -18,7 +18,7 @@ struct FinerModel {
   Recording recording;
   SimulatedObject object;
   double edge_share = 0.5;  ///< its edges, of those of the mesh that it is finer than
-  double order = 2;         ///< of its edges: the error that is left falls with this power (docs/uncertainty.md)
+  double order = 2;         ///< of its edges: the error that is left falls with this power (docs/estimator.md)
   bool everywhere = true;   ///< false: under round tools only
   AnswerShift elsewhere;    ///< if not: what is known of the error that the mesh makes elsewhere
   /// Of the coarser mesh's error, what this one has left.

@@ -19,7 +19,7 @@ struct FootDoubt {
 };
 
 /// Of flanks that were followed down to a table, one standard deviation: what all of them lean in common by, and half of it towards
-/// one side. Feet of balls are off by 0.04 to 0.08 and by 0.06, those of bears and of thin legs by more (docs/uncertainty.md).
+/// one side. Feet of balls are off by 0.04 to 0.08 and by 0.06, those of bears and of thin legs by more (docs/estimator.md).
 inline constexpr double foot_lean_std_rad = 0.1, foot_aside_std_rad = 0.05;
 
 /// A mesh whose nodes below the strip's upper end moved along the plane: outwards from the middle of the foot that is nearest by

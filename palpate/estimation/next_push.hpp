@@ -32,7 +32,7 @@ struct SensorPlan {
   double travel_offset_std_m = 0;
   double force_std_n = 0, force_relative_std = 0, force_tare_std_n = 0;
   double contact_std_m = 0;
-  double variance_inflation = 1;  ///< of surface points that err together (docs/uncertainty.md)
+  double variance_inflation = 1;  ///< of surface points that err together (docs/estimator.md)
   int levels = 4;                 ///< force steps up to the limit; each is a choice of how hard to push
 };
 
