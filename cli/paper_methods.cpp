@@ -68,7 +68,7 @@ MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& opt
         for (estimation::AlternativeShape& shape : slipping.doubt->shapes) estimation::take_slips(slipping.recording, shape.recording);
       }
     }
-    return estimation::fit_within_pressure(slipping.recording, slipping.object, slipping.inputs, fit_options, fit, &steps);
+    return estimation::fit_within_pressure(slipping.recording, slipping.object, slipping.inputs, fit_options, fit, &steps, progress);
   });
   if (fitted != nullptr) *fitted = steps;
   const MethodAnswer out = summary(answer, watch.seconds());

@@ -444,7 +444,7 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
       if (before == nullptr) fitted = estimation::all_steps(whole);  // else of no higher loads: E was wrong that would take them
       else fit_options.young_start_pa = before->parameters[0].value, fit_options.poisson_start = before->parameters[1].value;
       if (options.all_loads) return fit_steps(fitted);
-      return estimation::fit_within_pressure(whole, filled, observed, fit_options, fit_steps, &fitted);
+      return estimation::fit_within_pressure(whole, filled, observed, fit_options, fit_steps, &fitted, progress);
     };
     out.answer = options.slips ? estimation::fit_with_slips(whole, fit_loads) : fit_loads(nullptr);
   };

@@ -10,11 +10,14 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/quantity.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/fem/materials.hpp"
 
 namespace palpate::estimation {
 namespace {
+
+constexpr double nearly = 0.7;  ///< of the limit: an E that makes a load beyond it look like that is a third too high
 
 double force_of(const Step& step) {
   double force_n = 0;
@@ -86,7 +89,58 @@ std::optional<double> young_of(const Identification& answer) {
   return highest_pa;
 }
 
-Verdict left_out(const Recording& recording, const StepCounts& counts, double young_pa) {
+/// What is fitted without its deepest loads; nothing where these press with much less than the limit, or hardly any would be left.
+std::optional<StepCounts> without_deepest(const Recording& recording, const StepCounts& now, double young_pa) {
+  constexpr double same_level = 0.9;  // pushes are pressed in steps of about the same force
+  double deepest_pa = 0;
+  for (std::size_t p = 0; p < now.size(); ++p)
+    for (std::size_t s = 0; s < now[p]; ++s) deepest_pa = std::max(deepest_pa, pressure_of(recording, recording.pushes[p].steps[s]));
+  if (deepest_pa <= nearly * largest_pressure * young_pa) return std::nullopt;
+  StepCounts out = steps_within_pressure(recording, 1, same_level * deepest_pa);
+  for (std::size_t p = 0; p < now.size(); ++p) {
+    out[p] = std::min(out[p], now[p]);
+    const auto first = recording.pushes[p].steps.begin(), end = first + static_cast<std::ptrdiff_t>(out[p]);
+    // One load alone knows little.
+    if (out[p] < now[p] && std::count_if(first, end, [](const Step& step) { return force_of(step) > 0; }) < 2) return std::nullopt;
+  }
+  return out;
+}
+
+/// Some of the steps fitted by themselves, and nothing else asked: the answer, or none where they have none.
+Identification fit_alone(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, FitOptions options,
+                         const StepCounts& steps, const OnProgress& progress) {
+  options.cross_checks = options.find_slips = options.compare_laws = options.stresses = false;
+  options.on_estimate = nullptr;
+  options.take_finer = nullptr;
+  Recording some = recording;
+  keep_first_steps(some, steps);
+  try {
+    return fit(some, object, first_steps(inputs, recording, steps), options, progress);
+  } catch (const Error&) {
+    Identification none;
+    none.termination = Termination::failed;
+    return none;
+  }
+}
+
+/// Do the lighter loads give a lower E than all together (a law that softens gives them a higher one)? Were all within the model, the answer of all would be the better one, and the
+/// variance of the difference that of the lighter ones' less that of all (Hausman, Econometrica 46, 1978).
+bool seems_stiffer(const Identification& lighter, const Identification& all) {
+  constexpr double contact = 0.02;  // of E, that no load knows of its contact
+  constexpr double rare = 2.33;     // standard deviations, to this side: one in a hundred
+  if (lighter.termination != Termination::converged || all.termination != Termination::converged) return false;
+  const auto variance = [](const Parameter& young) { return std::pow(std::log(young.upper_95 / young.lower_95) / 3.92, 2); };
+  for (std::size_t k = 0; k < std::min(lighter.parameters.size(), all.parameters.size()); ++k) {
+    const Parameter &some = lighter.parameters[k], &every = all.parameters[k];
+    if (some.name != "young_modulus" || every.name != "young_modulus") continue;
+    const double of_difference = std::max(0.0, variance(some) - variance(every)) + contact * contact;
+    if (std::log(every.value / some.value) > rare * std::sqrt(of_difference)) return true;
+  }
+  return false;
+}
+
+/// @param with_them_pa  E with the lightest of them, where that is why they are left out
+Verdict left_out(const Recording& recording, const StepCounts& counts, double young_pa, std::optional<double> with_them_pa) {
   std::string where;
   double highest = 0;
   for (std::size_t p = 0; p < counts.size(); ++p) {
@@ -95,11 +149,19 @@ Verdict left_out(const Recording& recording, const StepCounts& counts, double yo
     where += fmt::format("{}from step {} of push '{}' on", where.empty() ? "" : ", ", counts[p], push.name);
     for (const Step& step : push.steps) highest = std::max(highest, pressure_of(recording, step) / young_pa);
   }
+  where.front() = static_cast<char>(std::toupper(where.front()));
+  if (with_them_pa)
+    return {"deep_loads_left_out",
+            fmt::format("{} the tool presses with up to {:.2g} E (mean over its patch). From about {:.1f} E on a simulated patch of even pressure may "
+                        "cave in, which no tool does, and E is {} by the lighter loads and would be {} with the next ones, which is more than "
+                        "chance: the patch caves in, or the material stiffens. These steps are left out. Press less deep, or with a larger tool; "
+                        "--all-loads fits them all.",
+                        where, highest, nearly * largest_pressure, quantity(young_pa, "Pa"), quantity(*with_them_pa, "Pa"))};
   return {"deep_loads_left_out",
           fmt::format("{} the tool presses with more than {:.1f} E (up to {:.2g} E, mean over its patch): a simulated patch of even pressure caves "
                       "in under that, which no tool does. These steps are left out, and E is that of the lower loads. Press less deep, or with a "
                       "larger tool.",
-                      static_cast<char>(std::toupper(where.front())) + where.substr(1), largest_pressure, highest)};
+                      where, largest_pressure, highest)};
 }
 
 }  // namespace
@@ -127,7 +189,7 @@ void keep_first_steps(Recording& recording, const StepCounts& counts) {
 
 Identification fit_within_pressure(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
                                    const FitOptions& options, const std::function<Identification(const StepCounts&)>& fit,
-                                   StepCounts* fitted) {
+                                   StepCounts* fitted, const OnProgress& progress) {
   constexpr int most_fits = 3;
   constexpr double roughly = 1.5;  // by how much E may be off that linear theory reads
   const StepCounts all = all_steps(recording);
@@ -146,18 +208,46 @@ Identification fit_within_pressure(const Recording& recording, const SimulatedOb
   Identification answer;
   std::optional<double> young_pa;
   std::optional<Slip> slip;
-  for (int fits = 1;; ++fits) {
+  FitSummary before;  // what earlier fits solved for
+  const auto fit_now = [&] {
+    before.solves += answer.fit.solves;
+    before.load_cases += answer.fit.load_cases;
     answer = fit(now);
     young_pa = young_of(answer);
     if (answer.slip) slip = answer.slip;
+  };
+  for (int fits = 1;; ++fits) {
+    fit_now();
     if (!caves_in || !young_pa || fits == most_fits) break;
     const StepCounts within = at_most(steps_within_pressure(recording, *young_pa));
     if (within == now || !any_loaded(recording, within)) break;
     now = within;
   }
+  std::optional<double> with_them_pa;
+  // Whether a load is beyond is told by an E that it may have spoilt, and near the limit a surface may cave in or not: there the
+  // deepest loads must not make E higher than the lighter ones have it. Not where a slip is in the way, which will be fitted next.
+  for (int fewer = 0; caves_in && young_pa && !answer.slip && fewer < most_fits; ++fewer) {
+    const std::optional<StepCounts> lighter = without_deepest(recording, now, *young_pa);
+    if (!lighter) break;
+    FitOptions from_there = options;
+    from_there.young_start_pa = young_pa;
+    const auto alone = [&](const StepCounts& steps) {
+      const Identification found = fit_alone(recording, object, inputs, from_there, steps, progress);
+      before.solves += found.fit.solves;
+      before.load_cases += found.fit.load_cases;
+      if (found.termination == Termination::cancelled) answer.termination = found.termination, answer.message = found.message;
+      return found;
+    };
+    if (!seems_stiffer(alone(*lighter), alone(now)) || answer.termination == Termination::cancelled) break;
+    if (!with_them_pa) with_them_pa = young_pa;
+    now = *lighter;
+    fit_now();
+  }
+  answer.fit.solves += before.solves;
+  answer.fit.load_cases += before.load_cases;
   // Few loads may not tell from a law or a nuisance that the tool slid; what more of them told still holds.
   if (!answer.slip && slip && young_pa && slip->step < now[slip->push]) answer.slip = slip;
-  if (now != all && young_pa) answer.verdicts.push_back(left_out(recording, now, *young_pa));
+  if (now != all && young_pa) answer.verdicts.push_back(left_out(recording, now, *young_pa, with_them_pa));
   if (fitted != nullptr) *fitted = now;
   return answer;
 }
