@@ -123,8 +123,9 @@ Identification fit_alone(const Recording& recording, const SimulatedObject& obje
   }
 }
 
-/// Do the lighter loads give a lower E than all together (a law that softens gives them a higher one)? Were all within the model, the answer of all would be the better one, and the
-/// variance of the difference that of the lighter ones' less that of all (Hausman, Econometrica 46, 1978).
+/// Do the lighter loads give a lower E than all together (a law that softens gives them a higher one)? Were all within the model, the
+/// answer of all would be the better one, and the variance of the difference that of the lighter ones' less that of all (Hausman,
+/// Econometrica 46, 1978).
 bool seems_stiffer(const Identification& lighter, const Identification& all) {
   constexpr double contact = 0.02;  // of E, that no load knows of its contact
   constexpr double rare = 2.33;     // standard deviations, to this side: one in a hundred
@@ -223,6 +224,8 @@ Identification fit_within_pressure(const Recording& recording, const SimulatedOb
     if (within == now || !any_loaded(recording, within)) break;
     now = within;
   }
+  // Few loads may not tell from a law or a nuisance that the tool slid; what more of them told still holds.
+  if (!answer.slip && slip && young_pa && slip->step < now[slip->push]) answer.slip = slip;
   std::optional<double> with_them_pa;
   // Whether a load is beyond is told by an E that it may have spoilt, and near the limit a surface may cave in or not: there the
   // deepest loads must not make E higher than the lighter ones have it. Not where a slip is in the way, which will be fitted next.
@@ -238,15 +241,14 @@ Identification fit_within_pressure(const Recording& recording, const SimulatedOb
       if (found.termination == Termination::cancelled) answer.termination = found.termination, answer.message = found.message;
       return found;
     };
-    if (!seems_stiffer(alone(*lighter), alone(now)) || answer.termination == Termination::cancelled) break;
+    const Identification without = alone(*lighter);
+    if (!seems_stiffer(without, alone(now)) || answer.termination == Termination::cancelled) break;
     if (!with_them_pa) with_them_pa = young_pa;
     now = *lighter;
     fit_now();
   }
   answer.fit.solves += before.solves;
   answer.fit.load_cases += before.load_cases;
-  // Few loads may not tell from a law or a nuisance that the tool slid; what more of them told still holds.
-  if (!answer.slip && slip && young_pa && slip->step < now[slip->push]) answer.slip = slip;
   if (now != all && young_pa) answer.verdicts.push_back(left_out(recording, now, *young_pa, with_them_pa));
   if (fitted != nullptr) *fitted = now;
   return answer;
