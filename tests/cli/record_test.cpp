@@ -163,7 +163,8 @@ TEST_F(Record, KilledAtEveryStepItGoesOnFromWhereTheTipStands) {
     const pid_t child = start(words());
     for (std::size_t k = 0; k <= step; ++k) ASSERT_TRUE(says("push 1 (")) << said;
     kill(child, SIGKILL);
-    EXPECT_EQ(wait_for(child), 1000 + SIGKILL) << step;
+    const int ended = wait_for(child);
+    EXPECT_TRUE(ended == 1000 + SIGKILL || (step == 6 && ended == 0)) << step << ", " << ended << ": after its last step it may be quicker than we";
     const std::size_t before = read_recording_unchecked(folder.path() / "recording").pushes.at(0).steps.size();
     EXPECT_EQ(before, step + 1);
     double x_m = 0, y_m = 0, z_m = 0;
