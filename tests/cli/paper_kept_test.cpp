@@ -23,14 +23,13 @@ std::string contents(const fs::path& file) {
   return text.str();
 }
 
-/// | scene | seeds | rms of E, the paper's method / palpate | mean | inside, E / nu | simulated / most load cases | seconds |
+/// | scene | seeds | rms of E, the paper's method / palpate | mean | inside, E / nu | simulated / most load cases |
 std::string row(const SceneAnswers& scene) {
   const SceneScores scores = scores_of(scene.trials);
   const Score &paper = scores.paper_compared, &palpate = scores.palpate;
-  return fmt::format("| `{}` | {} | {:.1f} % / {:.1f} % | {:+.1f} / {:+.1f} % | {} / {} of {} | {:.0f} / {} | {:.1f}, {:.1f} |", scene.scene->name,
+  return fmt::format("| `{}` | {} | {:.1f} % / {:.1f} % | {:+.1f} / {:+.1f} % | {} / {} of {} | {:.0f} / {} |", scene.scene->name,
                      scene.trials.size(), paper.rms_percent, scores.palpate_compared.rms_percent, paper.bias_percent, palpate.bias_percent,
-                     palpate.inside_95, palpate.poisson_inside_95, palpate.asked, paper.solves, palpate.most_load_cases, paper.seconds,
-                     palpate.seconds);
+                     palpate.inside_95, palpate.poisson_inside_95, palpate.asked, paper.solves, palpate.most_load_cases);
 }
 
 TEST(PaperKept, TheTableIsMadeOfTheSeedsThatAreKept) {
@@ -42,12 +41,12 @@ TEST(PaperKept, TheTableIsMadeOfTheSeedsThatAreKept) {
   ASSERT_FALSE(runs.scenes.empty());
   const std::string told = contents(docs / "benchmarks.md");
   for (const SceneAnswers& scene : runs.scenes) {
-    EXPECT_NE(told.find(row(scene)), std::string::npos) << "docs/benchmarks.md lacks this row:\n" << row(scene);
+    EXPECT_NE(told.find(row(scene) + "\n"), std::string::npos) << "docs/benchmarks.md lacks this row:\n" << row(scene);
     for (std::size_t k = 0; k < scene.trials.size(); ++k) EXPECT_EQ(scene.trials[k].seed, k + 1) << scene.scene->name << ": a seed was left out";
   }
   for (const Claim& claim : claims_of(runs.scenes)) {
     const std::string line = fmt::format("| {} | {} | {} |", claim.what, claim.holds ? "yes" : "no", claim.found);
-    EXPECT_NE(told.find(line), std::string::npos) << "docs/benchmarks.md lacks this row:\n" << line;
+    EXPECT_NE(told.find(line + "\n"), std::string::npos) << "docs/benchmarks.md lacks this row:\n" << line;
   }
 }
 
