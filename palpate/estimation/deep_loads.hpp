@@ -39,10 +39,11 @@ std::vector<Entry> first_steps(const std::vector<Entry>& all, const Recording& g
 /// is not known beforehand: a first one is read off the lighter loads by linear theory, and where the fit has another one that
 /// changes which steps these are, they are fitted anew. Near the limit a surface may cave in
 /// or not, and a load that does may spoil the very E by which it counts: where the deepest ones come near it, E of the lighter loads
-/// alone must not be lower (Hausman's test), or they are left out as well. With a linear law, which caves in under nothing, and where every load is
-/// far beyond, all steps are fitted.
+/// alone must not be lower (Hausman's test), or they are left out as well. With a linear law, which caves in under nothing, and
+/// where every load is far beyond, all steps are fitted.
 /// @param fit     of the first steps of each push; called once where no load is near the limit
 /// @param fitted  if given: the steps that the answer is of. Goes in as the most that are fitted (empty: all)
+/// @param progress  of the fits of lighter loads alone; stopped there, the answer ends as cancelled
 Identification fit_within_pressure(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
                                    const FitOptions& options, const std::function<Identification(const StepCounts&)>& fit,
                                    StepCounts* fitted = nullptr, const OnProgress& progress = {});
