@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -18,12 +17,17 @@ namespace palpate::fem {
 
 inline bool calculix_is_there() { return std::system("command -v ccx > /dev/null 2>&1") == 0; }
 
+/// Elements that are of another stuff than the rest.
+struct CalculixPart {
+  std::vector<Index> elements;
+  double young_pa = 0, poisson = 0;
+};
+
 /// Displacements (3n, node-major; seven digits) of C3D4 or C3D10 elements, by the mesh's columns. Linear, or NLGEOM with its
 /// Neo-Hookean law (C10 = mu / 2, D1 = 2 / K). NaN where ccx gave no result.
-/// @param other, other_young_pa, other_poisson  elements that are of another E, and nu where one is given
+/// @param parts  of the body that are not of young_pa and poisson
 inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Index>& held, const VectorX& load,
-                                      bool nonlinear, double young_pa, double poisson, const std::vector<Index>& other = {},
-                                      double other_young_pa = 0, std::optional<double> other_poisson = std::nullopt) {
+                                      bool nonlinear, double young_pa, double poisson, const std::vector<CalculixPart>& parts = {}) {
   const auto nodes = mesh.tetrahedra.cols();
   const test::TemporaryFolder folder("ccx");
   {
@@ -32,33 +36,27 @@ inline VectorX calculix_displacements(const TetMesh& mesh, const std::vector<Ind
     out << "*NODE, NSET=ALL\n";
     for (Index i = 0; i < mesh.nodes_m.rows(); ++i)
       out << i + 1 << ", " << mesh.nodes_m(i, 0) << ", " << mesh.nodes_m(i, 1) << ", " << mesh.nodes_m(i, 2) << "\n";
-    out << "*ELEMENT, TYPE=C3D" << nodes << ", ELSET=BODY\n";
+    out << "*ELEMENT, TYPE=C3D" << nodes << "\n";
     for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
       out << e + 1;
       for (int a = 0; a < nodes; ++a) out << ", " << mesh.tetrahedra(e, a) + 1;
       out << "\n";
     }
-    const auto material = [&](const char* name, const char* elements, double stiffness_pa, double nu) {
+    std::vector<std::size_t> part_of(static_cast<std::size_t>(mesh.tetrahedra.rows()), 0);
+    for (std::size_t p = 0; p < parts.size(); ++p)
+      for (Index e : parts[p].elements) part_of[static_cast<std::size_t>(e)] = p + 1;
+    for (std::size_t p = 0; p <= parts.size(); ++p) {
+      out << "*ELSET, ELSET=PART" << p << "\n";
+      for (std::size_t e = 0; e < part_of.size(); ++e)
+        if (part_of[e] == p) out << e + 1 << ",\n";
+      const double stiffness_pa = p ? parts[p - 1].young_pa : young_pa, nu = p ? parts[p - 1].poisson : poisson;
       const Moduli m = moduli(stiffness_pa, nu);
-      out << "*MATERIAL, NAME=" << name << "\n";
+      out << "*MATERIAL, NAME=STUFF" << p << "\n";
       if (nonlinear)
         out << "*HYPERELASTIC, NEO HOOKE\n" << m.mu / 2 << ", " << 2 / (m.lambda + 2.0 / 3 * m.mu) << "\n";
       else
         out << "*ELASTIC\n" << stiffness_pa << ", " << nu << "\n";
-      out << "*SOLID SECTION, ELSET=" << elements << ", MATERIAL=" << name << "\n";
-    };
-    if (other.empty()) {
-      material("SOFT", "BODY", young_pa, poisson);
-    } else {
-      std::vector<char> is_other(static_cast<std::size_t>(mesh.tetrahedra.rows()), 0);
-      for (Index e : other) is_other[static_cast<std::size_t>(e)] = 1;
-      for (const char which : {0, 1}) {
-        out << "*ELSET, ELSET=" << (which ? "THOSE" : "THESE") << "\n";
-        for (std::size_t e = 0; e < is_other.size(); ++e)
-          if (is_other[e] == which) out << e + 1 << ",\n";
-      }
-      material("SOFT", "THESE", young_pa, poisson);
-      material("OTHER", "THOSE", other_young_pa, other_poisson.value_or(poisson));
+      out << "*SOLID SECTION, ELSET=PART" << p << ", MATERIAL=STUFF" << p << "\n";
     }
     out << "*BOUNDARY\n";
     for (Index i : held) out << i + 1 << ", 1, 3, 0.\n";

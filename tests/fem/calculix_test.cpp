@@ -73,7 +73,8 @@ TEST_P(CalculiX, AgreesWithTwoMaterials) {
     options.region_stiffness = Eigen::Vector2d(1, ratio);
     if (upper_poisson) options.region_poisson = Eigen::Vector2d(std::nan(""), *upper_poisson);
     const VectorX theirs =
-        calculix_displacements(mesh, held, b.forces * force, c.nonlinear, young, c.poisson, upper, ratio * young, upper_poisson);
+        calculix_displacements(mesh, held, b.forces * force, c.nonlinear, young, c.poisson,
+                               {{upper, ratio * young, upper_poisson.value_or(c.poisson)}});
     ASSERT_TRUE(theirs.allFinite()) << "ccx gave no result";
     const Equilibrium e = Statics(mesh, c.nonlinear ? "neo_hookean_isochoric" : "linear", b, options)
                               .solve(young, c.poisson, force, VectorX());
