@@ -43,6 +43,8 @@ constexpr double time_left_after_share = 0.03;
 void stop_on_interrupt() {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
+  // A terminal that is gone, with whoever was to watch the arm; `nohup` says that it may go on.
+  if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);  // a reader that closed early is no reason to lose a result on disk
 }
 
@@ -57,6 +59,7 @@ void hold_standard_streams() {
 void end_at_first_interrupt() {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
+  if (std::signal(SIGHUP, SIG_DFL) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
 std::string stage_words(std::string_view stage) {

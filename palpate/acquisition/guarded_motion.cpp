@@ -55,17 +55,18 @@ void GuardedMotion::watch(const Leaving& leaving, double gone_m) {
       before_n_ = state.force_n;
       return;
     }
-    if (sample >= options_.contact.confirm_samples) hit(change_n);
+    if (sample >= options_.contact.confirm_samples) hit(change_n, leaving);
     robot_.wait(options_.sample_period_s);
   }
 }
 
-void GuardedMotion::hit(const Vec3& change_n) {
+void GuardedMotion::hit(const Vec3& change_n, const Leaving& leaving) {
   robot_.stop();
   const Vec3 at_m = robot_.read().T_base_tip.translation();
   double back_m = 0;
   while (!trail_.empty() && back_m < options_.clearance_m) {
     const Pose back = trail_.back();
+    if (leaving.is_pressed && (back.translation() - from_m_).norm() <= leaving.within_m) break;  // the object is there
     trail_.pop_back();
     if (robot_.move(back, options_.approach_speed_m_s) == Motion::refused) break;
     back_m += (back.translation() - here_.translation()).norm();
@@ -83,13 +84,13 @@ bool GuardedMotion::go(const Pose& to, const Leaving& leaving) {
   trail_.clear();
   listen();
   constexpr double turn_rad = 0.1;
-  const Vec3 from_m = here_.translation();
-  motion_ = (to.translation() - from_m).normalized();
+  from_m_ = here_.translation();
+  motion_ = (to.translation() - from_m_).normalized();
   for (const Pose& next : in_pieces(here_, to, options_.look_every_m, turn_rad)) {
     ask_user_();
     if (robot_.move(next, options_.approach_speed_m_s) == Motion::refused) return false;
     trail_.push_back(std::exchange(here_, next));
-    watch(leaving, (here_.translation() - from_m).norm());
+    watch(leaving, (here_.translation() - from_m_).norm());
   }
   return true;
 }

@@ -12,7 +12,8 @@ namespace palpate::acquisition {
 /// Out of an object that the tip presses.
 struct Leaving {
   double within_m = 0;      ///< from the beginning of a motion
-  bool is_pressed = false;  ///< for certain, so that all that is felt there is that object; false: what falls along the motion
+  /// For certain, so that all that is felt there is that object, and nothing drives the tip back into it. False: what falls along the motion.
+  bool is_pressed = false;
 };
 
 class GuardedMotion {
@@ -31,13 +32,14 @@ class GuardedMotion {
   double turned_rad(const RobotState& state) const;
   bool is_felt(const RobotState& state) const;
   void watch(const Leaving& leaving, double gone_m);
-  [[noreturn]] void hit(const Vec3& change_n);
+  [[noreturn]] void hit(const Vec3& change_n, const Leaving& leaving);
 
   Robot& robot_;
   const PushOptions& options_;
   std::function<void()> ask_user_;
   Pose here_;
   std::vector<Pose> trail_;  // where this motion has been
+  Vec3 from_m_ = Vec3::Zero();  // where it set out
   Vec3 motion_ = Vec3::Zero();  // along it
   Vec3 before_n_ = Vec3::Zero();
   Mat3 R_before_ = Mat3::Identity();  // of the tip then

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "palpate/acquisition/fresh_readings.hpp"
 #include "palpate/acquisition/guarded_motion.hpp"
 #include "palpate/acquisition/push_run.hpp"
 #include "palpate/core/error.hpp"
@@ -29,8 +30,9 @@ PushReport run_push(Robot& robot, const PushPlan& plan, const PushOptions& optio
 
 void step_back(Robot& robot, double deep_m, const PushOptions& options, const std::function<bool()>& keep_going) {
   const OnTheWay on_the_way(robot);
+  FreshReadings fresh(robot, options.sample_period_s);
   try {
-    GuardedMotion motion(robot, options, [&] {
+    GuardedMotion motion(fresh, options, [&] {
       if (keep_going && !keep_going()) throw Stopped{StopReason::user, ""};
     });
     Pose back = motion.here();

@@ -12,7 +12,7 @@ namespace palpate::acquisition {
 
 PushRun::PushRun(Robot& robot, const PushPlan& plan, const PushOptions& options, const OnStep& on_step,
                  const std::function<bool()>& keep_going, const Push* so_far)
-    : robot_(robot),
+    : robot_(robot, options.sample_period_s),
       plan_(plan),
       asked_(options),
       options_(within(robot.limits(), options)),

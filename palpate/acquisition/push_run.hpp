@@ -6,9 +6,11 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "palpate/acquisition/fresh_readings.hpp"
 #include "palpate/acquisition/guarded_motion.hpp"
 #include "palpate/acquisition/motion_lengths.hpp"
 #include "palpate/acquisition/push_protocol.hpp"
@@ -95,6 +97,7 @@ class PushRun {
     Vec3 mean_n = Vec3::Zero();
     double time_s = 0;  // its middle
     double std_n = 0;   // of one sample, along the push
+    double std_of_worst_axis_n = 0;
     std::optional<TorqueMean> torque;
     RobotState last;
   };
@@ -112,6 +115,15 @@ class PushRun {
   bool is_pressed_already() const { return top_is_recorded() && first_way_back() > options_.unloading_steps; }
 
   void approach();
+  // Nothing presses along the push, and a force is felt all the same.
+  void watch_aside(std::span<const sensing::ContactSample> samples);
+  // How far the tip stands behind where it was sent; the same all the time but where it yields, or does not follow.
+  double behind_m(const Vec3& tip_m) const { return at_m_ - along(tip_m - plan_.contact_m); }
+  double much_behind_m() const { return std::max(4 * options_.increment_m, 10 * robot_.travel_sigma_m()); }
+  [[noreturn]] void stays_behind(double by_m) const;
+  // What is left of the travel limit, by the encoders and by where the tip was sent: one that yields or is held jumps there when it
+  // comes free.
+  double travel_left_m(const RobotState& state);
 
   void touched(const std::vector<sensing::ContactSample>& samples, std::size_t contact, double motion_m);
 
@@ -148,7 +160,7 @@ class PushRun {
     return pressing(state) + 2 * lengths_.stiffness_n_m(seen(state)) * next_m(state) < options_.force_limit_n;
   }
 
-  void watch_out() const;
+  void watch_out();
 
   struct Settled {
     RobotState last;
@@ -206,7 +218,7 @@ class PushRun {
   // Away from the object whatever happened, and did it come back?
   void retreat();
 
-  Robot& robot_;
+  FreshReadings robot_;
   const PushPlan& plan_;
   const PushOptions asked_;    // what the user wants
   const PushOptions options_;  // and of that, what the robot bears
@@ -220,13 +232,14 @@ class PushRun {
   Vec3 noticed_m_ = Vec3::Zero();                           // there
   std::size_t late_of_ = 0;                                 // so many samples of history_ gave ...
   double late_m_ = 0;                                       // ... this
-  double free_air_std_n_ = 0, tared_at_s_ = 0;
+  double free_air_std_n_ = 0, worst_axis_std_n_ = 0, tared_at_s_ = 0;
   Mat3 R_base_tip_tared_ = Mat3::Identity();
   std::optional<TorqueMean> torque_tare_;
   bool in_front_ = false;     // the tip has been in front of the object
   bool loaded_ = false;       // a step under load is recorded
   bool begins_late_ = false;  // contact was noticed, and is not corrected yet for the force that this took
   double at_m_ = 0;           // commanded, along the push from the expected contact
+  double touched_at_m_ = 0;   // the same, when contact was noticed
   double top_n_ = 0, peak_n_ = 0;  // the highest force of the rise, and of all
   std::optional<double> recorded_at_m_;  // of the last loaded step
   int next_index_ = 0;

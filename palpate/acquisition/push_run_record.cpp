@@ -27,8 +27,14 @@ PushRun::FreeAir PushRun::listen() {
     air.time_s += air.last.time_s / options_.free_air_samples;
   }
   double square = 0;
-  for (const Vec3& f : forces) square += std::pow(along(f - air.mean_n), 2);
-  air.std_n = std::sqrt(square / std::max(1, options_.free_air_samples - 1));
+  Vec3 squares = Vec3::Zero();
+  for (const Vec3& f : forces) {
+    square += std::pow(along(f - air.mean_n), 2);
+    squares += (f - air.mean_n).cwiseAbs2();
+  }
+  const int freedom = std::max(1, options_.free_air_samples - 1);
+  air.std_n = std::sqrt(square / freedom);
+  air.std_of_worst_axis_n = std::sqrt(squares.maxCoeff() / freedom);
   air.torque = torque_mean(torques);
   return air;
 }
@@ -39,6 +45,7 @@ void PushRun::look_at_rest() {
   report_.tare_n = air.mean_n;
   tared_at_s_ = air.time_s;
   free_air_std_n_ = air.std_n;
+  worst_axis_std_n_ = air.std_of_worst_axis_n;
   R_base_tip_tared_ = air.last.T_base_tip.linear();
   torque_tare_ = air.torque;
   if (torque_tare_ && options_.contact_std_m > 0) {
@@ -102,7 +109,8 @@ std::optional<Wrench> PushRun::torque_of(const Settled& step) const {
   Wrench wrench;
   wrench.time_s = step.last.time_s;
   wrench.force_n = step.mean_n;
-  wrench.force_sigma_n = step.sigma_n;
+  constexpr double exact_n = 1e-6;  // of a sensor made of software
+  wrench.force_sigma_n = std::max(step.sigma_n, exact_n);
   wrench.has_torque = true;
   wrench.torque_nm = step.torque->mean_nm - torque_tare_->mean_nm;
   const double noise_nm = std::max(step.torque->mean_std_nm(), 0.1 * torque_tare_->mean_std_nm());

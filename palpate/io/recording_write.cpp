@@ -31,6 +31,7 @@ struct RecordingWriter::Pages {
     double depth_unit_m = 1;
   };
   std::vector<KnownCamera> cameras;
+  std::size_t joints_named = 0;
 
   void put_file(const std::string& name, const std::string& bytes) const {
     std::error_code code;
@@ -300,6 +301,7 @@ void RecordingWriter::Pages::set_head(const Recording& recording) {
   if (recording.time_offset_std_s != 0) head += fmt::format("time_offset_std_s: {}\n", recording.time_offset_std_s);
   if (recording.robot) {
     std::string joints;
+    joints_named = recording.joint_names.size();
     for (const std::string& joint : recording.joint_names) joints += (joints.empty() ? "" : ", ") + yaml_word(joint);
     for (const auto& [file, bytes] : urdf_files(*recording.robot, "robot")) put_file(file, bytes);
     head += "robot: {urdf: robot.urdf, joints: [" + joints + "]}\n";
@@ -369,6 +371,10 @@ std::string RecordingWriter::Pages::observation_text(const Observation& observat
 }
 
 void RecordingWriter::Pages::add_step(const Step& step) {
+  if (!step.joints_rad.empty() && joints_named > 0 && step.joints_rad.size() != joints_named)
+    throw Error(fmt::format("has {} values, 'robot: joints' names {}; name the joints that the robot tells of, in their order", step.joints_rad.size(),
+                            joints_named),
+                "joints_rad");
   std::string text;
   if (!pending.empty()) {
     const Push& push = pending.back();
@@ -386,7 +392,7 @@ void RecordingWriter::Pages::add_step(const Step& step) {
   text += fmt::format("      - time_s: {}\n", step.time_s);
   if (step.unloading) text += "        unloading: true\n";
   if (step.slipped) text += "        slipped: true\n";
-  if (!step.joints_rad.empty())
+  if (!step.joints_rad.empty() && joints_named > 0)  // without names nobody could read them
     text += "        joints_rad: " + yaml_list(step.joints_rad.data(), step.joints_rad.size()) + "\n";
   if (step.T_base_tip) text += "        T_base_tip: " + yaml_pose(*step.T_base_tip) + "\n";
   if (!step.loads.empty()) text += "        loads:\n";

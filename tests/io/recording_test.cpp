@@ -344,6 +344,36 @@ TEST(RecordingWriter, AfterEveryStepTheFolderIsAWholeRecording) {
   EXPECT_THROW(read_recording(folder.path() / "fast"), Error) << "2 N a second";
 }
 
+// What a reader would refuse is not written: hours of pushing would end in a folder that nobody can read.
+TEST(RecordingWriter, JointsAreThoseThatTheRobotNames) {
+  const TemporaryFolder folder("joints");
+  put_cube_recording(folder);
+  Recording recording = read_recording(folder.path());
+  Step step = recording.pushes[0].steps[0];
+  recording.pushes.clear();
+  recording.robot.reset();
+  step.joints_rad = {0.1, 0.2};
+  Push push;
+  push.name = "live";
+  RecordingWriter nameless(folder.path() / "nameless", recording);
+  nameless.begin_push(push);
+  nameless.add_step(step);
+  EXPECT_TRUE(read_recording_unchecked(folder.path() / "nameless").pushes.at(0).steps.at(0).joints_rad.empty());
+  recording.robot = RobotModel{};
+  recording.joint_names = {"shoulder"};
+  RecordingWriter writer(folder.path() / "named", recording);
+  writer.begin_push(push);
+  try {
+    writer.add_step(step);
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where(), "joints_rad");
+    EXPECT_NE(error.message().find("has 2 values, 'robot: joints' names 1"), std::string::npos) << error.what();
+  }
+  step.joints_rad = {0.1};
+  writer.add_step(step);
+}
+
 TEST(ReadRecording, EveryExampleOfTheDocumentationIsUnderstood) {
   const std::string page = read_file(std::string(PALPATE_SOURCE_DIR) + "/docs/recording-format.md");
   int examples = 0;
