@@ -85,6 +85,16 @@ TEST_F(Record, CtrlCStopsTheArmWhereItStandsAndKeepsEveryFinishedStep) {
   EXPECT_THAT(said, HasSubstr("\"steps\": " + std::to_string(recording.pushes[0].steps.size())));
 }
 
+// As does a terminal that is closed with whoever was to watch.
+TEST_F(Record, AClosedTerminalStopsTheArm) {
+  const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT));
+  ASSERT_TRUE(says(": 2.")) << said;
+  kill(child, SIGHUP);
+  EXPECT_EQ(wait_for(child), numbers) << said;
+  EXPECT_TRUE(folder.get("calls").ends_with("stop\n")) << "nothing moves after it";
+  EXPECT_TRUE(check_recording(made()).empty());
+}
+
 // From 0.15 m above the place where the push begins: 7.5 s of the robot's clock.
 TEST_F(Record, CtrlCOnALongWayStopsItThere) {
   const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT));

@@ -30,6 +30,7 @@ class RunningProgram : public testing::Test {
     words.insert(words.begin(), PALPATE_CLI);
     const pid_t child = fork();
     if (child == 0) {
+      signal(SIGHUP, SIG_DFL);  // tests may run under nohup
       setenv("PATIENT_ROBOT_LOG", path("calls").c_str(), 1);
       setenv("PATIENT_ROBOT_TIP", path("tip").c_str(), 1);
       dup2(ends[1], STDERR_FILENO);
