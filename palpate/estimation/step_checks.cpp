@@ -34,7 +34,7 @@ std::optional<Asked> asked_by(const Objective& objective, const Optimum& optimum
   MatrixX hessian = evaluation.information(factor);
   VectorX gradient = evaluation.gradient;
   for (int k : about) {  // the data alone
-    if (!std::isfinite(unknowns[k].prior_std)) continue;
+    if (!std::isfinite(unknowns[k].prior_std) || unknowns[k].fixed) continue;  // no prior was added: Objective::add_priors
     const double precision = 1 / (unknowns[k].prior_std * unknowns[k].prior_std);
     hessian(k, k) -= precision;
     gradient(k) -= precision * (optimum.unknowns(k) - unknowns[k].prior_mean);

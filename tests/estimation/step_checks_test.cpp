@@ -90,6 +90,32 @@ TEST(StepChecks, AContactThatSlips) {
   }
 }
 
+// What the steps say is asked without the contact's prior, which is part of their sum only where the contact is fitted.
+TEST(StepChecks, AContactThatIsHeldIsAskedTheSame) {
+  const Recording recording = six_loads();
+  Recording slipped = recording;
+  for (Step& step : slipped.pushes[0].steps) step.loads[0].contact_m += Vec3(-0.006, 0, 0);
+  const PushedBlock truth = linear_block();
+  const Inputs inputs = changed(clouds_of(truth, recording), clouds_of(truth, slipped), 3);
+  Unknowns unknowns;
+  ForwardModel model(recording, coarse_block("linear"), unknowns);
+  Objective objective(model, inputs, unknowns);
+  const auto asked = [&](bool held) {
+    for (const int k : unknowns.named({"contact_shift[down]_1", "contact_shift[down]_2"})) unknowns[k].fixed = held;
+    Optimum at;
+    at.unknowns = unknowns.prior_mean();
+    at.unknowns(log_young) = std::log(truth.young_pa);
+    at.unknowns(poisson) = truth.poisson;
+    at.evaluation = objective.evaluate(at.unknowns, at.loss);
+    return contact_slip(objective, at, 1);
+  };
+  const auto fitted = asked(false), held = asked(true);
+  ASSERT_TRUE(fitted && held);
+  EXPECT_EQ(held->step, fitted->step);
+  EXPECT_NEAR(held->size, fitted->size, 1e-9 * fitted->size);
+  EXPECT_NEAR(std::log(held->p_value), std::log(fitted->p_value), 1e-6);
+}
+
 TEST(StepChecks, AnObjectThatWasMoved) {
   PushedBlock truth = linear_block(), moved = truth;
   moved.clamp.translation_m = Vec3(0.002, 0.0015, 0.001);
