@@ -416,9 +416,9 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
       pose_std_m = std::max(pose_std_m, std::get<RayObservation>(*rays).pose_std_m);
       pose_std_rad = std::max(pose_std_rad, std::get<RayObservation>(*rays).pose_std_rad);
     }
-  const auto add = [&](const std::string& name, const std::string& unit, int k, double stated, double offset = 0) {
+  const auto add = [&](const std::string& name, const std::string& unit, int k, double stated, double offset = 0) -> CheckedError* {
     const auto column = std::find(moving.begin(), moving.end(), k);
-    if (column == moving.end()) return;
+    if (column == moving.end()) return nullptr;  // exactly known
     const auto c = static_cast<Index>(column - moving.begin());
     CheckedError error{name, unit};
     error.value = x(k) - offset;
@@ -428,7 +428,7 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
     error.stated_std = stated;
     error.determined = error.std < 0.3 * p.prior_std(k);
     error.consistent = !error.determined || std::abs(error.value) <= alarm * std::hypot(error.std, stated);
-    check.errors.push_back(error);
+    return &check.errors.emplace_back(error);
   };
   add("force_scale", "1", scale, recording.force_scale_std);
   const Tool tool = touching_tool(recording);
@@ -438,11 +438,9 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   for (int d = 0; d < 3; ++d) add(std::string("hand_eye_rotation_") + axes[d], "rad", camera_turn + d, pose_std_rad);
   for (std::size_t k = 0; k < recording.pushes.size(); ++k) {
     // Its prior is what the recording states: it is told by its pull.
-    add("force_tare[" + recording.pushes[k].name + "]", "N", p.tare(k), recording.pushes[k].force_tare_std_n);
-    if (!check.errors.empty() && check.errors.back().name.starts_with("force_tare")) {
-      CheckedError& error = check.errors.back();
-      error.consistent = std::abs(error.value) <= alarm * recording.pushes[k].force_tare_std_n;
-    }
+    const double stated = recording.pushes[k].force_tare_std_n;
+    CheckedError* const tare = add("force_tare[" + recording.pushes[k].name + "]", "N", p.tare(k), stated);
+    if (tare != nullptr) tare->consistent = std::abs(tare->value) <= alarm * stated;
   }
   judge(p, check);
   return check;

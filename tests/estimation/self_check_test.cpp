@@ -198,6 +198,18 @@ TEST(SelfCheck, RigsAsStatedPassAndIntervalsHoldTheTruth) {
   EXPECT_LE(alarms, 2);  // a dozen errors at three standard deviations: one good rig in thirty
 }
 
+// It has no entry, and the one before it is not judged in its place.
+TEST(SelfCheck, APushWithoutATareCondemnsNoOther) {
+  Rig rig;
+  Measured rigged = measured(rig);
+  for (const std::size_t exact : {1u, 3u}) rigged.recording.pushes[exact].force_tare_std_n = 0;
+  const SelfCheck check = self_check(rigged.recording, rigged.body, rigged.inputs, {});
+  EXPECT_TRUE(error_named(check, "force_tare[push 1]").consistent);
+  EXPECT_TRUE(error_named(check, "force_tare[push 3]").consistent);
+  EXPECT_THROW(error_named(check, "force_tare[push 2]"), std::runtime_error);
+  EXPECT_FALSE(says(check, "force_tare_off"));
+}
+
 TEST(SelfCheck, StatedComplianceIsNotAnError) {
   Rig rig;
   rig.compliance_m_per_n = 1.5e-4;
