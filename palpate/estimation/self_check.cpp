@@ -312,7 +312,7 @@ Tool touching_tool(const Recording& recording) {
   return {};
 }
 
-void judge(const Problem& p, SelfCheck& check) {
+void judge(const Problem& p, double dof, SelfCheck& check) {
   std::map<std::string, std::string> said;
   for (const auto& error : check.errors) {
     if (error.consistent) continue;
@@ -348,7 +348,7 @@ void judge(const Problem& p, SelfCheck& check) {
     said["hand_eye_not_determined"] =
         p.views.empty() ? "no depth images: the camera's place cannot be checked"
                         : "the surface that is seen can slide along itself: show the camera three faces of the body";
-  if (check.chi2_per_dof > 1.5)
+  if (check.chi2_per_dof > 1.5 + 4 * std::sqrt(2 / dof))  // few rows scatter
     said["does_not_fit"] =
         "what is left is larger than the stated sigmas allow: the body gives way elsewhere, it is not where the recording "
         "says, or a sigma is too small";
@@ -402,8 +402,14 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   for (const double r : left.travel) chi2 += r * r;
   for (const double r : left.touch) chi2 += r * r;
   for (const double r : left.ray) chi2 += std::abs(r) < tukey_cut ? r * r : 0;  // as they are counted
-  const double rows = static_cast<double>(left.travel.size() + left.touch.size() + left.rays_hit);
-  check.chi2_per_dof = chi2 / std::max(1.0, rows - static_cast<double>(moving.size()));
+  // A prior is a row, too: what moves under one costs no degree of freedom, and its pull counts.
+  double dof = static_cast<double>(left.travel.size() + left.touch.size() + left.rays_hit);
+  for (const int k : moving) {
+    if (std::isfinite(p.prior_std(k))) chi2 += std::pow(x(k) / p.prior_std(k), 2);
+    else --dof;
+  }
+  dof = std::max(1.0, dof);
+  check.chi2_per_dof = chi2 / dof;
   check.travels = left.travel.size();
   check.touches = left.touch.size();
   check.rays = left.rays_hit;
@@ -442,7 +448,7 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
     CheckedError* const tare = add("force_tare[" + recording.pushes[k].name + "]", "N", p.tare(k), stated);
     if (tare != nullptr) tare->consistent = std::abs(tare->value) <= alarm * stated;
   }
-  judge(p, check);
+  judge(p, dof, check);
   return check;
 }
 
