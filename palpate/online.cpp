@@ -4,7 +4,9 @@
 #include <algorithm>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/contacts_on_surface.hpp"
 #include "palpate/estimation/finer_model.hpp"
+#include "palpate/estimation/slips.hpp"
 
 namespace palpate {
 namespace {
@@ -37,6 +39,17 @@ bool says_something(const Recording& recording, const estimation::Inputs& inputs
   return false;
 }
 
+/// What a model of the step wants to know: not what a camera saw of the surface, which is large.
+Step without_surfaces(Step step) {
+  std::erase_if(step.observations, [](const Observation& one) { return std::holds_alternative<DepthFrame>(one) || std::holds_alternative<PointCloud>(one); });
+  return step;
+}
+
+Push without_surfaces(Push push) {
+  for (Step& step : push.steps) step = without_surfaces(std::move(step));
+  return push;
+}
+
 }  // namespace
 
 OnlineEstimator::OnlineEstimator(const Recording& scene, const IdentifyOptions& options)
@@ -48,6 +61,9 @@ OnlineEstimator::OnlineEstimator(const Recording& scene, const IdentifyOptions& 
   demand(options.regions != "by-site" || !recording_.regions.empty(), "regions by-site",
          "no site has been pushed yet: give the recording its regions");
   take_in(recording_);
+  light_ = recording_;
+  light_.rest.views.clear();
+  for (Push& push : light_.pushes) push = without_surfaces(std::move(push));
   estimate_.message = "no step was taken in";
 }
 
@@ -88,13 +104,14 @@ std::string OnlineEstimator::camera_of(const DepthFrame& frame) {
 }
 
 void OnlineEstimator::begin(const Push& push) {
-  for (const Push& known : recording_.pushes) {
+  for (const Push& known : light_.pushes) {
     if (known.name == push.name) throw Error("a push of this name was made already", "pushes." + push.name);
   }
-  Recording alone = recording_;
+  Recording alone = light_;
   alone.pushes = {push};
   take_in(alone);
   recording_.pushes.push_back(push);
+  light_.pushes.push_back(without_surfaces(push));
   if (!push.steps.empty()) object_.reset();  // it may touch elsewhere
 }
 
@@ -113,7 +130,8 @@ bool OnlineEstimator::new_contact(const Step& step) const {
 }
 
 void OnlineEstimator::build(const OnProgress& progress) {
-  simulated_ = recording_;
+  const bool out_of_views = !recording_.rest.volume && !recording_.rest.surface;
+  simulated_ = out_of_views ? recording_ : light_;
   object_ = build_simulated_object(simulated_, progress);
   if (simulated_.model.refine == "auto") {
     if (auto better = estimation::refined_within(simulated_, *object_, options_.mesh_tolerance)) {
@@ -121,29 +139,35 @@ void OnlineEstimator::build(const OnProgress& progress) {
       object_ = std::move(better->object);
     }
   }
+  simulated_.rest.views.clear();  // the shape is made
   fit_.forget_object();
 }
 
 const Identification& OnlineEstimator::add(const Step& step, const OnProgress& progress) {
   if (recording_.pushes.empty()) throw Error("say which push the step belongs to (begin)", "OnlineEstimator.add");
-  Recording alone = recording_;
-  alone.pushes = {recording_.pushes.back()};
+  Recording alone = light_;
+  alone.pushes = {light_.pushes.back()};
   alone.pushes.back().steps = {step};
   const bool rebuild = !object_ || new_contact(step);
   const std::size_t cameras = cameras_.size();
   take_in(alone);
   recording_.pushes.back().steps.push_back(step);
+  light_.pushes.back().steps.push_back(without_surfaces(step));
   try {
-    if (!says_something(recording_, inputs_)) {
+    if (!says_something(light_, inputs_)) {
       estimate_.message = "no load has been seen to deform the object yet";
       object_.reset();
       return estimate_;
     }
     if (rebuild) build(progress);
-    simulated_.pushes = recording_.pushes;
+    // As the object was built with them: the step may touch beside the surface, or be the first after a slip.
+    simulated_.pushes = light_.pushes;
+    estimation::put_contacts_on_surface(simulated_, object_->mesh);
+    estimation::free_contacts_after_slips(simulated_);
     estimate_ = fit_.update(simulated_, *object_, inputs_, progress);
   } catch (...) {
     recording_.pushes.back().steps.pop_back();
+    light_.pushes.back().steps.pop_back();
     inputs_.pop_back();
     cameras_.resize(cameras);
     if (rebuild) object_.reset();

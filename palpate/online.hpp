@@ -51,7 +51,8 @@ class OnlineEstimator {
   };
   IdentifyOptions options_;
   Recording recording_;   // as given, with all steps
-  Recording simulated_;   // the same with the object as it is solved
+  Recording light_;       // the same without images and points, which are in inputs_: this one is copied at every step
+  Recording simulated_;   // light_ with the object and its contacts as they are solved
   std::optional<estimation::SimulatedObject> object_;
   estimation::Inputs inputs_;
   std::vector<SeenFrom> cameras_;  // one a frame

@@ -122,21 +122,37 @@ PointCloud on_surface(const PointCloud& cloud, const TriMesh& surface) {
   return out;
 }
 
-/// Errors of force and travel as the last push stated them.
+/// The first load of a push under which something is pressed by a force; nullptr: none.
+const Load* pressing_load(const Push& push) {
+  for (const Step& step : push.steps)
+    for (const Load& load : step.loads)
+      if (load.force_n && load.force_n->norm() > 0) return &load;
+  return nullptr;
+}
+
+const ToolTravel* read_travel(const Push& push) {
+  for (const Step& step : push.steps)
+    for (const Observation& observation : step.observations)
+      if (const auto* travel = std::get_if<ToolTravel>(&observation)) return travel;
+  return nullptr;
+}
+
+/// Errors of force and travel as they were stated last, each by a push that has it.
 estimation::SensorPlan errors_of(const Recording& recording, std::vector<std::string>& warnings) {
   estimation::SensorPlan sensors;
-  for (auto push = recording.pushes.rbegin(); push != recording.pushes.rend(); ++push) {
-    for (const auto& step : push->steps) {
-      if (step.loads.empty() || !step.loads[0].force_n) continue;
-      sensors.force_std_n = step.loads[0].force_std_n;
-      sensors.force_relative_std = step.loads[0].force_relative_std;
-      sensors.contact_std_m = step.loads[0].contact_std_m;
-      sensors.force_tare_std_n = push->force_tare_std_n;
-      sensors.travel_offset_std_m = push->travel_offset_std_m;
-      for (const auto& observation : step.observations)
-        if (const auto* travel = std::get_if<ToolTravel>(&observation)) sensors.travel_sigma_m = travel->sigma_m;
-      return sensors;
-    }
+  const auto last = [&](const auto& has) { return std::find_if(recording.pushes.rbegin(), recording.pushes.rend(), has); };
+  const auto pressed = last([](const Push& push) { return pressing_load(push) != nullptr; });
+  if (pressed != recording.pushes.rend()) {
+    const Load& load = *pressing_load(*pressed);
+    sensors.force_std_n = load.force_std_n;
+    sensors.force_relative_std = load.force_relative_std;
+    sensors.contact_std_m = load.contact_std_m;
+    sensors.force_tare_std_n = pressed->force_tare_std_n;
+    const auto read = last([](const Push& push) { return pressing_load(push) != nullptr && read_travel(push) != nullptr; });
+    if (read == recording.pushes.rend()) return sensors;
+    sensors.travel_sigma_m = read_travel(*read)->sigma_m;
+    sensors.travel_offset_std_m = read->travel_offset_std_m;
+    return sensors;
   }
   sensors.force_std_n = 0.03;
   sensors.force_tare_std_n = 0.05;

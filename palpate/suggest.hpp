@@ -26,7 +26,7 @@ struct SuggestOptions {
   std::string tool;                               ///< of the recording; empty = its only one
   double young_modulus_pa = 2e4;                  ///< guess before the first touch
   std::vector<DepthFrame> cameras;                ///< empty = those of the recording; pixels are not looked at
-  std::optional<estimation::SensorPlan> sensors;  ///< errors of force and travel; nothing = those of the last push
+  std::optional<estimation::SensorPlan> sensors;  ///< errors of force and travel; nothing = as pushes stated them last
   int viewpoints = 0;                             ///< further places of the first camera, around the object
   int threads = 1;
 };

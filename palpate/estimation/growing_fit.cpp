@@ -10,6 +10,7 @@
 #include "palpate/estimation/error_budget.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
+#include "palpate/estimation/unknown_names.hpp"
 #include "palpate/estimation/verdicts.hpp"
 
 namespace palpate::estimation {
@@ -20,14 +21,6 @@ constexpr double search_reuse = 0.2;  // the same, for the search over nu, which
 constexpr double anew = 1e-9;   // keep, but evaluate every step that has moved at all
 constexpr double least_gain = 3;  // of the cost: less is not to be had for certain where rays change triangles
 constexpr double misfit = 1.5;  // robust spread of the residuals in standard deviations: the start was far off
-
-/// Unknowns that share a name (two cameras in a step) are told apart by their order, which steps to come do not change.
-std::vector<std::string> names_of(const Unknowns& unknowns) {
-  std::map<std::string, int> seen;
-  std::vector<std::string> names;
-  for (int k = 0; k < unknowns.size(); ++k) names.push_back(unknowns[k].name + "#" + std::to_string(seen[unknowns[k].name]++));
-  return names;
-}
 
 }  // namespace
 

@@ -7,6 +7,8 @@
 #include <memory>
 
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/own_poisson.hpp"
+#include "palpate/estimation/unknown_names.hpp"
 #include "palpate/fem/materials.hpp"
 
 namespace palpate::estimation {
@@ -28,9 +30,9 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
     // Both meshes integrate alike: as the fit did, or as this ratio alone asks for.
     auto statics = statics_options(copy, body, options);
     if (!kept) {
-      copy.model.poisson_fixed = optimum.unknowns(poisson);
+      // By its bounds: were it said to be known, regions would lose the nu of their own.
       copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
-      if (!linear) statics = statics_options(copy, body, options);
+      if (!linear) statics = statics_options(body, options, highest_poisson(objective.unknowns(), optimum.unknowns));
     }
     body.material = "linear";
     statics.loads_expected = static_cast<int>(all.steps.size());
@@ -40,9 +42,10 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
     // The change is a per cent itself: a few ratios are enough.
     ForwardModel model(*held, std::move(body), unknowns, statics, kept && *solved ? *solved : objective.model().surface_modes(), 1e-3);
     if (kept) *solved = model.solved();
+    const VectorX at = values_by_name(unknowns, objective.unknowns(), optimum.unknowns);
     std::vector<StepPrediction> predicted(model.step_count());
     for (std::size_t s = 0; s < model.step_count(); ++s) {
-      if (all.steps[s] != 0) predicted[s] = model.predict(s, optimum.unknowns, false);
+      if (all.steps[s] != 0) predicted[s] = model.predict(s, at, false);
     }
     load_cases += model.load_cases();
     return predicted;

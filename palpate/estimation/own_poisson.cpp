@@ -36,6 +36,12 @@ Parameter cut_normal(double mean, double std, double lower, double upper, const 
   return out;
 }
 
+double highest_poisson(const Unknowns& unknowns, const VectorX& at) {
+  double highest = at(poisson);
+  for (int k = unknowns.first_own_poisson(); k < unknowns.parameter_count(); ++k) highest = std::max(highest, at(k));
+  return highest;
+}
+
 void OwnPoisson::move(const AnswerShift& shift) {
   if (shift.region_poisson.size() == mean.size()) mean += shift.region_poisson;
 }

@@ -27,6 +27,9 @@ struct OwnPoisson {
 /// @param covariance  of the unknowns `moving`, nu among them
 OwnPoisson own_poisson(const Unknowns& unknowns, const VectorX& optimum, const MatrixX& covariance, const std::vector<int>& moving);
 
+/// The highest nu of all regions.
+double highest_poisson(const Unknowns& unknowns, const VectorX& at);
+
 /// A normal number that is known to lie between two bounds, as a Poisson ratio of a region.
 Parameter cut_normal(double mean, double std, double lower, double upper, const std::string& region);
 

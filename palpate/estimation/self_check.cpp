@@ -312,7 +312,7 @@ Tool touching_tool(const Recording& recording) {
   return {};
 }
 
-void judge(const Problem& p, SelfCheck& check) {
+void judge(const Problem& p, double dof, SelfCheck& check) {
   std::map<std::string, std::string> said;
   for (const auto& error : check.errors) {
     if (error.consistent) continue;
@@ -348,7 +348,7 @@ void judge(const Problem& p, SelfCheck& check) {
     said["hand_eye_not_determined"] =
         p.views.empty() ? "no depth images: the camera's place cannot be checked"
                         : "the surface that is seen can slide along itself: show the camera three faces of the body";
-  if (check.chi2_per_dof > 1.5)
+  if (check.chi2_per_dof > 1.5 + 4 * std::sqrt(2 / dof))  // few rows scatter
     said["does_not_fit"] =
         "what is left is larger than the stated sigmas allow: the body gives way elsewhere, it is not where the recording "
         "says, or a sigma is too small";
@@ -402,8 +402,14 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   for (const double r : left.travel) chi2 += r * r;
   for (const double r : left.touch) chi2 += r * r;
   for (const double r : left.ray) chi2 += std::abs(r) < tukey_cut ? r * r : 0;  // as they are counted
-  const double rows = static_cast<double>(left.travel.size() + left.touch.size() + left.rays_hit);
-  check.chi2_per_dof = chi2 / std::max(1.0, rows - static_cast<double>(moving.size()));
+  // A prior is a row, too: what moves under one costs no degree of freedom, and its pull counts.
+  double dof = static_cast<double>(left.travel.size() + left.touch.size() + left.rays_hit);
+  for (const int k : moving) {
+    if (std::isfinite(p.prior_std(k))) chi2 += std::pow(x(k) / p.prior_std(k), 2);
+    else --dof;
+  }
+  dof = std::max(1.0, dof);
+  check.chi2_per_dof = chi2 / dof;
   check.travels = left.travel.size();
   check.touches = left.touch.size();
   check.rays = left.rays_hit;
@@ -416,9 +422,9 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
       pose_std_m = std::max(pose_std_m, std::get<RayObservation>(*rays).pose_std_m);
       pose_std_rad = std::max(pose_std_rad, std::get<RayObservation>(*rays).pose_std_rad);
     }
-  const auto add = [&](const std::string& name, const std::string& unit, int k, double stated, double offset = 0) {
+  const auto add = [&](const std::string& name, const std::string& unit, int k, double stated, double offset = 0) -> CheckedError* {
     const auto column = std::find(moving.begin(), moving.end(), k);
-    if (column == moving.end()) return;
+    if (column == moving.end()) return nullptr;  // exactly known
     const auto c = static_cast<Index>(column - moving.begin());
     CheckedError error{name, unit};
     error.value = x(k) - offset;
@@ -428,7 +434,7 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
     error.stated_std = stated;
     error.determined = error.std < 0.3 * p.prior_std(k);
     error.consistent = !error.determined || std::abs(error.value) <= alarm * std::hypot(error.std, stated);
-    check.errors.push_back(error);
+    return &check.errors.emplace_back(error);
   };
   add("force_scale", "1", scale, recording.force_scale_std);
   const Tool tool = touching_tool(recording);
@@ -438,13 +444,11 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   for (int d = 0; d < 3; ++d) add(std::string("hand_eye_rotation_") + axes[d], "rad", camera_turn + d, pose_std_rad);
   for (std::size_t k = 0; k < recording.pushes.size(); ++k) {
     // Its prior is what the recording states: it is told by its pull.
-    add("force_tare[" + recording.pushes[k].name + "]", "N", p.tare(k), recording.pushes[k].force_tare_std_n);
-    if (!check.errors.empty() && check.errors.back().name.starts_with("force_tare")) {
-      CheckedError& error = check.errors.back();
-      error.consistent = std::abs(error.value) <= alarm * recording.pushes[k].force_tare_std_n;
-    }
+    const double stated = recording.pushes[k].force_tare_std_n;
+    CheckedError* const tare = add("force_tare[" + recording.pushes[k].name + "]", "N", p.tare(k), stated);
+    if (tare != nullptr) tare->consistent = std::abs(tare->value) <= alarm * stated;
   }
-  judge(p, check);
+  judge(p, dof, check);
   return check;
 }
 

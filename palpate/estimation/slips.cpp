@@ -53,6 +53,7 @@ std::vector<Stretch> stretches(const Objective& objective, const Optimum& optimu
     SaidByStep one{at.step, said.information(factor)(Eigen::all, now.those), said.gradient(now.those)};
     for (std::size_t j = 0; j < now.those.size(); ++j) {
       const int k = now.those[j];
+      if (unknowns[k].fixed) continue;  // no prior was added: Objective::add_priors
       const double precision = std::pow(unknowns[k].prior_std, -2);
       one.information(k, static_cast<Index>(j)) -= precision;
       one.gradient(static_cast<Index>(j)) -= precision * (optimum.unknowns(k) - unknowns[k].prior_mean);

@@ -34,7 +34,7 @@ std::optional<Asked> asked_by(const Objective& objective, const Optimum& optimum
   MatrixX hessian = evaluation.information(factor);
   VectorX gradient = evaluation.gradient;
   for (int k : about) {  // the data alone
-    if (!std::isfinite(unknowns[k].prior_std)) continue;
+    if (!std::isfinite(unknowns[k].prior_std) || unknowns[k].fixed) continue;  // no prior was added: Objective::add_priors
     const double precision = 1 / (unknowns[k].prior_std * unknowns[k].prior_std);
     hessian(k, k) -= precision;
     gradient(k) -= precision * (optimum.unknowns(k) - unknowns[k].prior_mean);
@@ -92,10 +92,22 @@ std::optional<StepChange> largest_change(const std::vector<Told>& told) {
   return best;
 }
 
-/// The more significant of the pushes' changes.
-void keep_rarest(std::optional<StepChange>& rarest, const std::optional<StepChange>& other) {
-  if (other && (!rarest || other->p_value < rarest->p_value)) rarest = other;
-}
+/// The most significant of what was asked. Of many one looks rare by chance: as often as all of them together are asked.
+struct Rarest {
+  std::optional<StepChange> one;
+  int asked = 0;
+
+  void ask(const std::optional<StepChange>& other) {
+    if (!other) return;
+    ++asked;
+    if (!one || other->p_value < one->p_value) one = other;
+  }
+  std::optional<StepChange> of_all() const {
+    std::optional<StepChange> out = one;
+    if (out) out->p_value = std::min(1.0, asked * out->p_value);
+    return out;
+  }
+};
 
 std::optional<int> unknown_named(const Unknowns& unknowns, const std::string& name) {
   for (int k = 0; k < unknowns.size(); ++k) {
@@ -121,9 +133,9 @@ std::optional<StepChange> contact_slip(const Objective& objective, const Optimum
     const auto asked = asked_by(objective, optimum, s, {*first, *first + 1}, factor);
     if (asked) pushes[model.index(s).push].push_back({s, asked->change, asked->covariance});
   }
-  std::optional<StepChange> rarest;
-  for (const auto& [push, told] : pushes) keep_rarest(rarest, largest_change(told));
-  return rarest;
+  Rarest rarest;
+  for (const auto& [push, told] : pushes) rarest.ask(largest_change(told));
+  return rarest.of_all();
 }
 
 std::optional<StepChange> object_motion(const Objective& objective, const Optimum& optimum) {
@@ -136,9 +148,9 @@ std::optional<StepChange> object_motion(const Objective& objective, const Optimu
     const double std_m = objective.unknowns()[*first].prior_std;
     pushes[model.index(s).push].push_back({s, optimum.unknowns.segment<3>(*first), std_m * std_m * MatrixX::Identity(3, 3)});
   }
-  std::optional<StepChange> rarest;
-  for (const auto& [push, told] : pushes) keep_rarest(rarest, largest_change(told));
-  return rarest;
+  Rarest rarest;
+  for (const auto& [push, told] : pushes) rarest.ask(largest_change(told));
+  return rarest.of_all();
 }
 
 std::optional<StepChange> settling(const Objective& objective, const Optimum& optimum, double factor) {
@@ -149,7 +161,7 @@ std::optional<StepChange> settling(const Objective& objective, const Optimum& op
     for (const Load& load : model.step(s).loads) sum += load.force_n.value_or(Vec3::Zero());
     return sum;
   };
-  std::optional<StepChange> rarest;
+  Rarest rarest;
   for (std::size_t from = 0; from < model.step_count(); ++from) {
     const Vec3 held_n = force_n(from);
     if (held_n.norm() == 0 || !has_rows(objective, from)) continue;
@@ -163,11 +175,11 @@ std::optional<StepChange> settling(const Objective& objective, const Optimum& op
     if (one && other) {
       const double fell = one->change(0) - other->change(0);
       const double deviate = fell / std::sqrt(one->covariance(0, 0) + other->covariance(0, 0));
-      keep_rarest(rarest, StepChange{last, 1 - std::exp(-fell), 0.5 * std::erfc(deviate / std::sqrt(2.0))});
+      rarest.ask(StepChange{last, 1 - std::exp(-fell), 0.5 * std::erfc(deviate / std::sqrt(2.0))});
     }
     from = last;
   }
-  return rarest;
+  return rarest.of_all();
 }
 
 Pattern residual_pattern(const Objective& objective, const Loss& loss) {

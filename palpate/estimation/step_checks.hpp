@@ -15,7 +15,7 @@ namespace palpate::estimation {
 struct StepChange {
   std::size_t step = 0;  ///< of the model: the first one after the change
   double size = 0;       ///< m; of settling: the share by which E fell
-  double p_value = 1;    ///< chance of a change at least as large in a recording without one, over all places where it may be
+  double p_value = 1;    ///< chance of a change at least as large in a recording without one, over all its pushes and places where it may be
 };
 
 /// The contact of a push was elsewhere before a step than from it on: the shift that each step asks for by itself, frames free

@@ -10,6 +10,8 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/own_poisson.hpp"
+#include "palpate/estimation/unknown_names.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
@@ -110,7 +112,9 @@ std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& a
                                         const FitOptions& options, SolveCount* solved) {
   constexpr double little = 0.2;  // of a standard deviation: far enough to be told from rounding, near enough to be linear
   Recording copy = recording;
-  copy.model.poisson_fixed = copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
+  // By its bounds: were it said to be known, regions would lose the nu of their own.
+  copy.model.poisson_lower = copy.model.poisson_upper = optimum.unknowns(poisson);
+  const fem::StaticsOptions statics = statics_options(object, options, highest_poisson(objective.unknowns(), optimum.unknowns));
   copy.supports = held_both_ways(std::move(copy.supports));
   SolveCount nobody_asks;
   const auto predicted = [&](const TetMesh& mesh) {
@@ -118,11 +122,12 @@ std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& a
     body.mesh = mesh;
     body.material = "linear";
     Unknowns unknowns;
-    ForwardModel model(copy, std::move(body), unknowns, statics_options(copy, object, options), objective.model().surface_modes(), 1e-3);
+    ForwardModel model(copy, std::move(body), unknowns, statics, objective.model().surface_modes(), 1e-3);
+    const VectorX at = values_by_name(unknowns, objective.unknowns(), optimum.unknowns);
     const CountsAtEnd counts(model, solved != nullptr ? *solved : nobody_asks);
     std::vector<StepPrediction> out(model.step_count());
     for (std::size_t s = 0; s < out.size(); ++s) {
-      if (objective.sees(s)) out[s] = model.predict(s, optimum.unknowns);
+      if (objective.sees(s)) out[s] = model.predict(s, at);
       if (objective.sees(s) && !out[s].converged) throw Error(out[s].reason, "unseen side");
     }
     return out;

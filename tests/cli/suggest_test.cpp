@@ -70,6 +70,60 @@ class Suggest : public testing::Test {
   const std::string folder_ = (files_ / "box").string();
 };
 
+// An unloaded step says little of the sensors, and the encoder may have been read in another step than the first one under load.
+TEST(SuggestSensors, ErrorsAreThoseOfStepsThatHaveThem) {
+  Recording recording = box_on_table();
+  Tool base = recording.tools[0];
+  base.name = "base";
+  recording.tools.push_back(base);
+  Load nothing;
+  nothing.tool = "stick";
+  nothing.contact_m = Vec3(0.55, 0, 0.09);
+  nothing.direction = -Vec3::UnitZ();
+  nothing.force_n = Vec3::Zero();
+  Load beside = nothing, pressing = nothing;
+  beside.tool = "base";
+  pressing.force_n = Vec3(0, 0, -2);
+  pressing.force_std_n = 0.04;
+  pressing.force_relative_std = 0.01;
+  pressing.contact_std_m = 0.002;
+  ToolTravel travel;
+  travel.tool = "stick";
+  travel.sigma_m = 7e-5;
+  Push push;
+  push.name = "down";
+  push.force_tare_std_n = 0.02;
+  push.travel_offset_std_m = 3e-4;
+  push.steps.resize(3);
+  push.steps[0].loads = {nothing};
+  push.steps[1].loads = {beside, pressing};
+  push.steps[2].loads = {beside, pressing};
+  push.steps[2].observations = {travel};
+  recording.pushes = {push};
+  SuggestOptions options;
+  options.tool = "stick";
+  options.candidates.contacts = 2;
+  options.candidates.tilts = 1;
+  const estimation::SensorPlan sensors = prepare_pushes(recording, options).sensors;
+  EXPECT_EQ(sensors.force_std_n, 0.04);
+  EXPECT_EQ(sensors.force_relative_std, 0.01);
+  EXPECT_EQ(sensors.contact_std_m, 0.002);
+  EXPECT_EQ(sensors.force_tare_std_n, 0.02);
+  EXPECT_EQ(sensors.travel_offset_std_m, 3e-4);
+  ASSERT_TRUE(sensors.travel_sigma_m);
+  EXPECT_EQ(*sensors.travel_sigma_m, 7e-5);
+
+  // A last push that nobody read a travel of says nothing against the encoder.
+  recording.pushes.push_back(push);
+  recording.pushes[1].name = "again";
+  recording.pushes[1].travel_offset_std_m = 0;
+  recording.pushes[1].steps[2].observations.clear();
+  const estimation::SensorPlan of_both = prepare_pushes(recording, options).sensors;
+  ASSERT_TRUE(of_both.travel_sigma_m);
+  EXPECT_EQ(*of_both.travel_sigma_m, 7e-5);
+  EXPECT_EQ(of_both.travel_offset_std_m, 3e-4) << "of the push that it was read in";
+}
+
 TEST_F(Suggest, OfAnObjectInRegionsEveryPushSaysWhichOfThemItPresses) {
   Recording halves = box_on_table();
   Region left, right;

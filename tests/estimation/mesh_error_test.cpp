@@ -49,6 +49,50 @@ TEST(MeshError, NeedsARoundToolAndAMeshThatItMayRefine) {
   EXPECT_FALSE(finer_model(recording, coarse_block())) << "no tool";
 }
 
+// A fit whose regions have a nu of their own has one unknown more before its nuisances. Where all nu are held at one value it is
+// moved by exactly what moves the fit with one nu for both; and so it is where a foot leans.
+TEST(MeshError, MovesRegionsWithANuOfTheirOwnLikeThoseThatShareOne) {
+  for (const bool linear : {true, false}) {
+    std::vector<AnswerShift> shifts;
+    for (const bool own : {false, true}) {
+      Recording recording = pushed_block_recording();
+      recording.pushes[0].force_tare_std_n = 0.02;
+      recording.model.poisson_by_region = own;
+      const TetMesh corners = kuhn_block(4, 3, 2, block_size_m);
+      recording.rest.volume = corners;
+      recording.rest.surface = SimulatedSurface::boundary_of(corners, nullptr).rest();
+      SimulatedObject object = coarse_block(linear ? "linear" : "neo_hookean");
+      auto finer = finer_model(recording, object);
+      ASSERT_TRUE(finer);
+      put_two_halves(object);
+      put_two_halves(finer->object);
+      PushedBlock truth;
+      truth.free_half = 1.5;
+      Unknowns unknowns;
+      ForwardModel model(recording, object, unknowns);
+      Objective objective(model, clouds_of(truth), unknowns);
+      Optimum at;
+      at.unknowns = unknowns.prior_mean();
+      at.unknowns(log_young) = std::log(truth.young_pa);
+      at.unknowns(poisson) = truth.poisson;
+      at.unknowns(first_ratio) = std::log(truth.free_half);
+      unknowns[poisson].fixed = true;
+      for (int k = unknowns.first_own_poisson(); k < unknowns.parameter_count(); ++k) {
+        at.unknowns(k) = truth.poisson;
+        unknowns[k].fixed = true;
+      }
+      at.evaluation = objective.evaluate(at.unknowns, at.loss);
+      ASSERT_TRUE(at.evaluation.usable);
+      const auto shift = mesh_shift(recording, object, objective, at, at.loss, *finer, {}, {});
+      ASSERT_TRUE(shift);
+      shifts.push_back(*shift);
+    }
+    EXPECT_NE(shifts[0].log_young, 0);
+    EXPECT_NEAR(shifts[1].log_young, shifts[0].log_young, 1e-6 * std::abs(shifts[0].log_young)) << "linear: " << linear;
+    EXPECT_NEAR(shifts[1].region_log_young(0), shifts[0].region_log_young(0), 1e-6 * std::abs(shifts[0].region_log_young(0)));
+  }
+}
+
 /// Normal posterior of (log E, nu) on a grid.
 Posterior normal_posterior(double log_young, double nu, double var_e, double cov, double var_nu) {
   Posterior p;

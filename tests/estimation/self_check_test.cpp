@@ -198,6 +198,47 @@ TEST(SelfCheck, RigsAsStatedPassAndIntervalsHoldTheTruth) {
   EXPECT_LE(alarms, 2);  // a dozen errors at three standard deviations: one good rig in thirty
 }
 
+// Few rows and as many unknowns, all of them with priors: what is left has nearly as many degrees of freedom as there are rows.
+TEST(SelfCheck, RigidRigsAsStatedWithoutImagesFit) {
+  int misfits = 0;
+  double sum = 0;
+  constexpr int rigs = 40;
+  for (unsigned seed = 1; seed <= rigs; ++seed) {
+    Rig rig;
+    rig.seed = seed;
+    rig.images = false;
+    const SelfCheck check = checked(rig);
+    misfits += says(check, "does_not_fit");
+    sum += check.chi2_per_dof;
+  }
+  std::printf("%d of %d good rigs do not fit, chi2 per degree of freedom %.2f\n", misfits, rigs, sum / rigs);
+  EXPECT_EQ(misfits, 0);
+  EXPECT_NEAR(sum / rigs, 0.9, 0.2);  // what is stated with room to spare takes a little
+}
+
+TEST(SelfCheck, ATravelThatScattersDoesNotFit) {
+  Rig rig;
+  rig.images = false;
+  Measured rigged = measured(rig);
+  int k = 0;
+  for (Push& push : rigged.recording.pushes)
+    for (Step& step : push.steps)
+      for (Observation& one : step.observations) std::get<ToolTravel>(one).travel_m += (++k % 2 ? 4e-4 : -4e-4);
+  EXPECT_TRUE(says(self_check(rigged.recording, rigged.body, rigged.inputs, {}), "does_not_fit"));
+}
+
+// It has no entry, and the one before it is not judged in its place.
+TEST(SelfCheck, APushWithoutATareCondemnsNoOther) {
+  Rig rig;
+  Measured rigged = measured(rig);
+  for (const std::size_t exact : {1u, 3u}) rigged.recording.pushes[exact].force_tare_std_n = 0;
+  const SelfCheck check = self_check(rigged.recording, rigged.body, rigged.inputs, {});
+  EXPECT_TRUE(error_named(check, "force_tare[push 1]").consistent);
+  EXPECT_TRUE(error_named(check, "force_tare[push 3]").consistent);
+  EXPECT_THROW(error_named(check, "force_tare[push 2]"), std::runtime_error);
+  EXPECT_FALSE(says(check, "force_tare_off"));
+}
+
 TEST(SelfCheck, StatedComplianceIsNotAnError) {
   Rig rig;
   rig.compliance_m_per_n = 1.5e-4;

@@ -28,6 +28,7 @@ Recording stated() {
 struct Truth {
   std::string material = "linear";
   double free_half = 1;  ///< stiffness of x > 30 mm over that of the rest
+  double read_sigma_m = travel_sigma_m, zero_std_m = 2e-4;  ///< of a travel
 };
 
 struct Slid {
@@ -56,13 +57,13 @@ Slid slid(unsigned seed, double aside_m, double deeper_m, const Recording& as_st
   at(poisson) = truth.poisson;
   std::mt19937 random(seed + 100);
   std::normal_distribution<double> normal;
-  const double zero_m = 2e-4 * normal(random);
+  const double zero_m = stuff.zero_std_m * normal(random);
   for (std::size_t s = 0; s < out.inputs.size(); ++s) {
     const StepIndex of = model.index(s);
     ToolTravel travel;
     travel.tool = "finger";
-    travel.sigma_m = travel_sigma_m;
-    travel.travel_m = model.predict(s, at, false).travel_m(0) + zero_m + (of.step >= slips_at ? deeper_m : 0) + travel_sigma_m * normal(random);
+    travel.sigma_m = stuff.read_sigma_m;
+    travel.travel_m = model.predict(s, at, false).travel_m(0) + zero_m + (of.step >= slips_at ? deeper_m : 0) + stuff.read_sigma_m * normal(random);
     out.inputs[s].emplace_back(travel);
     out.recording.pushes[of.push].steps[of.step].observations.emplace_back(travel);
   }
@@ -118,9 +119,9 @@ Slid slid_by_calculix(unsigned seed, double aside_m, double deeper_m) {
   return out;
 }
 
-Identification fitted(const Recording& recording, const Inputs& inputs) {
+Identification fitted(const Recording& recording, const Inputs& inputs, bool checks = false) {
   FitOptions options;
-  options.cross_checks = options.stresses = false;
+  options.cross_checks = checks, options.stresses = false;
   options.find_slips = true;
   return fit(recording, simulated(fem::to_quadratic(kuhn_block(6, 4, 3, block_size_m)), "linear"), inputs, options);
 }
@@ -210,6 +211,19 @@ TEST(Slips, AreNotInventedWhereThereAreNone) {
     const Slid push = slid(seed, 0, 0);
     const Identification answer = fitted(push.recording, push.inputs);
     EXPECT_FALSE(answer.slip) << "seed " << seed << ": step " << answer.slip->step << ", p " << answer.slip->p_value;
+  }
+}
+
+// A zero that is stated as exact has no prior in the fit: none may be taken off what its steps say of it.
+TEST(Slips, AreToldAlikeWhereTheZeroOfTheTravelIsExact) {
+  Recording exact = stated();
+  exact.pushes[0].travel_offset_std_m = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Slid push = slid(seed, 0, 0, exact, {"linear", 1, 4.6e-4, 0});
+    const Identification answer = fitted(push.recording, push.inputs, true);
+    EXPECT_FALSE(answer.slip) << "seed " << seed << ": step " << answer.slip->step << ", chi2 " << answer.slip->chi2;
+    const Slid deeper = slid(seed, 0, 0.003, exact, {"linear", 1, 6e-4, 0});
+    EXPECT_TRUE(fitted(deeper.recording, deeper.inputs, true).slip) << "seed " << seed;
   }
 }
 

@@ -90,6 +90,79 @@ TEST(StepChecks, AContactThatSlips) {
   }
 }
 
+// What the steps say is asked without the contact's prior, which is part of their sum only where the contact is fitted.
+TEST(StepChecks, AContactThatIsHeldIsAskedTheSame) {
+  const Recording recording = six_loads();
+  Recording slipped = recording;
+  for (Step& step : slipped.pushes[0].steps) step.loads[0].contact_m += Vec3(-0.006, 0, 0);
+  const PushedBlock truth = linear_block();
+  const Inputs inputs = changed(clouds_of(truth, recording), clouds_of(truth, slipped), 3);
+  Unknowns unknowns;
+  ForwardModel model(recording, coarse_block("linear"), unknowns);
+  Objective objective(model, inputs, unknowns);
+  const auto asked = [&](bool held) {
+    for (const int k : unknowns.named({"contact_shift[down]_1", "contact_shift[down]_2"})) unknowns[k].fixed = held;
+    Optimum at;
+    at.unknowns = unknowns.prior_mean();
+    at.unknowns(log_young) = std::log(truth.young_pa);
+    at.unknowns(poisson) = truth.poisson;
+    at.evaluation = objective.evaluate(at.unknowns, at.loss);
+    return contact_slip(objective, at, 1);
+  };
+  const auto fitted = asked(false), held = asked(true);
+  ASSERT_TRUE(fitted && held);
+  EXPECT_EQ(held->step, fitted->step);
+  EXPECT_NEAR(held->size, fitted->size, 1e-9 * fitted->size);
+  EXPECT_NEAR(std::log(held->p_value), std::log(fitted->p_value), 1e-6);
+}
+
+// Of many pushes without a fault one looks worst: a chance is that of the recording, not of the push.
+TEST(StepChecks, ChancesAreOverAllPushes) {
+  const PushedBlock truth = linear_block();
+  PushedBlock softer = truth;
+  softer.young_pa *= 0.9;
+  Recording slipped = six_loads();
+  for (Step& step : slipped.pushes[0].steps) step.loads[0].contact_m += Vec3(-0.002, 0, 0);
+  const Inputs slips = changed(clouds_of(truth, six_loads()), clouds_of(truth, slipped), 3);
+  const Inputs settles = changed(clouds_of(truth, six_loads(true)), clouds_of(softer, six_loads(true)), 3);
+  struct Found {
+    std::optional<StepChange> slip, motion, settled;
+  };
+  const auto found = [&](int pushes, bool same_force) {
+    Recording recording = six_loads(same_force);
+    const Push like = recording.pushes[0];
+    recording.pushes.clear();
+    Inputs inputs;
+    for (int p = 0; p < pushes; ++p) {
+      recording.pushes.push_back(like);
+      recording.pushes.back().name = "push " + std::to_string(p);
+      for (const auto& step : same_force ? settles : slips) inputs.push_back(step);
+    }
+    for (auto& step : inputs) std::get<PointCloud>(step[0]).pose_std_m = 5e-4;
+    Unknowns unknowns;
+    ForwardModel model(recording, coarse_block("linear"), unknowns);
+    Objective objective(model, inputs, unknowns);
+    Optimum at;
+    at.unknowns = unknowns.prior_mean();
+    at.unknowns(log_young) = std::log(truth.young_pa);
+    at.unknowns(poisson) = truth.poisson;
+    for (int p = 0; p < pushes; ++p)  // where the fit ended
+      for (std::size_t s = 3; s < steps; ++s)
+        at.unknowns(unknowns.named({"frame_x[push " + std::to_string(p) + ":" + std::to_string(s) + "]"}).at(0)) = 2e-3;
+    at.evaluation = objective.evaluate(at.unknowns, at.loss);
+    return Found{contact_slip(objective, at, 1), object_motion(objective, at), settling(objective, at, 1)};
+  };
+  constexpr int many = 5;
+  const Found one = found(1, false), all = found(many, false);
+  ASSERT_TRUE(one.slip && all.slip && one.motion && all.motion);
+  EXPECT_NEAR(all.slip->p_value / one.slip->p_value, many, 1e-6);
+  EXPECT_NEAR(all.motion->p_value / one.motion->p_value, many, 1e-6);
+  const Found held = found(1, true), held_often = found(many, true);
+  ASSERT_TRUE(held.settled && held_often.settled);
+  ASSERT_LT(held.settled->p_value, 0.1);
+  EXPECT_NEAR(held_often.settled->p_value / held.settled->p_value, many, 1e-6);
+}
+
 TEST(StepChecks, AnObjectThatWasMoved) {
   PushedBlock truth = linear_block(), moved = truth;
   moved.clamp.translation_m = Vec3(0.002, 0.0015, 0.001);

@@ -157,5 +157,39 @@ TEST(UnseenModes, AMillimetreDoesWhatAFitWithThatMillimetreSays) {
   EXPECT_NEAR(leans, leaning, 0.3 * leaning);
 }
 
+// Nuisances stand one place further on where regions have a nu of their own: with all nu held at one value the modes say the same.
+TEST(UnseenModes, RegionsMayHaveANuOfTheirOwn) {
+  std::vector<UnseenModes> said;
+  for (const bool own : {false, true}) {
+    Seen data = seen_from_above(6e-4);
+    data.recording.model.poisson_fixed.reset();
+    data.recording.model.poisson_by_region = own;
+    data.recording.pushes[0].force_tare_std_n = 0.02;
+    SimulatedObject block = block_from(0.002);
+    put_two_halves(block);
+    Unknowns unknowns;
+    ForwardModel model(data.recording, block, unknowns);
+    Objective objective(model, data.inputs, unknowns);
+    Optimum at;
+    at.unknowns = unknowns.prior_mean();
+    at.unknowns(log_young) = std::log(true_pa);
+    for (int k = 0; k < unknowns.parameter_count(); ++k) {
+      if (k != poisson && k < unknowns.first_own_poisson()) continue;
+      at.unknowns(k) = 0.3;
+      unknowns[k].fixed = true;
+    }
+    at.evaluation = objective.evaluate(at.unknowns, at.loss);
+    ASSERT_TRUE(at.evaluation.usable);
+    const auto modes =
+        unseen_modes(underside(block), VectorX::Zero(unseen_mode_count), data.recording, block, objective, at, at.loss, 1, {}, nullptr);
+    ASSERT_TRUE(modes);
+    said.push_back(*modes);
+  }
+  EXPECT_GT(said[0].gain, 1);
+  EXPECT_NEAR(said[1].gain, said[0].gain, 1e-6 * said[0].gain);
+  EXPECT_LT((said[1].amounts - said[0].amounts).norm(), 1e-6 * said[0].amounts.norm());
+  EXPECT_NEAR(said[1].change(log_young), said[0].change(log_young), 1e-6 * std::abs(said[0].change(log_young)));
+}
+
 }  // namespace
 }  // namespace palpate::estimation

@@ -61,6 +61,66 @@ TEST(OnlineEstimator, KnowsMoreAfterEveryStepAndEndsWhereIdentifyDoes) {
   }
 }
 
+/// A glued block under a disc of 12 mm whose contact point is stated off its surface.
+Recording glued_block(double stated_above_m) {
+  Recording recording = estimation::glued_block_recording({Vec3(0, 0, -0.8), Vec3(0, 0, -1.6), Vec3(0, 0, -2.4)}, 0.028, 0.02);
+  recording.model.material = "linear";
+  estimation::PushedBlock truth;
+  truth.material = "linear";
+  const estimation::Inputs clouds = estimation::clouds_of(truth, recording);
+  for (std::size_t s = 0; s < clouds.size(); ++s) {
+    Step& step = recording.pushes[0].steps[s];
+    step.observations = {std::get<PointCloud>(clouds[s][0])};
+    step.loads[0].contact_m.z() += stated_above_m;
+  }
+  recording.rest.volume = estimation::kuhn_block(4, 3, 2, estimation::block_size_m);
+  recording.model.refine = "none";
+  return recording;
+}
+
+OnlineEstimator before_the_first_step(Recording recording) {
+  Push push = recording.pushes[0];
+  push.steps.clear();
+  recording.pushes.clear();
+  IdentifyOptions options;
+  options.fit.cross_checks = options.fit.stresses = false;
+  OnlineEstimator online(recording, options);
+  online.begin(push);
+  return online;
+}
+
+// What the recording says of contacts is taken by a running estimate as `identify` takes it, and stays so with every further step.
+TEST(OnlineEstimator, ContactsLieOnTheSurface) {
+  const Recording whole = glued_block(0.008);
+  OnlineEstimator online = before_the_first_step(whole);
+  for (const Step& step : whole.pushes[0].steps) online.add(step);
+  const Parameter running = online.estimate().parameters.at(0), end = online.answer().answer.parameters.at(0);
+  EXPECT_NEAR(running.value, end.value, 0.1 * end.std);
+  EXPECT_EQ(online.recording().pushes[0].steps[0].loads[0].contact_m.z(), whole.pushes[0].steps[0].loads[0].contact_m.z()) << "as it was given";
+}
+
+TEST(OnlineEstimator, RefusesAContactThatIsFurtherOffThanTheToolIsWide) {
+  const Recording whole = glued_block(0), off = glued_block(0.02);
+  OnlineEstimator online = before_the_first_step(whole);
+  online.add(whole.pushes[0].steps[0]);
+  EXPECT_THROW(online.add(off.pushes[0].steps[1]), Error);
+  EXPECT_EQ(online.recording().pushes[0].steps.size(), 1u);
+  EXPECT_EQ(online.add(whole.pushes[0].steps[1]).parameters.size(), 2u);
+  EXPECT_EQ(online.recording().pushes[0].steps.size(), 2u);
+}
+
+TEST(OnlineEstimator, AToolThatSlippedTouchesElsewhereFromThereOn) {
+  Recording whole = glued_block(0);
+  whole.pushes[0].steps[1].slipped = true;
+  OnlineEstimator online = before_the_first_step(whole);
+  for (const Step& step : whole.pushes[0].steps) online.add(step);
+  const auto shifts = [](const std::vector<Nuisance>& all) {
+    return std::count_if(all.begin(), all.end(), [](const Nuisance& one) { return one.name.rfind("contact_shift[down, slipped]", 0) == 0; });
+  };
+  EXPECT_EQ(shifts(online.estimate().nuisances), 2);
+  EXPECT_EQ(shifts(online.answer().answer.nuisances), 2);
+}
+
 /// What a fixed camera's calibration errs by does not average out over steps, online or not.
 class SeenByOneCamera : public testing::Test {
  protected:
