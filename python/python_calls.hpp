@@ -24,6 +24,18 @@ class PythonProgress {
     if (raised_) std::rethrow_exception(raised_);
   }
 
+  /// Calls Python for the library, which knows faults only. Ctrl-C and sys.exit() that come out of it are none: go_on() is false from then on.
+  template <typename Act>
+  auto call(Act&& act) {
+    const py::gil_scoped_acquire lock;
+    try {
+      return act();
+    } catch (const py::error_already_set& raised) {
+      if (!raised_ && !raised.matches(PyExc_Exception)) raised_ = std::current_exception();
+      throw;
+    }
+  }
+
  private:
   bool told(std::string_view stage, double share) {
     if (raised_) return false;

@@ -12,55 +12,56 @@
 namespace palpate::python {
 namespace {
 
-/// The library asks without Python's lock; every call takes it. What Python raises goes through the library, which stops the robot first.
+/// What Python raises goes through the library, which stops the robot first, and takes its tip away where the robot was at fault.
 class PythonRobot : public acquisition::Robot {
  public:
-  explicit PythonRobot(py::object robot) : robot_(std::move(robot)) {
+  PythonRobot(py::object robot, PythonProgress& asks) : robot_(std::move(robot)), asks_(asks) {
     for (const char* call : {"read", "move", "stop", "take_depth_image", "wait", "travel_sigma_m"})
       if (!py::hasattr(robot_, call)) throw Error(std::string("has no `") + call + "`: derive it from palpate.Robot", "robot");
     travel_sigma_m_ = from_python<double>(robot_.attr("travel_sigma_m"), Place("robot.travel_sigma_m"));
   }
   acquisition::RobotState read() override {
-    const py::gil_scoped_acquire lock;
-    auto state = from_python<acquisition::RobotState>(robot_.attr("read")(), Place("robot.read()"));
-    if (!state.force_n.allFinite() || !std::isfinite(state.time_s)) throw Error("holds a number that is not finite", "robot.read()");
-    return state;
+    return asks_.call([&] {
+      auto state = from_python<acquisition::RobotState>(robot_.attr("read")(), Place("robot.read()"));
+      if (!state.force_n.allFinite() || !std::isfinite(state.time_s)) throw Error("holds a number that is not finite", "robot.read()");
+      return state;
+    });
   }
   acquisition::Motion move(const Pose& T_base_tip, double speed_m_s) override {
-    const py::gil_scoped_acquire lock;
-    const py::object moved = robot_.attr("move")(to_python(T_base_tip), speed_m_s);
-    return moved.is_none() || from_python<bool>(moved, Place("robot.move()")) ? acquisition::Motion::done : acquisition::Motion::refused;
+    return asks_.call([&] {
+      const py::object moved = robot_.attr("move")(to_python(T_base_tip), speed_m_s);
+      return moved.is_none() || from_python<bool>(moved, Place("robot.move()")) ? acquisition::Motion::done : acquisition::Motion::refused;
+    });
   }
   void stop() override {
-    const py::gil_scoped_acquire lock;
-    robot_.attr("stop")();
+    asks_.call([&] { robot_.attr("stop")(); });
   }
   DepthFrame take_depth_image() override {
-    const py::gil_scoped_acquire lock;
-    return from_python<DepthFrame>(robot_.attr("take_depth_image")(), Place("robot.take_depth_image()"));
+    return asks_.call([&] { return from_python<DepthFrame>(robot_.attr("take_depth_image")(), Place("robot.take_depth_image()")); });
   }
   void wait(double duration_s) override {
-    const py::gil_scoped_acquire lock;
-    robot_.attr("wait")(duration_s);
+    asks_.call([&] { robot_.attr("wait")(duration_s); });
   }
   double travel_sigma_m() const override { return travel_sigma_m_; }
   acquisition::RobotLimits limits() const override {
-    const py::gil_scoped_acquire lock;
-    if (!py::hasattr(robot_, "limits")) return {};
-    return from_python<acquisition::RobotLimits>(robot_.attr("limits"), Place("robot.limits"));
+    return asks_.call([&] {
+      if (!py::hasattr(robot_, "limits")) return acquisition::RobotLimits{};
+      return from_python<acquisition::RobotLimits>(robot_.attr("limits"), Place("robot.limits"));
+    });
   }
   std::optional<DepthFrame> look(int view, int views) override {
-    const py::gil_scoped_acquire lock;
-    if (!py::hasattr(robot_, "look")) return {};
-    return from_python<std::optional<DepthFrame>>(robot_.attr("look")(view, views), Place("robot.look()"));
+    return asks_.call([&] {
+      if (!py::hasattr(robot_, "look")) return std::optional<DepthFrame>{};
+      return from_python<std::optional<DepthFrame>>(robot_.attr("look")(view, views), Place("robot.look()"));
+    });
   }
   bool reaches(const Pose& T_base_tip) const {
-    const py::gil_scoped_acquire lock;
-    return !py::hasattr(robot_, "reaches") || from_python<bool>(robot_.attr("reaches")(to_python(T_base_tip)), Place("robot.reaches()"));
+    return asks_.call([&] { return !py::hasattr(robot_, "reaches") || from_python<bool>(robot_.attr("reaches")(to_python(T_base_tip)), Place("robot.reaches()")); });
   }
 
  private:
   py::object robot_;
+  PythonProgress& asks_;
   double travel_sigma_m_ = 0;
 };
 
@@ -104,9 +105,10 @@ acquisition::PushPlan plan_of(const Recording& scene, const std::string& tool, c
   return plan;
 }
 
-void tell(const py::object& callable, const Push& push, const Step& step) {
-  const py::gil_scoped_acquire lock;
-  if (!callable.is_none()) callable(push.name, to_python(step));
+void tell(PythonProgress& asks, const py::object& callable, const Push& push, const Step& step) {
+  asks.call([&] {
+    if (!callable.is_none()) callable(push.name, to_python(step));
+  });
 }
 
 LoopPush loop_push(const ExploredPush& push, const PushScene& scene) {
@@ -137,8 +139,8 @@ py::object push_with(const py::object& robot, const py::object& given, const py:
   acquisition::PushPlan plan = plan_of(scene, tool_of(scene, tool), contact_m, direction.normalized());
   plan.name = name.empty() ? "push " + std::to_string(scene.pushes.size() + 1) : name;
   plan.site = site;
-  PythonRobot arm(robot);
   PythonProgress asks(progress);
+  PythonRobot arm(robot, asks);
   Push made;
   acquisition::PushReport report;
   {
@@ -149,7 +151,7 @@ py::object push_with(const py::object& robot, const py::object& given, const py:
         [&](const Push& push, const Step& step) {
           made = push;
           steps.push_back(step);
-          tell(on_step, push, step);
+          tell(asks, on_step, push, step);
         },
         [&] { return asks.go_on(); });
     made.steps = std::move(steps);
@@ -184,7 +186,8 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
   asked.suggest.threads = asked.identify.fit.threads;
   asked.suggest.candidates.seed = asked.seed = static_cast<std::uint64_t>(seed);
   check(asked);
-  PythonRobot arm(robot);
+  PythonProgress asks(progress);
+  PythonRobot arm(robot, asks);
   asked.suggest.candidates.reachable = [&](const Vec3& contact_m, const Vec3& direction) {
     Pose pose = Pose::Identity();
     pose.linear() = acquisition::tip_along(direction);
@@ -199,7 +202,6 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
     cli::must_take_files(path_of(folder));
     kept.emplace(path_of(folder), scene);
   }
-  PythonProgress asks(progress);
   ExploreHooks hooks;
   hooks.plan = [&](const estimation::PushCandidate& at) {
     acquisition::PushPlan plan = plan_of(scene, asked.suggest.tool, at.contact_m, at.direction);
@@ -211,14 +213,15 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
   };
   hooks.on_step = [&](const Push& push, const Step& step) {
     if (kept) kept->add_step(step);
-    tell(on_step, push, step);
+    tell(asks, on_step, push, step);
   };
   hooks.on_push_end = [&](const acquisition::PushReport& report) {
     if (kept && report.drift) kept->end_push(*report.drift);
   };
   hooks.on_push = [&](const ExploredPush& push) {
-    const py::gil_scoped_acquire lock;
-    if (!on_push.is_none()) on_push(push.name, to_python(push.young_moduli), to_python(push.poisson_ratio));
+    asks.call([&] {
+      if (!on_push.is_none()) on_push(push.name, to_python(push.young_moduli), to_python(push.poisson_ratio));
+    });
   };
   hooks.keep_going = [&] { return asks.go_on(); };
   hooks.on_progress = asks.callback();
@@ -239,8 +242,8 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
 }
 
 py::object look_around_with(const py::object& robot, int views) {
-  PythonRobot arm(robot);
   PythonProgress asks{py::none()};
+  PythonRobot arm(robot, asks);
   std::optional<std::vector<DepthFrame>> frames;
   {
     const py::gil_scoped_release unlocked;

@@ -8,7 +8,8 @@ from palpate import _palpate
 class Robot:
     """Derive from it and drive your arm. Poses are 4 x 4, base frame, metres; the tip's z axis points along the tool, into the object.
 
-    What a call raises ends the push: the robot is stopped, and the caller of `push` or `explore` gets it.
+    What a call raises ends the push: the robot is stopped, its tip goes away from the object, and the caller of `push` or `explore` gets it.
+    After KeyboardInterrupt (Ctrl-C) and SystemExit it stands where it was stopped.
 
     travel_sigma_m: standard deviation of the encoders' tip position along a push
     """

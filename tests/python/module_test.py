@@ -9,7 +9,9 @@ import os
 import pathlib
 import pickle
 import re
+import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import unittest
@@ -291,13 +293,47 @@ class Stubborn(Gantry):
         return super().read()
 
 
+class CtrlC(Gantry):
+    """Ctrl-C comes in one of its calls, once it is deep enough in the object."""
+
+    def __init__(self, call):
+        super().__init__()
+        self.call, self.since = call, None  # what was asked of it since then
+
+    def asked(self, call):
+        if self.since is not None:
+            self.since.append(call)
+        elif call == self.call and self.pressed_m() > 0.001:
+            self.since = []
+            signal.raise_signal(signal.SIGINT)
+
+    def read(self):
+        self.asked("read")
+        return super().read()
+
+    def move(self, T_base_tip, speed_m_s):
+        self.asked("move")
+        return super().move(T_base_tip, speed_m_s)
+
+    def wait(self, duration_s):
+        self.asked("wait")
+        super().wait(duration_s)
+
+    def stop(self):
+        self.asked("stop")
+
+
+def explore_once(robot, *folder, **options):
+    """One push down onto a block whose nu is known."""
+    return palpate.explore(robot, block_on_a_table(), *folder, goal="young-modulus", young_modulus_within=0.05, poisson_ratio=0.3, max_pushes=1,
+                           contacts=6, tilts=0, travel_limit_m=0.004, **options)
+
+
 class Robots(unittest.TestCase):
     def test_explores_a_half_space_in_closed_form(self):
         told = []
         with tempfile.TemporaryDirectory() as folder:
-            done = palpate.explore(Gantry(), block_on_a_table(), folder + "/recording", goal="young-modulus", young_modulus_within=0.05,
-                                   poisson_ratio=0.3, max_pushes=1, contacts=6, tilts=0, travel_limit_m=0.004,
-                                   on_push=lambda name, young, poisson: told.append(young[0].value))
+            done = explore_once(Gantry(), folder + "/recording", on_push=lambda name, young, poisson: told.append(young[0].value))
             self.assertTrue(done.reached, done.message)
             young = done.found.answer.young_modulus
             self.assertLess(young.lower_95, 20e3)
@@ -325,15 +361,33 @@ class Robots(unittest.TestCase):
         def broken():
             raise OSError("the cable is out")
 
-        def interrupted():
-            raise KeyboardInterrupt
-        for act, raised in ((broken, OSError), (interrupted, KeyboardInterrupt), (lambda: None, palpate.Error)):
+        for act, raised in ((broken, OSError), (lambda: None, palpate.Error)):
             robot = Stubborn(act)
             with self.assertRaises(raised) as caught:
                 palpate.push(robot, block_on_a_table(), [0.5, 0, 0.5], force_limit_n=1)
             self.assertGreater(robot.stopped, 0)
             self.assertEqual(robot.pressed_m(), 0, "the tip is away from the object")
         self.assertEqual(caught.exception.where, "robot.read()")
+
+    def test_stands_still_after_ctrl_c(self):
+        push = lambda robot, **hooks: palpate.push(robot, block_on_a_table(), [0.5, 0, 0.5], force_limit_n=1, force_step_n=0.25, **hooks)
+        for call in ("move", "read", "wait"):
+            for use in (push, explore_once):
+                robot = CtrlC(call)
+                with self.assertRaises(KeyboardInterrupt):
+                    use(robot)
+                self.assertEqual(robot.since, ["stop"], call)
+                self.assertGreater(robot.pressed_m(), 0, "only the user knows why")
+
+        def asked_to_end(name, step):
+            if robot.pressed_m() > 0:
+                robot.since = []
+                sys.exit("enough")  # as a handler of SIGTERM may
+        for use in (push, explore_once):
+            robot = CtrlC(None)
+            with self.assertRaisesRegex(SystemExit, "enough"):
+                use(robot, on_step=asked_to_end)
+            self.assertEqual(robot.since, ["stop"])
 
     def test_must_have_its_calls(self):
         with self.assertRaisesRegex(palpate.Error, "derive it from palpate.Robot"):
