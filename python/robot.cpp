@@ -2,8 +2,11 @@
 #include "python/robot.hpp"
 
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
+#include "cli/new_folder.hpp"
 #include "cli/paths.hpp"
 #include "palpate/io/recording.hpp"
 #include "python/arguments.hpp"
@@ -111,6 +114,21 @@ void tell(PythonProgress& asks, const py::object& callable, const Push& push, co
   });
 }
 
+/// What `explore` leaves on the disk: nothing, where nothing was recorded.
+struct Kept {
+  Kept(const std::filesystem::path& out, const Recording& scene) : folder(out), recording(out, scene) {}
+  cli::NewFolder folder;
+  io::RecordingWriter recording;
+};
+
+/// @throws Error where something is in it: of a recording that is written over nothing would be left
+void must_be_new(const std::filesystem::path& folder) {
+  cli::must_take_files(folder);
+  std::error_code code;
+  if (std::filesystem::exists(folder, code) && !std::filesystem::is_empty(folder, code))
+    throw Error("is there already; choose another folder or remove it", folder.string());
+}
+
 LoopPush loop_push(const ExploredPush& push, const PushScene& scene) {
   return {push.name, suggested(push.plan, scene), made_push(push.report), push.young_moduli, push.poisson_ratio};
 }
@@ -163,7 +181,8 @@ py::object push_with(const py::object& robot, const py::object& given, const py:
 
 py::object explore_with(const py::object& robot, const py::object& given, const py::object& folder, const py::dict& options, const py::object& on_step,
                         const py::object& on_push, const py::object& progress) {
-  const Recording scene = recording_of(given, "scene");
+  Recording scene = recording_of(given, "scene");
+  scene.pushes.clear();  // of another day; the folder gets those that are made now
   ExploreOptions asked;
   std::string tool, goal = "both";
   int seed = 1;
@@ -197,9 +216,9 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
     }
     return true;
   };
-  std::optional<io::RecordingWriter> kept;
+  std::optional<Kept> kept;
   if (!folder.is_none()) {
-    cli::must_take_files(path_of(folder));
+    must_be_new(path_of(folder));
     kept.emplace(path_of(folder), scene);
   }
   ExploreHooks hooks;
@@ -209,14 +228,17 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
     return plan;
   };
   hooks.on_push_begin = [&](const Push& push) {
-    if (kept) kept->begin_push(push);
+    if (kept) kept->recording.begin_push(push);
   };
   hooks.on_step = [&](const Push& push, const Step& step) {
-    if (kept) kept->add_step(step);
+    if (kept) {
+      kept->recording.add_step(step);
+      kept->folder.keep();
+    }
     tell(asks, on_step, push, step);
   };
   hooks.on_push_end = [&](const acquisition::PushReport& report) {
-    if (kept && report.drift) kept->end_push(*report.drift);
+    if (kept && report.drift) kept->recording.end_push(*report.drift);
   };
   hooks.on_push = [&](const ExploredPush& push) {
     asks.call([&] {

@@ -77,7 +77,8 @@ def explore(robot, scene, folder=None, *, young_modulus_within=0.05, poisson_rat
     """Push, estimate, take the next best push, until the intervals are narrow enough: an Explored.
 
     scene:    a Recording with the object, what holds it, tools and priors
-    folder:   the recording is written there while it is made; a crash loses at most the step in flight
+    folder:   the recording is written there while it is made; a crash loses at most the step in flight. It must not be there yet, or be
+              empty, and is left so where nothing was recorded. Pushes of the scene are not looked at
     young_modulus_within, poisson_ratio_within: half of the 95 % interval, over E; of nu
     levels:   force steps of a push
     goal:     'young-modulus', 'poisson-ratio' or 'both'

@@ -389,6 +389,43 @@ class Robots(unittest.TestCase):
                 use(robot, on_step=asked_to_end)
             self.assertEqual(robot.since, ["stop"])
 
+    def test_leaves_a_recording_that_is_there_as_it_is(self):
+        with tempfile.TemporaryDirectory() as folder:
+            there = folder + "/recording"
+            palpate.write_recording(pressed_block(), there)
+            with self.assertRaises(palpate.Error) as raised:
+                explore_once(Gantry(), there)
+            self.assertEqual(raised.exception.where, there)
+            self.assertIn("is there already", raised.exception.message)
+            self.assertEqual(len(palpate.read_recording(there).pushes[0].steps), len(pressed_block().pushes[0].steps))
+
+    def test_leaves_nothing_where_nothing_was_recorded(self):
+        def broken():
+            raise OSError("the cable is out")
+        with tempfile.TemporaryDirectory() as folder:
+            os.mkdir(folder + "/empty")
+            for name in ("new", "empty"):
+                robot = Stubborn(broken)
+                robot.pressed_m = lambda: 1  # its first reading fails
+                with self.assertRaises(OSError):
+                    explore_once(robot, f"{folder}/{name}")
+            self.assertEqual(os.listdir(folder), ["empty"])
+            self.assertEqual(os.listdir(folder + "/empty"), [])
+            explore_once(Gantry(), folder + "/stopped", progress=lambda stage, share: False)
+            self.assertEqual(os.listdir(folder), ["empty"])
+
+    def test_records_its_own_pushes_only(self):
+        def broken(name, step):
+            raise OSError("the disk is full")
+        scene = block_on_a_table()
+        scene.pushes = [palpate.Push(name="of an earlier day", steps=[palpate.Step()])]
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaises(OSError):
+                palpate.explore(Gantry(), scene, folder, poisson_ratio=0.3, max_pushes=1, contacts=6, tilts=0, on_step=broken)
+            recorded = pathlib.Path(folder, "recording.yaml").read_text()
+            self.assertIn("push 1", recorded)
+            self.assertNotIn("of an earlier day", recorded)
+
     def test_must_have_its_calls(self):
         with self.assertRaisesRegex(palpate.Error, "derive it from palpate.Robot"):
             palpate.push(object(), block_on_a_table(), [0.5, 0, 0.5])
