@@ -22,6 +22,8 @@ class PythonRobot : public acquisition::Robot {
     for (const char* call : {"read", "move", "stop", "take_depth_image", "wait", "travel_sigma_m"})
       if (!py::hasattr(robot_, call)) throw Error(std::string("has no `") + call + "`: derive it from palpate.Robot", "robot");
     travel_sigma_m_ = from_python<double>(robot_.attr("travel_sigma_m"), Place("robot.travel_sigma_m"));
+    if (!(travel_sigma_m_ > 0) || !std::isfinite(travel_sigma_m_))
+      throw Error("must be positive: how well the encoders know where the tip is along a push, in metres", "robot.travel_sigma_m");
   }
   acquisition::RobotState read() override {
     return asks_.call([&] {

@@ -11,7 +11,7 @@ class Robot:
     What a call raises ends the push: the robot is stopped, its tip goes away from the object, and the caller of `push` or `explore` gets it.
     After KeyboardInterrupt (Ctrl-C) and SystemExit it stands where it was stopped.
 
-    travel_sigma_m: standard deviation of the encoders' tip position along a push
+    travel_sigma_m: standard deviation of the encoders' tip position along a push; positive
     """
 
     travel_sigma_m = 0.0005

@@ -426,6 +426,16 @@ class Robots(unittest.TestCase):
             self.assertIn("push 1", recorded)
             self.assertNotIn("of an earlier day", recorded)
 
+    def test_says_how_well_it_knows_its_tip(self):
+        for sigma_m in (0, -1e-4, float("nan"), float("inf")):
+            robot = Gantry()
+            robot.travel_sigma_m = sigma_m
+            for use in (explore_once, lambda robot: palpate.push(robot, block_on_a_table(), [0.5, 0, 0.5])):
+                with self.assertRaises(palpate.Error) as raised:
+                    use(robot)
+                self.assertEqual(raised.exception.where, "robot.travel_sigma_m")
+                self.assertIn("must be positive", raised.exception.message)
+
     def test_must_have_its_calls(self):
         with self.assertRaisesRegex(palpate.Error, "derive it from palpate.Robot"):
             palpate.push(object(), block_on_a_table(), [0.5, 0, 0.5])
