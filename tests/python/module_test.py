@@ -219,6 +219,8 @@ class Refused(unittest.TestCase):
         self.refused(lambda r: setattr(r.model, "material", "rubber"), "recording.model.material", "neo_hookean")
         self.refused(lambda r: setattr(step(r), "T_base_tip", 2 * np.eye(4)), "recording.pushes[0].steps[2].T_base_tip", "rigid transform")
         self.refused(lambda r: setattr(r, "pushes", "all"), "recording.pushes", "list of Push")
+        self.refused(lambda r: setattr(r, "name", os.fsdecode(b"caf\xe9")), "recording.name", "not UTF-8")
+        self.refused(lambda r: setattr(r.tools[0], "shape", "caf\udce9"), "recording.tools[0].shape", "not UTF-8")
 
     def test_as_a_file_would_be(self):
         def upside_down(recording):
@@ -242,6 +244,24 @@ class Refused(unittest.TestCase):
             palpate.identify(pressed_block(), poison_ratio=0.3)
         with self.assertRaisesRegex(palpate.Error, "poisson_range"):
             palpate.identify(pressed_block(), poisson_range=[0.3])
+
+    def test_files_whose_names_are_no_utf_8(self):
+        latin = "café".encode("latin-1")
+        with tempfile.TemporaryDirectory() as folder:
+            palpate.write_recording(pressed_block(), folder + "/recording")
+            index = pathlib.Path(folder, "recording", "recording.yaml")
+            index.write_bytes(index.read_bytes().replace(b"rest.vtu", latin + b".vtu"))
+            with self.assertRaises(palpate.Error) as raised:
+                palpate.read_recording(folder + "/recording")
+            for text in (str(raised.exception), raised.exception.where + raised.exception.message):
+                self.assertIn("caf\ufffd.vtu", text)
+            named = os.path.join(os.fsencode(folder), latin)
+            for name in (named, os.fsdecode(named)):  # as os.listdir() gives it for bytes and for text
+                with self.assertRaisesRegex(palpate.Error, "caf\ufffd"):
+                    palpate.read_recording(name)
+            palpate.write_recording(pressed_block(), os.fsdecode(named))
+            self.assertTrue(os.path.exists(os.path.join(named, b"recording.yaml")))
+            self.assertEqual(len(palpate.read_recording(os.fsdecode(named)).pushes), 1)
 
     def test_a_push_that_nothing_can_make(self):
         found = palpate.identify(pressed_block(), threads=1)
