@@ -162,11 +162,9 @@ py::object push_with(const py::object& robot, const py::object& given, const py:
   PythonProgress asks(progress);
   PythonRobot arm(robot, asks);
   Push made;
-  acquisition::PushReport report;
-  {
-    const py::gil_scoped_release unlocked;
+  const acquisition::PushReport report = without_lock(asks, [&] {
     std::vector<Step> steps;
-    report = acquisition::run_push(
+    acquisition::PushReport of_push = acquisition::run_push(
         arm, plan, asked,
         [&](const Push& push, const Step& step) {
           made = push;
@@ -175,9 +173,9 @@ py::object push_with(const py::object& robot, const py::object& given, const py:
         },
         [&] { return asks.go_on(); });
     made.steps = std::move(steps);
-    if (report.drift) take_off(*report.drift, made);
-  }
-  asks.raise_what_was_raised();
+    if (of_push.drift) take_off(*of_push.drift, made);
+    return of_push;
+  });
   return py::make_tuple(to_python(made), to_python(made_push(report)));
 }
 
@@ -249,31 +247,25 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
   };
   hooks.keep_going = [&] { return asks.go_on(); };
   hooks.on_progress = asks.callback();
-  Loop out;
-  {
-    const py::gil_scoped_release unlocked;
+  const Loop out = without_lock(asks, [&] {
     Explored done = explore(arm, scene, asked, hooks);
-    for (const ExploredPush& push : done.pushes) out.pushes.push_back(loop_push(push, done.scene));
-    out.recording = std::move(done.recording);
-    if (out.recording.source == "scene") out.recording.source.clear();  // it came from nowhere
-    out.found = std::move(done.identified);
-    out.fruitless = done.fruitless;
-    out.reached = done.reached;
-    out.message = std::move(done.message);
-  }
-  asks.raise_what_was_raised();
+    Loop told;
+    for (const ExploredPush& push : done.pushes) told.pushes.push_back(loop_push(push, done.scene));
+    told.recording = std::move(done.recording);
+    if (told.recording.source == "scene") told.recording.source.clear();  // it came from nowhere
+    told.found = std::move(done.identified);
+    told.fruitless = done.fruitless;
+    told.reached = done.reached;
+    told.message = std::move(done.message);
+    return told;
+  });
   return to_python(out);
 }
 
 py::object look_around_with(const py::object& robot, int views) {
   PythonProgress asks{py::none()};
   PythonRobot arm(robot, asks);
-  std::optional<std::vector<DepthFrame>> frames;
-  {
-    const py::gil_scoped_release unlocked;
-    frames = acquisition::look_around(arm, views, [&] { return asks.go_on(); });
-  }
-  asks.raise_what_was_raised();
+  const auto frames = without_lock(asks, [&] { return acquisition::look_around(arm, views, [&] { return asks.go_on(); }); });
   if (!frames) throw Error("does not carry its camera around: it has no `look`, or that gives None", "robot");
   return to_python(*frames);
 }

@@ -66,7 +66,7 @@ def push(robot, scene, contact_m, direction=(0, 0, -1), *, tool=None, name="", s
     scene:    a Recording with the object, what holds it, and tools
     tool:     a name of scene.tools (its first)
     on_step:  called with (name of the push, Step) after each
-    progress: called with nothing to tell now and then; KeyboardInterrupt stops the robot
+    progress: called with ("push", 0) between motions; where it returns False the robot stops where it is, as after KeyboardInterrupt
     """
     options.update(contact_m=contact_m, direction=direction, tool=tool, name=name, site=site)
     return _palpate.push(robot, scene, options, on_step, progress)
@@ -84,7 +84,7 @@ def explore(robot, scene, folder=None, *, young_modulus_within=0.05, poisson_rat
     goal:     'young-modulus', 'poisson-ratio' or 'both'
     young_modulus_pa: guess before the first touch
     on_step:  called with (name of the push, Step);  on_push: with (name, [E of every region], nu) after each estimate
-    progress: as of `identify`
+    progress: as of `identify`, and of `push` meanwhile; an estimate that it stops leaves the one from before it, and `message` says so
 
     Further options: those of `push` and of `identify`.
     """

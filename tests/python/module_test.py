@@ -409,6 +409,21 @@ class Robots(unittest.TestCase):
                 use(robot, on_step=asked_to_end)
             self.assertEqual(robot.since, ["stop"])
 
+    def test_ends_where_progress_says_so(self):
+        robot = Stubborn(None)
+        made, report = palpate.push(robot, block_on_a_table(), [0.5, 0, 0.5], force_limit_n=1, progress=lambda stage, share: not robot.pressed_m() > 0)
+        self.assertEqual((report.stop, robot.stopped), ("stopped by the user", 1))
+        self.assertGreater(robot.pressed_m(), 0)
+        stages = []
+
+        def not_in_the_fit(stage, share):
+            stages.append(stage)
+            return stage != "fit"
+        done = explore_once(Gantry(), progress=not_in_the_fit)
+        self.assertEqual(done.message, "push 1 is recorded, but nothing is estimated: stopped on request")
+        self.assertEqual(done.found.answer.termination, "cancelled")
+        self.assertEqual(stages.count("fit"), 1, "who said so once is not asked again")
+
     def test_leaves_a_recording_that_is_there_as_it_is(self):
         with tempfile.TemporaryDirectory() as folder:
             there = folder + "/recording"
@@ -431,7 +446,7 @@ class Robots(unittest.TestCase):
                     explore_once(robot, f"{folder}/{name}")
             self.assertEqual(os.listdir(folder), ["empty"])
             self.assertEqual(os.listdir(folder + "/empty"), [])
-            explore_once(Gantry(), folder + "/stopped", progress=lambda stage, share: False)
+            explore_once(Gantry(), folder + "/stopped", progress=lambda stage, share: stage != "push")
             self.assertEqual(os.listdir(folder), ["empty"])
 
     def test_records_its_own_pushes_only(self):
