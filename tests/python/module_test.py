@@ -2,6 +2,7 @@
 """`import palpate` as a user meets it: data made of numpy, an answer against closed forms and against the program's, errors that name
 the field. Run by ctest with PYTHONPATH set to the built package and examples/python;
 PALPATE_CLI names the program."""
+import ast
 import copy
 import dataclasses
 import json
@@ -191,6 +192,18 @@ class Data(unittest.TestCase):
         push = palpate.Push()
         push.steps.append(palpate.Step())
         self.assertEqual(palpate.Push().steps, [])  # defaults are not shared
+
+    def test_editors_know_every_name_and_field(self):
+        from palpate import _palpate, _stubs
+        written = pathlib.Path(palpate.__file__).with_name("__init__.pyi").read_text()
+        self.assertEqual(written, _stubs.stubs(), "made of this module")
+        known = {one.name: one for one in ast.parse(written).body if isinstance(one, (ast.ClassDef, ast.FunctionDef))}
+        self.assertEqual(sorted(known), sorted(palpate.__all__))
+        for name, _, fields, _ in _palpate.nouns():
+            types = {one.target.id: ast.unparse(one.annotation) for one in known[name].body if isinstance(one, ast.AnnAssign)}
+            self.assertEqual(types, {field: re.sub(r"numpy.ndarray, [\w ]+", "NDArray[Any]", kind) for field, kind, _, _ in fields}, name)
+        self.assertIn("read", [one.name for one in known["Robot"].body if isinstance(one, ast.FunctionDef)])
+        self.assertEqual(ast.unparse(known["identify"].returns), "'Identified'")
 
     def test_tables(self):
         self.assertIn("neo_hookean", palpate.materials())
