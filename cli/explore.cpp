@@ -216,7 +216,7 @@ int run(const Options& given, Session& session) {
   }
   Kept kept(given.out, scene, std::move(truth));
   Explored found = run_loop(session, loop, *robot, scene, PushOrder::next_best, &kept, &live);
-  if (found.pushes.empty()) {
+  if (found.pushes.empty() || found.identified.answer.termination == Termination::cancelled) {  // what stands in the folder stays
     session.warn(found.message);
     session.result({{"format", "palpate-exploration/1"}, {"reached", false}, {"message", found.message}});
     return exit_numbers;
@@ -239,7 +239,7 @@ int run(const Options& given, Session& session) {
   if (given.compare && !Session::interrupted()) compare(session, given, found, json);
   kept.pushes.write(json);
   session.result(json);
-  return found.reached && answer.termination == Termination::converged ? exit_done : exit_numbers;
+  return found.reached && answer.termination == Termination::converged && !Session::interrupted() ? exit_done : exit_numbers;
 }
 
 }  // namespace

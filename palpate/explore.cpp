@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -32,18 +33,24 @@ class Loop {
     out_.recording = scene;
     out_.recording.pushes.clear();
     if (options.go_on) earlier_ = scene.pushes;
+    if (hooks.on_progress)
+      on_progress_ = [this](std::string_view stage, double share) {
+        cancelled_ = cancelled_ || !hooks_.on_progress(stage, share);
+        return !cancelled_;
+      };
     prepare(scene);
   }
 
   Explored run() {
-    if (!take_up()) return end("stopped on request");
+    if (!take_up()) return end("the pushes of the earlier run are not estimated: stopped on request");
     std::vector<RatedPush> fixed_order;
     while (out_.message.empty()) {
-      if (hooks_.keep_going && !hooks_.keep_going()) return end("stopped on request");
+      if (is_stopped()) return end("stopped on request");
       const std::size_t made = out_.pushes.size() + static_cast<std::size_t>(out_.fruitless);
       if (made >= static_cast<std::size_t>(options_.max_pushes)) return end("all pushes are used up");
       const Identification* so_far = out_.pushes.empty() ? nullptr : &out_.identified.answer;
-      const PushRanking ranking = suggest(out_.scene, so_far, options_.suggest, hooks_.on_progress);
+      const PushRanking ranking = suggest(out_.scene, so_far, options_.suggest, on_progress_);
+      if (is_stopped()) return end("stopped on request");  // not all were ranked
       std::vector<RatedPush> pushes;
       for (const std::size_t i : estimation::hardest_pushes(ranking)) pushes.push_back(ranking.pushes[i]);
       if (pushes.empty()) return end("no push is possible in view of the camera");
@@ -64,8 +71,7 @@ class Loop {
         forget(next.plan.candidate);
         continue;
       }
-      estimate(false);
-      if (out_.identified.answer.termination == Termination::cancelled) return end("stopped on request");
+      if (!estimate(false)) return end(stopped_in_fit_of(next));
       take_in(std::move(next));
       if (hit) return end(what);
     }
@@ -93,7 +99,7 @@ class Loop {
     sensors.contact_std_m = options_.push.contact_std_m;
     sensors.levels = options_.levels;
     suggesting.sensors = sensors;
-    out_.scene = prepare_pushes(scene, suggesting, hooks_.on_progress);
+    out_.scene = prepare_pushes(scene, suggesting, on_progress_);
   }
 
   /// Of one reading in free air, per axis.
@@ -141,8 +147,7 @@ class Loop {
       }
     }
     if (out_.pushes.empty()) return true;
-    estimate(false);
-    if (out_.identified.answer.termination == Termination::cancelled) return false;
+    if (!estimate(false)) return false;
     if (judge(out_.pushes.back())) tell_of_last();
     return true;
   }
@@ -284,13 +289,23 @@ class Loop {
               all.end());
   }
 
+  bool is_stopped() const { return cancelled_ || (hooks_.keep_going && !hooks_.keep_going()); }
+
+  std::string stopped_in_fit_of(const ExploredPush& last) const {
+    return last.name + " is recorded, but " + (out_.pushes.empty() ? "nothing is estimated" : "not in the estimate") + ": stopped on request";
+  }
+
   /// @param whole  with the checks that refit parts of the recording: only the last estimate needs them
-  void estimate(bool whole) {
+  /// @returns false where the user stopped it: what was known before stands
+  bool estimate(bool whole) {
     IdentifyOptions options = options_.identify;
     options.fit.cross_checks = whole;
     if (!out_.identified.answer.parameters.empty())
       options.fit.young_start_pa = parameters(out_.identified.answer, "young_modulus").front().value;
-    out_.identified = identify(out_.recording, options, hooks_.on_progress);
+    Identified found = identify(out_.recording, options, on_progress_);
+    const bool whole_fit = found.answer.termination != Termination::cancelled;
+    if (whole_fit || out_.identified.answer.parameters.empty()) out_.identified = std::move(found);
+    return whole_fit;
   }
 
   void take_in(ExploredPush next) {
@@ -322,7 +337,8 @@ class Loop {
 
   /// Nobody pushes for it: what every push tells is known by now, and a list begins where this loop began.
   void expect_fixed_lists() {
-    const PushRanking ranking = suggest(out_.scene, &out_.identified.answer, options_.suggest, hooks_.on_progress);
+    const PushRanking ranking = suggest(out_.scene, &out_.identified.answer, options_.suggest, on_progress_);
+    if (is_stopped()) return;
     std::vector<RatedPush> pushes;
     for (const std::size_t i : estimation::hardest_pushes(ranking)) pushes.push_back(ranking.pushes[i]);
     if (pushes.empty()) return;
@@ -341,9 +357,9 @@ class Loop {
 
   Explored end(const std::string& message) {
     out_.message = message;
-    const bool stopped = hooks_.keep_going && !hooks_.keep_going();
-    if (!out_.pushes.empty() && !out_.pushes.back().young_moduli.empty() && !stopped) expect_fixed_lists();
-    if (options_.identify.fit.cross_checks && !out_.pushes.empty() && !stopped) estimate(true);
+    if (!out_.pushes.empty() && !out_.pushes.back().young_moduli.empty() && !is_stopped()) expect_fixed_lists();
+    if (options_.identify.fit.cross_checks && !out_.pushes.empty() && !is_stopped() && !estimate(true))
+      out_.message = "stopped on request in the last checks: " + message;
     return std::move(out_);
   }
 
@@ -351,6 +367,8 @@ class Loop {
   ExploreOptions options_;
   acquisition::PushOptions borne_;  // of options_.push, what the robot bears
   const ExploreHooks& hooks_;
+  OnProgress on_progress_;  // the hook's
+  bool cancelled_ = false;  // by it
   std::vector<Push> earlier_;
   int number_ = 0;  // of the last push
   Explored out_;

@@ -67,9 +67,9 @@ struct FixedLists {
 
 struct Explored {
   Recording recording;
-  Identified identified;
+  Identified identified;  ///< of `pushes`; cancelled only where the user stopped the first estimate of all, else the last whole one stands
   PushScene scene;
-  std::vector<ExploredPush> pushes;
+  std::vector<ExploredPush> pushes;  ///< that were estimated; the recording may have one more, whose estimate the user stopped
   std::optional<FixedLists> fixed_lists;  ///< nothing: no estimate to expect them by, or stopped on request
   int fruitless = 0;     ///< pushes that found nothing to press on; they count, and their places are not tried again
                          ///< (of an earlier run those that recorded a step)
@@ -85,7 +85,7 @@ struct ExploreHooks {
   std::function<void(const acquisition::PushReport& report)> on_push_end;  ///< after its last step; not for one of no step
   std::function<void(const ExploredPush& push)> on_push;  ///< after each estimate
   std::function<bool()> keep_going;                       ///< false: stop where it is
-  OnProgress on_progress;
+  OnProgress on_progress;                                 ///< false: as keep_going, and what is being worked out is not waited for
 };
 
 /// @param scene  object, supports, tools and priors; with `regions`, every part's E is wanted. Pushes: see ExploreOptions::go_on;

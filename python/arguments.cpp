@@ -36,7 +36,7 @@ Recording recording_of(const py::object& given, const char* name) {
   return recording;
 }
 
-std::filesystem::path path_of(const py::object& given) { return py::module_::import("os").attr("fspath")(given).cast<std::string>(); }
+std::filesystem::path path_of(const py::object& given) { return std::string(py::bytes(py::module_::import("os").attr("fsencode")(given))); }
 
 int threads_of(int asked) {
   if (asked < 0) throw Error("must be at least 1, or 0: as many as the machine has", "threads");

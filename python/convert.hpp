@@ -135,7 +135,13 @@ struct Convert<std::string> {
   static py::object to(const std::string& value) { return py::reinterpret_steal<py::object>(PyUnicode_DecodeUTF8(value.data(), static_cast<Py_ssize_t>(value.size()), "replace")); }
   static std::string from(py::handle given, const Place& place) {
     if (!py::isinstance<py::str>(given)) place.refuse("a text", given);
-    return given.cast<std::string>();
+    Py_ssize_t size = 0;
+    const char* text = PyUnicode_AsUTF8AndSize(given.ptr(), &size);
+    if (text == nullptr) {
+      PyErr_Clear();
+      place.refuse("holds what is no text (a surrogate: bytes of a file's name that are not UTF-8)");
+    }
+    return {text, static_cast<std::size_t>(size)};
   }
 };
 
@@ -154,7 +160,7 @@ struct Convert<T> {
   }
   static T from(py::handle given, const Place& place) {
     if (!py::isinstance<py::str>(given)) place.refuse("one of " + listed(), given);
-    const std::string text = given.cast<std::string>();
+    const std::string text = from_python<std::string>(given, place);
     for (const auto& [word, one] : Words<T>::names)
       if (text == word) return one;
     place.refuse("must be one of " + listed() + ", not '" + text + "'");

@@ -228,9 +228,10 @@ PYBIND11_MODULE(_palpate, m) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const Error& wrong) {
-      const py::object raised = py::reinterpret_borrow<py::object>(error)(wrong.what());
-      raised.attr("where") = wrong.where();
-      raised.attr("message") = wrong.message();
+      const auto text = [](const std::string& words) { return to_python(words); };  // files' names may hold any bytes
+      const py::object raised = py::reinterpret_borrow<py::object>(error)(text(wrong.what()));
+      raised.attr("where") = text(wrong.where());
+      raised.attr("message") = text(wrong.message());
       PyErr_SetObject(error, raised.ptr());
     }
   });

@@ -2,8 +2,11 @@
 #include "python/robot.hpp"
 
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
+#include "cli/new_folder.hpp"
 #include "cli/paths.hpp"
 #include "palpate/io/recording.hpp"
 #include "python/arguments.hpp"
@@ -12,55 +15,58 @@
 namespace palpate::python {
 namespace {
 
-/// The library asks without Python's lock; every call takes it. What Python raises goes through the library, which stops the robot first.
+/// What Python raises goes through the library, which stops the robot first, and takes its tip away where the robot was at fault.
 class PythonRobot : public acquisition::Robot {
  public:
-  explicit PythonRobot(py::object robot) : robot_(std::move(robot)) {
+  PythonRobot(py::object robot, PythonProgress& asks) : robot_(std::move(robot)), asks_(asks) {
     for (const char* call : {"read", "move", "stop", "take_depth_image", "wait", "travel_sigma_m"})
       if (!py::hasattr(robot_, call)) throw Error(std::string("has no `") + call + "`: derive it from palpate.Robot", "robot");
     travel_sigma_m_ = from_python<double>(robot_.attr("travel_sigma_m"), Place("robot.travel_sigma_m"));
+    if (!(travel_sigma_m_ > 0) || !std::isfinite(travel_sigma_m_))
+      throw Error("must be positive: how well the encoders know where the tip is along a push, in metres", "robot.travel_sigma_m");
   }
   acquisition::RobotState read() override {
-    const py::gil_scoped_acquire lock;
-    auto state = from_python<acquisition::RobotState>(robot_.attr("read")(), Place("robot.read()"));
-    if (!state.force_n.allFinite() || !std::isfinite(state.time_s)) throw Error("holds a number that is not finite", "robot.read()");
-    return state;
+    return asks_.call([&] {
+      auto state = from_python<acquisition::RobotState>(robot_.attr("read")(), Place("robot.read()"));
+      if (!state.force_n.allFinite() || !std::isfinite(state.time_s)) throw Error("holds a number that is not finite", "robot.read()");
+      return state;
+    });
   }
   acquisition::Motion move(const Pose& T_base_tip, double speed_m_s) override {
-    const py::gil_scoped_acquire lock;
-    const py::object moved = robot_.attr("move")(to_python(T_base_tip), speed_m_s);
-    return moved.is_none() || from_python<bool>(moved, Place("robot.move()")) ? acquisition::Motion::done : acquisition::Motion::refused;
+    return asks_.call([&] {
+      const py::object moved = robot_.attr("move")(to_python(T_base_tip), speed_m_s);
+      return moved.is_none() || from_python<bool>(moved, Place("robot.move()")) ? acquisition::Motion::done : acquisition::Motion::refused;
+    });
   }
   void stop() override {
-    const py::gil_scoped_acquire lock;
-    robot_.attr("stop")();
+    asks_.call([&] { robot_.attr("stop")(); });
   }
   DepthFrame take_depth_image() override {
-    const py::gil_scoped_acquire lock;
-    return from_python<DepthFrame>(robot_.attr("take_depth_image")(), Place("robot.take_depth_image()"));
+    return asks_.call([&] { return from_python<DepthFrame>(robot_.attr("take_depth_image")(), Place("robot.take_depth_image()")); });
   }
   void wait(double duration_s) override {
-    const py::gil_scoped_acquire lock;
-    robot_.attr("wait")(duration_s);
+    asks_.call([&] { robot_.attr("wait")(duration_s); });
   }
   double travel_sigma_m() const override { return travel_sigma_m_; }
   acquisition::RobotLimits limits() const override {
-    const py::gil_scoped_acquire lock;
-    if (!py::hasattr(robot_, "limits")) return {};
-    return from_python<acquisition::RobotLimits>(robot_.attr("limits"), Place("robot.limits"));
+    return asks_.call([&] {
+      if (!py::hasattr(robot_, "limits")) return acquisition::RobotLimits{};
+      return from_python<acquisition::RobotLimits>(robot_.attr("limits"), Place("robot.limits"));
+    });
   }
   std::optional<DepthFrame> look(int view, int views) override {
-    const py::gil_scoped_acquire lock;
-    if (!py::hasattr(robot_, "look")) return {};
-    return from_python<std::optional<DepthFrame>>(robot_.attr("look")(view, views), Place("robot.look()"));
+    return asks_.call([&] {
+      if (!py::hasattr(robot_, "look")) return std::optional<DepthFrame>{};
+      return from_python<std::optional<DepthFrame>>(robot_.attr("look")(view, views), Place("robot.look()"));
+    });
   }
   bool reaches(const Pose& T_base_tip) const {
-    const py::gil_scoped_acquire lock;
-    return !py::hasattr(robot_, "reaches") || from_python<bool>(robot_.attr("reaches")(to_python(T_base_tip)), Place("robot.reaches()"));
+    return asks_.call([&] { return !py::hasattr(robot_, "reaches") || from_python<bool>(robot_.attr("reaches")(to_python(T_base_tip)), Place("robot.reaches()")); });
   }
 
  private:
   py::object robot_;
+  PythonProgress& asks_;
   double travel_sigma_m_ = 0;
 };
 
@@ -104,9 +110,25 @@ acquisition::PushPlan plan_of(const Recording& scene, const std::string& tool, c
   return plan;
 }
 
-void tell(const py::object& callable, const Push& push, const Step& step) {
-  const py::gil_scoped_acquire lock;
-  if (!callable.is_none()) callable(push.name, to_python(step));
+void tell(PythonProgress& asks, const py::object& callable, const Push& push, const Step& step) {
+  asks.call([&] {
+    if (!callable.is_none()) callable(push.name, to_python(step));
+  });
+}
+
+/// What `explore` leaves on the disk: nothing, where nothing was recorded.
+struct Kept {
+  Kept(const std::filesystem::path& out, const Recording& scene) : folder(out), recording(out, scene) {}
+  cli::NewFolder folder;
+  io::RecordingWriter recording;
+};
+
+/// @throws Error where something is in it: of a recording that is written over nothing would be left
+void must_be_new(const std::filesystem::path& folder) {
+  cli::must_take_files(folder);
+  std::error_code code;
+  if (std::filesystem::exists(folder, code) && !std::filesystem::is_empty(folder, code))
+    throw Error("is there already; choose another folder or remove it", folder.string());
 }
 
 LoopPush loop_push(const ExploredPush& push, const PushScene& scene) {
@@ -137,31 +159,30 @@ py::object push_with(const py::object& robot, const py::object& given, const py:
   acquisition::PushPlan plan = plan_of(scene, tool_of(scene, tool), contact_m, direction.normalized());
   plan.name = name.empty() ? "push " + std::to_string(scene.pushes.size() + 1) : name;
   plan.site = site;
-  PythonRobot arm(robot);
   PythonProgress asks(progress);
+  PythonRobot arm(robot, asks);
   Push made;
-  acquisition::PushReport report;
-  {
-    const py::gil_scoped_release unlocked;
+  const acquisition::PushReport report = without_lock(asks, [&] {
     std::vector<Step> steps;
-    report = acquisition::run_push(
+    acquisition::PushReport of_push = acquisition::run_push(
         arm, plan, asked,
         [&](const Push& push, const Step& step) {
           made = push;
           steps.push_back(step);
-          tell(on_step, push, step);
+          tell(asks, on_step, push, step);
         },
         [&] { return asks.go_on(); });
     made.steps = std::move(steps);
-    if (report.drift) take_off(*report.drift, made);
-  }
-  asks.raise_what_was_raised();
+    if (of_push.drift) take_off(*of_push.drift, made);
+    return of_push;
+  });
   return py::make_tuple(to_python(made), to_python(made_push(report)));
 }
 
 py::object explore_with(const py::object& robot, const py::object& given, const py::object& folder, const py::dict& options, const py::object& on_step,
                         const py::object& on_push, const py::object& progress) {
-  const Recording scene = recording_of(given, "scene");
+  Recording scene = recording_of(given, "scene");
+  scene.pushes.clear();  // of another day; the folder gets those that are made now
   ExploreOptions asked;
   std::string tool, goal = "both";
   int seed = 1;
@@ -184,7 +205,8 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
   asked.suggest.threads = asked.identify.fit.threads;
   asked.suggest.candidates.seed = asked.seed = static_cast<std::uint64_t>(seed);
   check(asked);
-  PythonRobot arm(robot);
+  PythonProgress asks(progress);
+  PythonRobot arm(robot, asks);
   asked.suggest.candidates.reachable = [&](const Vec3& contact_m, const Vec3& direction) {
     Pose pose = Pose::Identity();
     pose.linear() = acquisition::tip_along(direction);
@@ -194,12 +216,11 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
     }
     return true;
   };
-  std::optional<io::RecordingWriter> kept;
+  std::optional<Kept> kept;
   if (!folder.is_none()) {
-    cli::must_take_files(path_of(folder));
+    must_be_new(path_of(folder));
     kept.emplace(path_of(folder), scene);
   }
-  PythonProgress asks(progress);
   ExploreHooks hooks;
   hooks.plan = [&](const estimation::PushCandidate& at) {
     acquisition::PushPlan plan = plan_of(scene, asked.suggest.tool, at.contact_m, at.direction);
@@ -207,46 +228,44 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
     return plan;
   };
   hooks.on_push_begin = [&](const Push& push) {
-    if (kept) kept->begin_push(push);
+    if (kept) kept->recording.begin_push(push);
   };
   hooks.on_step = [&](const Push& push, const Step& step) {
-    if (kept) kept->add_step(step);
-    tell(on_step, push, step);
+    if (kept) {
+      kept->recording.add_step(step);
+      kept->folder.keep();
+    }
+    tell(asks, on_step, push, step);
   };
   hooks.on_push_end = [&](const acquisition::PushReport& report) {
-    if (kept && report.drift) kept->end_push(*report.drift);
+    if (kept && report.drift) kept->recording.end_push(*report.drift);
   };
   hooks.on_push = [&](const ExploredPush& push) {
-    const py::gil_scoped_acquire lock;
-    if (!on_push.is_none()) on_push(push.name, to_python(push.young_moduli), to_python(push.poisson_ratio));
+    asks.call([&] {
+      if (!on_push.is_none()) on_push(push.name, to_python(push.young_moduli), to_python(push.poisson_ratio));
+    });
   };
   hooks.keep_going = [&] { return asks.go_on(); };
   hooks.on_progress = asks.callback();
-  Loop out;
-  {
-    const py::gil_scoped_release unlocked;
+  const Loop out = without_lock(asks, [&] {
     Explored done = explore(arm, scene, asked, hooks);
-    for (const ExploredPush& push : done.pushes) out.pushes.push_back(loop_push(push, done.scene));
-    out.recording = std::move(done.recording);
-    if (out.recording.source == "scene") out.recording.source.clear();  // it came from nowhere
-    out.found = std::move(done.identified);
-    out.fruitless = done.fruitless;
-    out.reached = done.reached;
-    out.message = std::move(done.message);
-  }
-  asks.raise_what_was_raised();
+    Loop told;
+    for (const ExploredPush& push : done.pushes) told.pushes.push_back(loop_push(push, done.scene));
+    told.recording = std::move(done.recording);
+    if (told.recording.source == "scene") told.recording.source.clear();  // it came from nowhere
+    told.found = std::move(done.identified);
+    told.fruitless = done.fruitless;
+    told.reached = done.reached;
+    told.message = std::move(done.message);
+    return told;
+  });
   return to_python(out);
 }
 
 py::object look_around_with(const py::object& robot, int views) {
-  PythonRobot arm(robot);
   PythonProgress asks{py::none()};
-  std::optional<std::vector<DepthFrame>> frames;
-  {
-    const py::gil_scoped_release unlocked;
-    frames = acquisition::look_around(arm, views, [&] { return asks.go_on(); });
-  }
-  asks.raise_what_was_raised();
+  PythonRobot arm(robot, asks);
+  const auto frames = without_lock(asks, [&] { return acquisition::look_around(arm, views, [&] { return asks.go_on(); }); });
   if (!frames) throw Error("does not carry its camera around: it has no `look`, or that gives None", "robot");
   return to_python(*frames);
 }

@@ -15,10 +15,18 @@ point. Data are plain objects (Recording, Push, Step, ...): lists are lists, and
 `help(palpate.Recording)` lists fields. Where no answer can exist, `palpate.Error` names the field and the cure; what did not work
 out in numbers is a field of the result. The same input, seed and number of threads give the same digits.
 """
+from __future__ import annotations as _annotations
+
 import json as _json
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from palpate import _nouns, _palpate
 from palpate._palpate import Error, __version__
+
+if _TYPE_CHECKING:
+    from collections.abc import Callable
+    from os import PathLike
+    from typing import Any
 
 _classes = _nouns.classes()
 globals().update(_classes)
@@ -30,7 +38,7 @@ __all__ = sorted(_classes) + ["Error", "OnlineEstimator", "Robot", "check_record
                               "read_scene", "read_surface", "read_volume", "result_json", "suggest", "write_recording", "write_result"]
 
 
-def read_recording(path, mapping=None):
+def read_recording(path: str | PathLike[str], mapping: str | PathLike[str] | None = None) -> Recording:
     """A recording from a folder (docs/recording-format.md) or a bag of ROS 1 or 2, checked.
 
     mapping: what a bag's topics mean (mapping.yaml beside it, if not given; `palpate info BAG` suggests one).
@@ -39,39 +47,39 @@ def read_recording(path, mapping=None):
     return _palpate.read_recording(path, mapping)
 
 
-def read_scene(folder):
+def read_scene(folder: str | PathLike[str]) -> Recording:
     """What stands before a robot: a recording's object, supports, tools and priors, without its pushes, for `push` and `explore`."""
     return _palpate.read_scene(folder)
 
 
-def write_recording(recording, folder):
+def write_recording(recording: Recording, folder: str | PathLike[str]) -> None:
     """Writes a folder that read_recording gives back; it must not be there yet, or be empty. Raises Error."""
     _palpate.write_recording(recording, folder)
 
 
-def check_recording(recording):
+def check_recording(recording: Recording) -> list[tuple[str, str]]:
     """[(where, what is wrong and the cure)]; empty: it can be used. `identify` asks the same."""
     return _palpate.problems(recording)
 
 
-def read_surface(path):
+def read_surface(path: str | PathLike[str]) -> TriMesh:
     """TriMesh from a PLY, STL, OBJ, VTU, ... file, in metres."""
     return _palpate.read_surface(path)
 
 
-def read_volume(path):
+def read_volume(path: str | PathLike[str]) -> TetMesh:
     """TetMesh from a VTU, VTK, MSH, INP, ... file, in metres."""
     return _palpate.read_volume(path)
 
 
-def read_robot(path):
+def read_robot(path: str | PathLike[str]) -> RobotModel:
     """RobotModel from a URDF file."""
     return _palpate.read_robot(path)
 
 
-def identify(recording, *, method="palpate", material=None, element=None, refine=None, regions="recorded", poisson_range=None,
+def identify(recording: Recording, *, method="palpate", material=None, element=None, refine=None, regions="recorded", poisson_range=None,
              poisson_ratio=None, poisson_by_region=False, mesh_tolerance=0.01, slips=True, all_loads=False, compare_laws=False,
-             cross_checks=True, young_modulus_start_pa=None, max_iterations=60, threads=0, progress=None):
+             cross_checks=True, young_modulus_start_pa=None, max_iterations=60, threads=0, progress: Callable[[str, float], Any] | None = None) -> Identified:
     """Young's modulus and Poisson ratio of what was pushed: an Identified. The options are those of `palpate estimate`.
 
     method:            'palpate', or 'paper' (the algorithm of Frank et al. 2010, as a baseline)
@@ -108,33 +116,33 @@ class OnlineEstimator:
     Options are those of `identify`. Raises Error where identify would; a step that is refused is not taken in.
     """
 
-    def __init__(self, scene, **options):
+    def __init__(self, scene: Recording, **options) -> None:
         self._estimator = _palpate.OnlineEstimator(scene, options)
 
-    def begin(self, push):
+    def begin(self, push: Push) -> None:
         """A new push: its name, site and priors; steps in it are taken in without an estimate in between."""
         self._estimator.begin(push)
 
-    def add(self, step, progress=None):
+    def add(self, step: Step, progress: Callable[[str, float], Any] | None = None) -> Identification:
         """One more step of the push; what is known by now. Until a load and an observation were seen there are no parameters."""
         return self._estimator.add(step, progress)
 
     @property
-    def estimate(self):
+    def estimate(self) -> Identification:
         """After the last step."""
         return self._estimator.estimate()
 
     @property
-    def recording(self):
+    def recording(self) -> Recording:
         """All so far."""
         return self._estimator.recording()
 
-    def answer(self, progress=None):
+    def answer(self, progress: Callable[[str, float], Any] | None = None) -> Identified:
         """An Identified: what `identify` says of all so far, with the mesh's error, checks of the parts and figures."""
         return self._estimator.answer(progress)
 
 
-def write_result(found, recording, folder):
+def write_result(found: Identified, recording: Recording, folder: str | PathLike[str]) -> None:
     """Leaves what `palpate estimate -o` leaves: result.json, fit/, model/ (mesh and material) and report.html.
 
     recording: that was identified, for the report.
@@ -142,17 +150,17 @@ def write_result(found, recording, folder):
     _palpate.write_result(found, recording, folder)
 
 
-def read_result(folder):
+def read_result(folder: str | PathLike[str]) -> Identified:
     """An Identified from a folder that write_result or `palpate estimate` wrote. Surfaces and points are in single precision."""
     return _palpate.read_result(folder)
 
 
-def result_json(answer):
+def result_json(answer: Identification) -> dict[str, Any]:
     """The object of result.json (docs/result-format.md) as a dict."""
     return _json.loads(_palpate.result_json(answer))
 
 
-def predict(found, *, contact_m=None, direction=(0, 0, -1), force_n=None, travel_m=None, radius_m=None, tool=None, threads=0):
+def predict(found: Identified, *, contact_m=None, direction=(0, 0, -1), force_n=None, travel_m=None, radius_m=None, tool=None, threads=0) -> PushPrediction:
     """What a push that nobody has made does: a PushPrediction with bands of 95 %.
 
     contact_m:         on the surface at rest, base frame (3 numbers)
@@ -165,13 +173,14 @@ def predict(found, *, contact_m=None, direction=(0, 0, -1), force_n=None, travel
                                         tool=tool, threads=threads))
 
 
-def export(found, to, folder, *, density_kg_m3=0.0, gravity_m_s2=None):
+def export(found: Identified, to: str, folder: str | PathLike[str], *, density_kg_m3=0.0, gravity_m_s2=None) -> list[str]:
     """The learned object for a simulator, one of exporters(). Returns the names of the files, the one to open first."""
     return _palpate.export(found, to, folder, density_kg_m3, gravity_m_s2)
 
 
-def suggest(recording, so_far=None, *, goal="both", tool=None, tip_link=None, contacts=24, tilts=2, views=0, young_modulus_pa=2e4,
-            force_limit_n=50.0, travel_limit_m=0.10, seed=1, threads=0, progress=None):
+def suggest(recording: Recording, so_far: Identification | None = None, *, goal="both", tool=None, tip_link=None, contacts=24, tilts=2, views=0, young_modulus_pa=2e4,
+            force_limit_n=50.0, travel_limit_m=0.10, seed=1, threads=0,
+            progress: Callable[[str, float], Any] | None = None) -> list[SuggestedPush]:
     """Pushes that would tell the most, best first: a list of SuggestedPush. Empty: none that is possible is in view (`views` adds some).
 
     so_far:            `found.answer`, what the pushes until now gave; None: before the first touch
@@ -186,21 +195,21 @@ def suggest(recording, so_far=None, *, goal="both", tool=None, tip_link=None, co
                                                     travel_limit_m=travel_limit_m, seed=seed, threads=threads), progress)
 
 
-def demo(seed=1, progress=None):
+def demo(seed=1, progress: Callable[[str, float], Any] | None = None) -> tuple[Recording, dict[str, float]]:
     """(recording, truth): the built-in recording of a foam cube, made by the lab, and E and nu of the truth."""
     return _palpate.demo(seed, progress)
 
 
-def materials():
+def materials() -> list[str]:
     """Names of the laws."""
     return _palpate.materials()
 
 
-def exporters():
+def exporters() -> dict[str, str]:
     """{name: what is written}"""
     return _palpate.exporters()
 
 
-def depth_sensors():
+def depth_sensors() -> dict[str, str]:
     """{name: source} of the noise models for DepthNoise.model; 'constant' with a sigma_m goes, too."""
     return _palpate.depth_sensors()

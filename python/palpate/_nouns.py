@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The classes of data, made of the library's own table of fields."""
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy
 
 from palpate import _palpate
+
+if TYPE_CHECKING:
+    from palpate import Parameter
 
 
 def _short(value):
@@ -25,7 +31,7 @@ class _Noun:
 class _Identification(_Noun):
     __slots__ = ()
 
-    def parameter(self, name, region=""):
+    def parameter(self, name: str, region: str = "") -> Parameter:
         """The parameter of that name. KeyError lists those that there are."""
         for one in self.parameters:
             if one.name == name and one.region == region:
@@ -34,12 +40,12 @@ class _Identification(_Noun):
         raise KeyError(f"{name!r}{f' of {region!r}' if region else ''}; there are: {there or 'none'}")
 
     @property
-    def young_modulus(self):
+    def young_modulus(self) -> Parameter:
         """Of the whole object, Pa. Of one in regions: parameter('young_modulus', region)."""
         return self.parameter("young_modulus")
 
     @property
-    def poisson_ratio(self):
+    def poisson_ratio(self) -> Parameter:
         return self.parameter("poisson_ratio")
 
 

@@ -155,6 +155,57 @@ TEST(Explore, BudgetRefusalAndUserEndIt) {
   EXPECT_EQ(half.message, "stopped on request");
 }
 
+// Hours of pushes must not be lost to the wish to end.
+TEST(Explore, StoppedInAFitItKeepsWhatWasKnownBefore) {
+  ExploreOptions options = loop_options();
+  options.young_modulus_within = 1e-4;
+  options.max_pushes = 2;
+  const auto in_fit_after = [](int pushes) {
+    return [pushes](const Tried& so_far, std::string_view stage) { return so_far.told < pushes || stage != "fit"; };
+  };
+  BlockRobot robot(1), stopped(1), at_first(1);
+  const Explored one = explored(robot, options, [](const Tried& so_far) { return so_far.told < 1; }).found;
+  ASSERT_EQ(one.pushes.size(), 1u);
+  EXPECT_EQ(one.message, "stopped on request");
+
+  const Explored found = explored(stopped, options, {}, nullptr, in_fit_after(1)).found;
+  EXPECT_EQ(found.message, "push 2 is recorded, but not in the estimate: stopped on request");
+  EXPECT_EQ(found.identified.answer.termination, Termination::converged);
+  ASSERT_FALSE(found.identified.answer.parameters.empty());
+  EXPECT_EQ(found.identified.answer.parameters.front().value, one.identified.answer.parameters.front().value);
+  EXPECT_EQ(found.pushes.size(), 1u);
+  EXPECT_EQ(found.recording.pushes.size(), 2u);
+  EXPECT_FALSE(found.fixed_lists) << "nobody waits for them";
+
+  const Explored none = explored(at_first, options, {}, nullptr, in_fit_after(0)).found;
+  EXPECT_EQ(none.message, "push 1 is recorded, but nothing is estimated: stopped on request");
+  EXPECT_EQ(none.identified.answer.termination, Termination::cancelled);
+  EXPECT_TRUE(none.pushes.empty());
+  EXPECT_EQ(none.recording.pushes.size(), 1u);
+}
+
+TEST(Explore, StoppedInTheLastChecksItKeepsTheEstimate) {
+  ExploreOptions options = loop_options();
+  options.young_modulus_within = options.poisson_ratio_within = 0.5;
+  options.identify.fit.cross_checks = true;
+  BlockRobot robot(1);
+  const Explored found =
+      explored(robot, options, {}, nullptr, [](const Tried& so_far, std::string_view stage) { return so_far.told < 1 || stage != "fit"; }).found;
+  EXPECT_TRUE(found.reached);
+  EXPECT_EQ(found.message, "stopped on request in the last checks: both intervals are as narrow as was asked for");
+  EXPECT_EQ(found.identified.answer.termination, Termination::converged);
+  ASSERT_FALSE(found.identified.answer.parameters.empty());
+  EXPECT_EQ(found.identified.answer.parameters.front().value, found.pushes.back().young_moduli.front().value);
+}
+
+TEST(Explore, StoppedWhileItRanksPushesItDoesNotBlameTheCamera) {
+  BlockRobot robot(1);
+  const Explored found =
+      explored(robot, loop_options(), {}, nullptr, [](const Tried&, std::string_view stage) { return stage != "rate pushes"; }).found;
+  EXPECT_EQ(found.message, "stopped on request");
+  EXPECT_EQ(robot.places, 0);
+}
+
 // What the robot bears bounds what is planned, what the first touch sizes and what is pressed, and the report says so.
 TEST(Explore, TheRobotsOwnLimitsHold) {
   struct Weak : BlockRobot {

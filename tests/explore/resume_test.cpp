@@ -103,6 +103,15 @@ TEST(Resume, CutOffInAPushItKeepsItsLoadsAndBacksOut) {
   EXPECT_EQ(names(found).size(), found.pushes.size());
 }
 
+TEST(Resume, StoppedInItsFirstFitItSaysThatNothingWasEstimated) {
+  BlockRobot robot(1);
+  const Explored first = explored(robot, some_pushes(), [](const Tried& so_far) { return so_far.told < 1; }).found;
+  const Explored found = explored(robot, going_on(some_pushes()), {}, &first.recording, [](const Tried&, std::string_view stage) { return stage != "fit"; }).found;
+  EXPECT_EQ(found.message, "the pushes of the earlier run are not estimated: stopped on request");
+  EXPECT_EQ(found.identified.answer.termination, Termination::cancelled);
+  EXPECT_EQ(found.recording.pushes.size(), first.recording.pushes.size());
+}
+
 TEST(Resume, WhatIsAtItsGoalOrUsedUpIsNotPushedAgain) {
   ExploreOptions options = loop_options();
   BlockRobot robot(1);

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <string_view>
 
 #include "block_robot.hpp"
 #include "palpate/explore.hpp"
@@ -31,8 +32,9 @@ struct Tried {
 };
 
 /// @param keep_going  told what was made so far  @param scene  nullptr: the robot's own
+/// @param go_on       told that, too, and the stage of the work that it may stop
 inline Tried explored(BlockRobot& robot, const ExploreOptions& options, const std::function<bool(const Tried&)>& keep_going = {},
-                      const Recording* scene = nullptr) {
+                      const Recording* scene = nullptr, const std::function<bool(const Tried&, std::string_view)>& go_on = {}) {
   Tried run;
   ExploreHooks hooks;
   hooks.plan = [&](const estimation::PushCandidate& at) { return robot.plan(at); };
@@ -40,6 +42,7 @@ inline Tried explored(BlockRobot& robot, const ExploreOptions& options, const st
   hooks.on_step = [&](const Push&, const Step&) { ++run.steps; };
   hooks.on_push = [&](const ExploredPush&) { ++run.told; };
   if (keep_going) hooks.keep_going = [&] { return keep_going(run); };
+  if (go_on) hooks.on_progress = [&](std::string_view stage, double) { return go_on(run, stage); };
   run.found = explore(robot, scene != nullptr ? *scene : robot.scene(), options, hooks);
   return run;
 }

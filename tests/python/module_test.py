@@ -2,6 +2,7 @@
 """`import palpate` as a user meets it: data made of numpy, an answer against closed forms and against the program's, errors that name
 the field. Run by ctest with PYTHONPATH set to the built package and examples/python;
 PALPATE_CLI names the program."""
+import ast
 import copy
 import dataclasses
 import json
@@ -9,7 +10,9 @@ import os
 import pathlib
 import pickle
 import re
+import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import unittest
@@ -190,6 +193,18 @@ class Data(unittest.TestCase):
         push.steps.append(palpate.Step())
         self.assertEqual(palpate.Push().steps, [])  # defaults are not shared
 
+    def test_editors_know_every_name_and_field(self):
+        from palpate import _palpate, _stubs
+        written = pathlib.Path(palpate.__file__).with_name("__init__.pyi").read_text()
+        self.assertEqual(written, _stubs.stubs(), "made of this module")
+        known = {one.name: one for one in ast.parse(written).body if isinstance(one, (ast.ClassDef, ast.FunctionDef))}
+        self.assertEqual(sorted(known), sorted(palpate.__all__))
+        for name, _, fields, _ in _palpate.nouns():
+            types = {one.target.id: ast.unparse(one.annotation) for one in known[name].body if isinstance(one, ast.AnnAssign)}
+            self.assertEqual(types, {field: re.sub(r"numpy.ndarray, [\w ]+", "NDArray[Any]", kind) for field, kind, _, _ in fields}, name)
+        self.assertIn("read", [one.name for one in known["Robot"].body if isinstance(one, ast.FunctionDef)])
+        self.assertEqual(ast.unparse(known["identify"].returns), "'Identified'")
+
     def test_tables(self):
         self.assertIn("neo_hookean", palpate.materials())
         self.assertIn("mujoco", palpate.exporters())
@@ -217,6 +232,8 @@ class Refused(unittest.TestCase):
         self.refused(lambda r: setattr(r.model, "material", "rubber"), "recording.model.material", "neo_hookean")
         self.refused(lambda r: setattr(step(r), "T_base_tip", 2 * np.eye(4)), "recording.pushes[0].steps[2].T_base_tip", "rigid transform")
         self.refused(lambda r: setattr(r, "pushes", "all"), "recording.pushes", "list of Push")
+        self.refused(lambda r: setattr(r, "name", os.fsdecode(b"caf\xe9")), "recording.name", "not UTF-8")
+        self.refused(lambda r: setattr(r.tools[0], "shape", "caf\udce9"), "recording.tools[0].shape", "not UTF-8")
 
     def test_as_a_file_would_be(self):
         def upside_down(recording):
@@ -240,6 +257,24 @@ class Refused(unittest.TestCase):
             palpate.identify(pressed_block(), poison_ratio=0.3)
         with self.assertRaisesRegex(palpate.Error, "poisson_range"):
             palpate.identify(pressed_block(), poisson_range=[0.3])
+
+    def test_files_whose_names_are_no_utf_8(self):
+        latin = "café".encode("latin-1")
+        with tempfile.TemporaryDirectory() as folder:
+            palpate.write_recording(pressed_block(), folder + "/recording")
+            index = pathlib.Path(folder, "recording", "recording.yaml")
+            index.write_bytes(index.read_bytes().replace(b"rest.vtu", latin + b".vtu"))
+            with self.assertRaises(palpate.Error) as raised:
+                palpate.read_recording(folder + "/recording")
+            for text in (str(raised.exception), raised.exception.where + raised.exception.message):
+                self.assertIn("caf\ufffd.vtu", text)
+            named = os.path.join(os.fsencode(folder), latin)
+            for name in (named, os.fsdecode(named)):  # as os.listdir() gives it for bytes and for text
+                with self.assertRaisesRegex(palpate.Error, "caf\ufffd"):
+                    palpate.read_recording(name)
+            palpate.write_recording(pressed_block(), os.fsdecode(named))
+            self.assertTrue(os.path.exists(os.path.join(named, b"recording.yaml")))
+            self.assertEqual(len(palpate.read_recording(os.fsdecode(named)).pushes), 1)
 
     def test_a_push_that_nothing_can_make(self):
         found = palpate.identify(pressed_block(), threads=1)
@@ -291,13 +326,47 @@ class Stubborn(Gantry):
         return super().read()
 
 
+class CtrlC(Gantry):
+    """Ctrl-C comes in one of its calls, once it is deep enough in the object."""
+
+    def __init__(self, call):
+        super().__init__()
+        self.call, self.since = call, None  # what was asked of it since then
+
+    def asked(self, call):
+        if self.since is not None:
+            self.since.append(call)
+        elif call == self.call and self.pressed_m() > 0.001:
+            self.since = []
+            signal.raise_signal(signal.SIGINT)
+
+    def read(self):
+        self.asked("read")
+        return super().read()
+
+    def move(self, T_base_tip, speed_m_s):
+        self.asked("move")
+        return super().move(T_base_tip, speed_m_s)
+
+    def wait(self, duration_s):
+        self.asked("wait")
+        super().wait(duration_s)
+
+    def stop(self):
+        self.asked("stop")
+
+
+def explore_once(robot, *folder, **options):
+    """One push down onto a block whose nu is known."""
+    return palpate.explore(robot, block_on_a_table(), *folder, goal="young-modulus", young_modulus_within=0.05, poisson_ratio=0.3, max_pushes=1,
+                           contacts=6, tilts=0, travel_limit_m=0.004, **options)
+
+
 class Robots(unittest.TestCase):
     def test_explores_a_half_space_in_closed_form(self):
         told = []
         with tempfile.TemporaryDirectory() as folder:
-            done = palpate.explore(Gantry(), block_on_a_table(), folder + "/recording", goal="young-modulus", young_modulus_within=0.05,
-                                   poisson_ratio=0.3, max_pushes=1, contacts=6, tilts=0, travel_limit_m=0.004,
-                                   on_push=lambda name, young, poisson: told.append(young[0].value))
+            done = explore_once(Gantry(), folder + "/recording", on_push=lambda name, young, poisson: told.append(young[0].value))
             self.assertTrue(done.reached, done.message)
             young = done.found.answer.young_modulus
             self.assertLess(young.lower_95, 20e3)
@@ -325,15 +394,95 @@ class Robots(unittest.TestCase):
         def broken():
             raise OSError("the cable is out")
 
-        def interrupted():
-            raise KeyboardInterrupt
-        for act, raised in ((broken, OSError), (interrupted, KeyboardInterrupt), (lambda: None, palpate.Error)):
+        for act, raised in ((broken, OSError), (lambda: None, palpate.Error)):
             robot = Stubborn(act)
             with self.assertRaises(raised) as caught:
                 palpate.push(robot, block_on_a_table(), [0.5, 0, 0.5], force_limit_n=1)
             self.assertGreater(robot.stopped, 0)
             self.assertEqual(robot.pressed_m(), 0, "the tip is away from the object")
         self.assertEqual(caught.exception.where, "robot.read()")
+
+    def test_stands_still_after_ctrl_c(self):
+        push = lambda robot, **hooks: palpate.push(robot, block_on_a_table(), [0.5, 0, 0.5], force_limit_n=1, force_step_n=0.25, **hooks)
+        for call in ("move", "read", "wait"):
+            for use in (push, explore_once):
+                robot = CtrlC(call)
+                with self.assertRaises(KeyboardInterrupt):
+                    use(robot)
+                self.assertEqual(robot.since, ["stop"], call)
+                self.assertGreater(robot.pressed_m(), 0, "only the user knows why")
+
+        def asked_to_end(name, step):
+            if robot.pressed_m() > 0:
+                robot.since = []
+                sys.exit("enough")  # as a handler of SIGTERM may
+        for use in (push, explore_once):
+            robot = CtrlC(None)
+            with self.assertRaisesRegex(SystemExit, "enough"):
+                use(robot, on_step=asked_to_end)
+            self.assertEqual(robot.since, ["stop"])
+
+    def test_ends_where_progress_says_so(self):
+        robot = Stubborn(None)
+        made, report = palpate.push(robot, block_on_a_table(), [0.5, 0, 0.5], force_limit_n=1, progress=lambda stage, share: not robot.pressed_m() > 0)
+        self.assertEqual((report.stop, robot.stopped), ("stopped by the user", 1))
+        self.assertGreater(robot.pressed_m(), 0)
+        stages = []
+
+        def not_in_the_fit(stage, share):
+            stages.append(stage)
+            return stage != "fit"
+        done = explore_once(Gantry(), progress=not_in_the_fit)
+        self.assertEqual(done.message, "push 1 is recorded, but nothing is estimated: stopped on request")
+        self.assertEqual(done.found.answer.termination, "cancelled")
+        self.assertEqual(stages.count("fit"), 1, "who said so once is not asked again")
+
+    def test_leaves_a_recording_that_is_there_as_it_is(self):
+        with tempfile.TemporaryDirectory() as folder:
+            there = folder + "/recording"
+            palpate.write_recording(pressed_block(), there)
+            with self.assertRaises(palpate.Error) as raised:
+                explore_once(Gantry(), there)
+            self.assertEqual(raised.exception.where, there)
+            self.assertIn("is there already", raised.exception.message)
+            self.assertEqual(len(palpate.read_recording(there).pushes[0].steps), len(pressed_block().pushes[0].steps))
+
+    def test_leaves_nothing_where_nothing_was_recorded(self):
+        def broken():
+            raise OSError("the cable is out")
+        with tempfile.TemporaryDirectory() as folder:
+            os.mkdir(folder + "/empty")
+            for name in ("new", "empty"):
+                robot = Stubborn(broken)
+                robot.pressed_m = lambda: 1  # its first reading fails
+                with self.assertRaises(OSError):
+                    explore_once(robot, f"{folder}/{name}")
+            self.assertEqual(os.listdir(folder), ["empty"])
+            self.assertEqual(os.listdir(folder + "/empty"), [])
+            explore_once(Gantry(), folder + "/stopped", progress=lambda stage, share: stage != "push")
+            self.assertEqual(os.listdir(folder), ["empty"])
+
+    def test_records_its_own_pushes_only(self):
+        def broken(name, step):
+            raise OSError("the disk is full")
+        scene = block_on_a_table()
+        scene.pushes = [palpate.Push(name="of an earlier day", steps=[palpate.Step()])]
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaises(OSError):
+                palpate.explore(Gantry(), scene, folder, poisson_ratio=0.3, max_pushes=1, contacts=6, tilts=0, on_step=broken)
+            recorded = pathlib.Path(folder, "recording.yaml").read_text()
+            self.assertIn("push 1", recorded)
+            self.assertNotIn("of an earlier day", recorded)
+
+    def test_says_how_well_it_knows_its_tip(self):
+        for sigma_m in (0, -1e-4, float("nan"), float("inf")):
+            robot = Gantry()
+            robot.travel_sigma_m = sigma_m
+            for use in (explore_once, lambda robot: palpate.push(robot, block_on_a_table(), [0.5, 0, 0.5])):
+                with self.assertRaises(palpate.Error) as raised:
+                    use(robot)
+                self.assertEqual(raised.exception.where, "robot.travel_sigma_m")
+                self.assertIn("must be positive", raised.exception.message)
 
     def test_must_have_its_calls(self):
         with self.assertRaisesRegex(palpate.Error, "derive it from palpate.Robot"):
