@@ -161,6 +161,7 @@ void tell(Session& session, const Options& given, const Identification& answer) 
 
 int estimate(Session& session, const Options& given) {
   StageClock clock;
+  must_leave_recording(given.out, given.recording);
   must_take_files(given.out);
   if (!given.material.empty()) check_material(given.material, "--material");
   LiveReport live(given.live, session, given.recording.filename().string());

@@ -186,6 +186,7 @@ int run(const Options& given, Session& session) {
     throw Error("is there already; say --resume to go on, choose another folder or remove it (`palpate estimate` takes the "
                 "recording in it)",
                 given.out.string());
+  if (!exists && given.resume) throw Error("holds nothing to go on with; is it the right folder? Leave --resume out to begin", given.out.string());
   check_push_options(given.explore.push);
   ExploreOptions with_limit = given.explore;
   with_limit.push.travel_limit_m = acquisition::PushOptions{}.travel_limit_m;  // the object's, which is not known yet

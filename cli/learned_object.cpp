@@ -70,6 +70,8 @@ prediction::Elasticity elasticity_of(const LearnedObject& learned) {
 }
 
 io::ExportModel export_model(const LearnedObject& learned, double density_kg_m3, const std::optional<Vec3>& gravity_m_s2) {
+  if (gravity_m_s2 && !(gravity_m_s2->norm() <= 100))
+    throw Error("must be three numbers in m/s2, 0 0 -9.81 on earth, and at most 100 together", "gravity");
   io::ExportModel model;
   const prediction::Elasticity elasticity = elasticity_of(learned);
   model.mesh = *learned.object.rest.volume;

@@ -72,6 +72,15 @@ void must_take_files(const fs::path& folder) {
     if (!fs::remove(made, code)) break;
 }
 
+void must_leave_recording(const fs::path& folder, const fs::path& recording) {
+  std::error_code code;
+  const fs::path within = fs::weakly_canonical(without_slash(recording), code).lexically_relative(fs::weakly_canonical(without_slash(folder), code));
+  if (within.empty()) return;
+  const std::string first = within.begin()->string();
+  if (first == "." || first == "model" || first == "fit" || first == "figures")
+    throw Error("would be overwritten by what is written into " + folder.string() + "; give another folder", recording.string());
+}
+
 void must_take_file(const fs::path& file) {
   std::error_code code;
   if (!file.has_filename() || fs::is_directory(file, code)) throw Error("is a folder; give the name of a file", file.string());

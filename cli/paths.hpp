@@ -18,6 +18,10 @@ void must_be_result(const std::filesystem::path& path);
 /// @throws Error when it, or what it would have to be made in, is no folder or cannot be written
 void must_take_files(const std::filesystem::path& folder);
 
+/// What is written into `folder` replaces model/, fit/ and figures/ in it.
+/// @throws Error when the recording is one of these or lies in one, or is the folder itself
+void must_leave_recording(const std::filesystem::path& folder, const std::filesystem::path& recording);
+
 /// A file that is there is replaced, folders on the way to it are made.
 /// @throws Error when it is a folder, or its folder cannot be written
 void must_take_file(const std::filesystem::path& file);

@@ -110,6 +110,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   const bool exists = std::filesystem::exists(folder) && !std::filesystem::is_empty(folder);
   if (exists && !arguments.resume)
     throw Error("is there already; say --resume to go on, or choose another folder", folder.string());
+  if (!exists && arguments.resume) throw Error("holds nothing to go on with; is it the right folder? Leave --resume out to begin", folder.string());
   check_push_options(arguments.push);
   const std::filesystem::path truth_file =
       std::filesystem::path(arguments.truth.empty() ? folder.string() + ".truth.json" : arguments.truth);

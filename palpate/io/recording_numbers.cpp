@@ -214,10 +214,55 @@ class OddNumbers {
         look_at_joints(step);
       }
     }
+    look_at_what_is_seen();
     return std::move(said_);
   }
 
  private:
+  /// The pose of another camera, or the inverse of its own, shows what is elsewhere.
+  void look_at_what_is_seen() {
+    if (!extent_.known) return;
+    std::size_t seen = 0;
+    const Step* first = nullptr;
+    for (const Push& push : recording_.pushes)
+      for (const Step& step : push.steps)
+        for (const Observation& one : step.observations) {
+          const auto* frame = std::get_if<DepthFrame>(&one);
+          const auto* cloud = std::get_if<PointCloud>(&one);
+          if (frame == nullptr && cloud == nullptr) continue;
+          if (frame != nullptr ? shows_object(*frame) : shows_object(*cloud)) return;  // others may look away
+          ++seen;
+          if (first == nullptr) first = &step;
+        }
+    if (first != nullptr)
+      say(fmt::format("none of the {} images and clouds shows anything where the object is; is T_base_camera the camera's pose in the base frame, not "
+                      "its inverse, in metres, and the surface in the base frame, too?",
+                      seen),
+          first->source);
+  }
+
+  bool is_near(const Vec3& point_m) const { return (point_m - extent_.centre).norm() <= extent_.diagonal_m; }
+
+  bool shows_object(const PointCloud& cloud) const {
+    for (Index i = 0; i < cloud.points_m.rows(); ++i)
+      if (is_near(cloud.points_m.row(i))) return true;
+    return false;
+  }
+
+  /// A lens bends rays by less than the object's size.
+  bool shows_object(const DepthFrame& frame) const {
+    const Index every = std::max<Index>(1, std::min(frame.depth_m.rows(), frame.depth_m.cols()) / 100);
+    for (Index row = 0; row < frame.depth_m.rows(); row += every)
+      for (Index column = 0; column < frame.depth_m.cols(); column += every) {
+        const double z_m = frame.depth_m(row, column);
+        if (!(z_m > 0)) continue;
+        const Vec3 at_m(z_m * (double(column) - frame.camera.cx_px) / frame.camera.fx_px, z_m * (double(row) - frame.camera.cy_px) / frame.camera.fy_px,
+                        z_m);
+        if (is_near(frame.T_base_camera * at_m)) return true;
+      }
+    return false;
+  }
+
   void say(const std::string& what, const std::string& where) {
     if (known_.insert(what).second) said_.push_back(where.empty() ? what : where + ": " + what);
   }
@@ -254,6 +299,9 @@ class OddNumbers {
         if (along_n < -std::max(unsure_n, 0.5 * load.force_n->norm()) && pulls == nullptr) pulls = &step;
       }
     }
+    if (pulls != nullptr && presses == 0)
+      say(fmt::format("force_n pulls, against 'direction', in all of push '{}'; it is the force of the tool on the object: is its sign right?", push.name),
+          pulls->source);
     if (pulls != nullptr && presses > 0)
       say(fmt::format("force_n pulls, against 'direction', where other steps of push '{}' press; is its sign right?", push.name),
           pulls->source);

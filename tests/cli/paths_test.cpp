@@ -99,6 +99,18 @@ TEST_F(Paths, OutputsThatCannotBeWrittenAreRefusedBeforeTheWorkBegins) {
   }
 }
 
+// What `estimate` writes replaces model/ and fit/: a recording in there would be gone.
+TEST_F(Paths, ARecordingIsNotOverwrittenByItsResult) {
+  fs::create_directories(folder_ / "bear" / "model");
+  std::ofstream(folder_ / "bear" / "model" / "recording.yaml") << "format: palpate-recording/1\n";
+  for (const std::string out : {"bear", "bear/", "bear/model"}) {
+    EXPECT_THAT(say("estimate bear/model -o " + out), HasSubstr("would be overwritten")) << out;
+    EXPECT_EQ(code_, 3);
+  }
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "bear" / "model" / "recording.yaml"));
+  EXPECT_FALSE(fs::exists(folder_ / "bear" / "fit"));
+}
+
 TEST_F(Paths, APlaceWhereNothingCanBeMadeIsToldBeforeTheWork) {
   EXPECT_THAT(say("estimate /nonexistent -o /proc/nowhere/out"), testing::AnyOf(HasSubstr("cannot be made"), HasSubstr("may not be written")));
   EXPECT_EQ(code_, 3);

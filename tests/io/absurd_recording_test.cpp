@@ -152,6 +152,19 @@ TEST_F(AbsurdRecording, WhatIsOnlyOddIsSaidAndRead) {
               ElementsAre(HasSubstr("gravity_m_s2")));
 }
 
+// The inverse of a hand-eye calibration, the commonest mistake of all: what it shows is elsewhere, and E was found all the same.
+TEST_F(AbsurdRecording, ACameraThatShowsTheObjectNowhereIsSaid) {
+  EXPECT_THAT(warnings_with("quaternion_xyzw: [1, 0, 0, 0]", "quaternion_xyzw: [0, 0, 0, 1]"),  // looks up
+              ElementsAre(HasSubstr("none of the 2 images and clouds shows anything where the object is")));
+}
+
+TEST_F(AbsurdRecording, APushThatPullsAllTheTimeIsSaid) {
+  folder.put("recording.yaml", replaced(replaced(replaced(whole_index, "[0, 0, -1], contact_m: [0.05, 0.05, 0.1], force", "[0, 0, 1], direction: [0, 0, -1], contact_m: [0.05, 0.05, 0.1], force"),
+                                                 "force_n: [0, 0, -2], ", "force_n: [0, 0, 2], direction: [0, 0, -1], "),
+                                        "force_n: [0, 0, -2.1]", "force_n: [0, 0, 2.1]"));
+  EXPECT_THAT(read_recording(folder.path()).warnings, testing::Contains(HasSubstr("in all of push 'seen'")));
+}
+
 TEST_F(AbsurdRecording, AnObjectOfAnySizeTakesToolsOfAnySize) {
   EXPECT_THAT(refusal_with("radius_m: 0.02", "radius_m: 3"), HasSubstr("is 3 m"));
   EXPECT_EQ(refusal_with("name: cube\n", "name: cube\naccept_size: true\n"), "accepted");
