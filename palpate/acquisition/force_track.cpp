@@ -47,13 +47,12 @@ RunningSum way_of(const Track& track, bool is_signed, double from_s, double to_s
   return sum;
 }
 
-/// The tip at the arm's own times, without a force.
-Track tip_track(const StreamPlan& plan, const SensorStreams& streams, const FrameTree& tree, double period_s) {
+/// The tip at the arm's own times, no denser than the period, without a force. Not at all times from the first to the last of
+/// everything: one stamp of another century is enough, and they have no end.
+Track tip_track(const StreamPlan& plan, const FrameTree& tree, double period_s) {
   Track track;
-  double from = 0, to = streams.end_s;
-  if (!streams.wrenches.empty())
-    from = std::min(from, streams.wrenches.front().time_s), to = std::max(to, streams.wrenches.back().time_s);
-  for (double time = from; time <= to; time += period_s) {
+  for (const double time : tree.times_s(plan.base_frame, plan.tip_frame)) {
+    if (!track.samples.empty() && time < track.samples.back().time_s + period_s) continue;
     const auto tip = tree.lookup(plan.base_frame, plan.tip_frame, time);
     if (!tip) continue;
     track.samples.push_back({time, Vec3::Zero(), tip->translation()});
@@ -164,20 +163,21 @@ ClockOffset wrench_offset(const StreamPlan& plan, const SensorStreams& streams, 
       if (std::isfinite(change.amount)) changes.push_back(change);
     }
   }
-  const Track tip = tip_track(plan, streams, tree, 0.005);
+  const Track tip = tip_track(plan, tree, 0.0025);
   const double margin = plan.largest_offset_s + 1;
   found = find_offset(way_of(tip, true, from - margin, to + margin), changes, plan.largest_offset_s);
   found.sensor = "force";
   return found;
 }
 
-ClockOffset camera_offset(const StreamPlan& plan, const SensorStreams& streams, const FrameTree& tree,
-                          const DepthStream& camera) {
+ClockOffset camera_offset(const StreamPlan& plan, const FrameTree& tree, const DepthStream& camera) {
   constexpr std::size_t most_images = 600;
   constexpr double compared_s = 0.15;        // apart: the tool has to have moved beyond the noise of a pixel
   constexpr double largest_change_m = 0.02;  // edges jump by as much as the background is away: they count, but not for more
   ClockOffset found;
-  const Track tip = tip_track(plan, streams, tree, 0.01);
+  found.sensor = camera.name;
+  if (camera.times_s.empty()) return found;
+  const Track tip = tip_track(plan, tree, 0.005);
   const RunningSum way = way_of(tip, false, -1e300, 1e300);
   // Where most happens: the stretch of images over which the tip goes farthest.
   std::size_t begin = 0;

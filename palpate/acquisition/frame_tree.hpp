@@ -23,6 +23,8 @@ class FrameTree {
   bool connects(const std::string& a, const std::string& b) const;
   /// T_target_source, or nothing when they are not connected or a link was not seen near that time.
   std::optional<Pose> lookup(const std::string& target, const std::string& source, double time_s) const;
+  /// Times, rising, at which a link that moves between the two was seen; empty where none is or they are not connected.
+  std::vector<double> times_s(const std::string& target, const std::string& source) const;
   std::vector<std::string> frames() const;
 
  private:

@@ -85,7 +85,7 @@ class Assembly {
     wrench_offset_s_ = clock_of(plan_.wrench_clock, [&] { return wrench_offset(plan_, streams_, tree_); });
     for (const DepthStream& camera : streams_.cameras)
       camera_offset_s_.push_back(
-          clock_of(plan_.camera_clock, [&] { return camera_offset(plan_, streams_, tree_, camera); }));
+          clock_of(plan_.camera_clock, [&] { return camera_offset(plan_, tree_, camera); }));
     // Clouds come from the same device as the depth images, where there are any.
     cloud_offset_s_ = !camera_offset_s_.empty() ? camera_offset_s_.front() : plan_.camera_clock.offset_s;
   }
