@@ -437,7 +437,7 @@ class Assembly {
 
   /// In the order of the recording's joint names; empty where one is missing.
   std::vector<double> joints_of(double time_s) const {
-    const auto all = joints_at(streams_, time_s);
+    const auto all = joints_at(streams_, plan_.recording.robot, time_s);
     std::vector<double> positions;
     for (const std::string& name : out_.recording.joint_names) {
       const auto place = std::find(streams_.joint_names.begin(), streams_.joint_names.end(), name);
@@ -459,7 +459,7 @@ class Assembly {
       of_steps_.add("the robot is not masked in the image of", step_s, ": the pose of '" + root + "' is not known");
       return frame;
     }
-    const NamedJoints joints = known_joints_at(streams_, kinematics.robot(), frame.time_s);
+    const NamedJoints joints = known_joints_at(streams_, plan_.recording.robot, frame.time_s);
     if (const auto unmasked = unmasked_links(*mask_, joints, streams_)) {
       of_steps_.add(unmasked->who + " not masked in the image of", step_s, ": " + unmasked->why);
       if (unmasked->is_whole_robot) return frame;

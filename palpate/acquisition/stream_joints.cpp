@@ -5,12 +5,24 @@
 #include <cmath>
 
 namespace palpate::acquisition {
+namespace {
+
+/// An angle that is the other one, whole turns apart, and nearest to `from_rad`.
+double nearest_turn(double from_rad, double to_rad) { return to_rad - 2 * M_PI * std::round((to_rad - from_rad) / (2 * M_PI)); }
+
+bool is_continuous(const std::optional<RobotModel>& robot, const std::string& joint) {
+  return robot && std::any_of(robot->joints.begin(), robot->joints.end(), [&](const RobotJoint& one) {
+           return one.name == joint && one.kind == RobotJoint::Kind::continuous;
+         });
+}
+
+}  // namespace
 
 bool knows(const RobotModel& robot, const std::string& joint) {
   return std::any_of(robot.joints.begin(), robot.joints.end(), [&](const RobotJoint& one) { return one.name == joint; });
 }
 
-std::optional<std::vector<double>> joints_at(const SensorStreams& streams, double time_s) {
+std::optional<std::vector<double>> joints_at(const SensorStreams& streams, const std::optional<RobotModel>& robot, double time_s) {
   constexpr double near_s = 0.5;
   const auto& samples = streams.joints;
   const auto after = std::lower_bound(samples.begin(), samples.end(), time_s,
@@ -25,16 +37,20 @@ std::optional<std::vector<double>> joints_at(const SensorStreams& streams, doubl
   if (b.time_s - a.time_s > 2 * near_s) return std::nullopt;
   const double share = (time_s - a.time_s) / (b.time_s - a.time_s);
   std::vector<double> positions;
-  for (std::size_t k = 0; k < a.positions.size(); ++k)
-    positions.push_back((1 - share) * a.positions[k] + share * b.positions[k]);
+  for (std::size_t k = 0; k < a.positions.size(); ++k) {
+    // A joint that turns without end is told between -pi and pi: from one to the other is no turn back through everything.
+    const bool turns = k < streams.joint_names.size() && is_continuous(robot, streams.joint_names[k]);
+    const double next = turns ? nearest_turn(a.positions[k], b.positions[k]) : b.positions[k];
+    positions.push_back((1 - share) * a.positions[k] + share * next);
+  }
   return positions;
 }
 
-NamedJoints known_joints_at(const SensorStreams& streams, const RobotModel& robot, double time_s) {
+NamedJoints known_joints_at(const SensorStreams& streams, const std::optional<RobotModel>& robot, double time_s) {
   NamedJoints known;
-  const auto all = joints_at(streams, time_s);
-  for (std::size_t k = 0; all && k < streams.joint_names.size(); ++k) {
-    if (!knows(robot, streams.joint_names[k])) continue;  // of another device on the topic
+  const auto all = joints_at(streams, robot, time_s);
+  for (std::size_t k = 0; robot && all && k < streams.joint_names.size(); ++k) {
+    if (!knows(*robot, streams.joint_names[k])) continue;  // of another device on the topic
     known.names.push_back(streams.joint_names[k]);
     known.positions.push_back((*all)[k]);
   }

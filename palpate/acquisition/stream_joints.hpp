@@ -14,15 +14,15 @@ namespace palpate::acquisition {
 /// True when a robot's description has a joint of that name.
 bool knows(const RobotModel& robot, const std::string& joint);
 
-/// Joints at a time, interpolated; nothing away from any sample.
-std::optional<std::vector<double>> joints_at(const SensorStreams& streams, double time_s);
+/// Joints at a time, interpolated, continuous ones of the robot the short way around; nothing away from any sample.
+std::optional<std::vector<double>> joints_at(const SensorStreams& streams, const std::optional<RobotModel>& robot, double time_s);
 
-/// Those of them that the robot's description knows; none away from any sample.
+/// Those of them that the robot's description knows; none without one, and away from any sample.
 struct NamedJoints {
   std::vector<std::string> names;
   std::vector<double> positions;
 };
-NamedJoints known_joints_at(const SensorStreams& streams, const RobotModel& robot, double time_s);
+NamedJoints known_joints_at(const SensorStreams& streams, const std::optional<RobotModel>& robot, double time_s);
 
 /// Links with a shape that cannot be masked since they hang on a joint without a value, in words.
 struct UnmaskedLinks {

@@ -223,5 +223,42 @@ TEST(FromStreams, LinksThatAreKnownAreMaskedWithoutThoseThatAreNot) {
   EXPECT_THAT(made.notes, testing::Contains(testing::AllOf(HasSubstr("'finger'"), HasSubstr("not masked"), HasSubstr("'finger_joint'"))));
 }
 
+/// Half a turn the short way is no turn back through everything.
+TEST(FromStreams, AJointThatTurnsWithoutEndGoesTheShortWay) {
+  SensorStreams streams = lab();
+  streams.joint_names = {"lift", "turn", "elbow"};
+  for (int i = 0; i <= 300; ++i) {
+    const double one = i % 2 == 0 ? 3.13 : -3.13;
+    streams.joints.push_back({0.1 * i + 0.003, {height_m(0.1 * i + 0.003), one, one}});
+  }
+  StreamPlan turning = plan();
+  RobotModel robot = column();
+  RobotJoint joint;
+  joint.kind = RobotJoint::Kind::continuous;
+  joint.name = "turn";
+  joint.parent = "tip";
+  joint.child = "spindle";
+  joint.axis = Vec3::UnitZ();
+  robot.links.push_back({"spindle", {}, {}});
+  robot.joints.push_back(joint);
+  joint.kind = RobotJoint::Kind::revolute;
+  joint.name = "elbow";
+  joint.parent = "spindle";
+  joint.child = "flap";
+  joint.lower = -3.2, joint.upper = 3.2;
+  robot.links.push_back({"flap", {}, {}});
+  robot.joints.push_back(joint);
+  turning.recording.robot = robot;
+  streams.cameras.clear();
+  bool went_back = false;
+  const FromStreams made = recording_from(turning, streams);
+  for (const Step& step : made.recording.pushes[0].steps) {
+    ASSERT_EQ(step.joints_rad.size(), 3u);
+    EXPECT_LT(std::cos(step.joints_rad[1]), std::cos(3.129)) << step.joints_rad[1];
+    went_back |= std::cos(step.joints_rad[2]) > -0.9;
+  }
+  EXPECT_TRUE(went_back) << "a revolute joint has no other way";
+}
+
 }  // namespace
 }  // namespace palpate::acquisition
