@@ -8,6 +8,7 @@
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/materials.hpp"
 #include "palpate/fem/regions.hpp"
+#include "palpate/io/part_folder.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/result.hpp"
 #include "palpate/report/report.hpp"
@@ -31,10 +32,11 @@ std::vector<Index> held_nodes(const Recording& object) {
 }  // namespace
 
 void write_learned_object(const Identified& found, const Recording& recording, const fs::path& out) {
-  io::write_result(found.answer, out);
-  io::write_model(found.answer, found.volume, out / "model", found.region);
-  { const io::RecordingWriter object(out / "model", found.object); }
+  const io::PartFolder model(out / "model");
+  io::write_model(found.answer, found.volume, model.path(), found.region);
+  { const io::RecordingWriter object(model.path(), found.object); }
   report::write_report(found.answer, &recording, out / "report.html");
+  io::write_result(found.answer, out, model.path());  // last: an earlier result stays until all of this one is there
 }
 
 LearnedObject load_learned_object(const fs::path& given) {
@@ -53,6 +55,7 @@ LearnedObject load_learned_object(const fs::path& given) {
   }
   if (!fs::exists(out / "model" / "recording.yaml", code))
     throw Error("holds no model/recording.yaml; run `palpate estimate` again", out.string());
+  io::check_model(out);
   learned.object = io::read_recording_unchecked(out / "model");
   if (!learned.object.rest.volume) throw Error("holds no volume mesh", (out / "model").string());
   return learned;

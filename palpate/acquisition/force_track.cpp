@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 
+#include "palpate/acquisition/stream_joints.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/kinematics.hpp"
 #include "palpate/sensing/wrench.hpp"
@@ -16,17 +17,37 @@ std::string sensor_frame(const StreamPlan& plan, const SensorStreams& streams) {
   return plan.wrench_frame.empty() ? streams.wrench_frame : plan.wrench_frame;
 }
 
-void demand_frame(const FrameTree& tree, const StreamPlan& plan, const std::string& frame, const char* key) {
+/// A joint that nobody tells, which hides a frame: its own link's, or that of the link that it is mounted on.
+std::optional<std::string> hiding_joint(const FrameTree& tree, const StreamPlan& plan, const SensorStreams& streams,
+                                        const std::string& frame) {
+  if (!plan.recording.robot || streams.joints.empty()) return std::nullopt;
+  const sensing::Kinematics kinematics(*plan.recording.robot);
+  const auto& links = kinematics.robot().links;
+  const std::string top = tree.root_of(frame);
+  const auto link = std::find_if(links.begin(), links.end(), [&](const RobotLink& one) { return one.name == top; });
+  if (link == links.end()) return std::nullopt;
+  return kinematics.missing_joint(static_cast<Index>(link - links.begin()), streams.joint_names);
+}
+
+/// @param name   of what has the frame, for the message
+/// @param field  of the mapping that names it; the tip's own where it has one
+void demand_frame(const FrameTree& tree, const StreamPlan& plan, const SensorStreams& streams, const std::string& frame,
+                  const std::string& name, const char* field) {
   if (frame == plan.base_frame || tree.connects(plan.base_frame, frame)) return;
   std::string known;
   for (const std::string& one : tree.frames()) known += (known.empty() ? "" : ", ") + one;
-  const auto written = [&](const std::string& where) { return where.empty() ? plan.source + ": frames" : where; };
+  const auto written = [&](const std::string& where) { return where.empty() ? plan.source + ": " + field : where; };
   if (!known.empty() && !tree.knows(plan.base_frame))
     throw Error("no transform names the base frame '" + plan.base_frame + "'; frames in the bag: " + known, written(plan.base_where));
-  throw Error("the frame '" + frame + "' (" + key + ") is not connected to the base frame '" + plan.base_frame +
+  const std::string where = written(frame == plan.tip_frame ? plan.tip_where : "");
+  if (const auto joint = hiding_joint(tree, plan, streams, frame))
+    throw Error("the frame '" + frame + "' (" + name + ") hangs on the joint '" + *joint +
+                    "', which the joint states (topics.joints) never tell; record its topic, or name a frame before that joint",
+                where);
+  throw Error("the frame '" + frame + "' (" + name + ") is not connected to the base frame '" + plan.base_frame +
                   "' by any transform; frames in the bag: " + (known.empty() ? "none" : known) +
                   ". A robot description with joint states helps too",
-              written(frame == plan.tip_frame ? plan.tip_where : ""));
+              where);
 }
 
 /// Way of the tip so far, signed along its own axis or as a length.
@@ -47,13 +68,12 @@ RunningSum way_of(const Track& track, bool is_signed, double from_s, double to_s
   return sum;
 }
 
-/// The tip at the arm's own times, without a force.
-Track tip_track(const StreamPlan& plan, const SensorStreams& streams, const FrameTree& tree, double period_s) {
+/// The tip at the arm's own times, no denser than the period, without a force. Not at all times from the first to the last of
+/// everything: one stamp of another century is enough, and they have no end.
+Track tip_track(const StreamPlan& plan, const FrameTree& tree, double period_s) {
   Track track;
-  double from = 0, to = streams.end_s;
-  if (!streams.wrenches.empty())
-    from = std::min(from, streams.wrenches.front().time_s), to = std::max(to, streams.wrenches.back().time_s);
-  for (double time = from; time <= to; time += period_s) {
+  for (const double time : tree.times_s(plan.base_frame, plan.tip_frame)) {
+    if (!track.samples.empty() && time < track.samples.back().time_s + period_s) continue;
     const auto tip = tree.lookup(plan.base_frame, plan.tip_frame, time);
     if (!tip) continue;
     track.samples.push_back({time, Vec3::Zero(), tip->translation()});
@@ -63,10 +83,6 @@ Track tip_track(const StreamPlan& plan, const SensorStreams& streams, const Fram
 }
 
 }  // namespace
-
-bool knows(const RobotModel& robot, const std::string& joint) {
-  return std::any_of(robot.joints.begin(), robot.joints.end(), [&](const RobotJoint& one) { return one.name == joint; });
-}
 
 FrameTree tree_of(const StreamPlan& plan, const SensorStreams& streams) {
   FrameTree tree(streams.frames);
@@ -98,16 +114,18 @@ FrameTree tree_of(const StreamPlan& plan, const SensorStreams& streams) {
     for (const JointSample& sample : streams.joints) {
       std::vector<double> positions;
       for (const std::size_t k : used) positions.push_back(sample.positions[k]);
-      const std::vector<Pose> poses = kinematics.link_poses(names, positions);
+      // Of a joint that nobody tells, a gripper's perhaps, only what hangs on it is not known.
+      const std::vector<std::optional<Pose>> poses = kinematics.known_link_poses(names, positions);
       for (std::size_t i = 0; i < link_of.size(); ++i)
-        links[first + i].samples.push_back({sample.time_s, poses[std::size_t(link_of[i])]});
+        if (const auto& pose = poses[std::size_t(link_of[i])]) links[first + i].samples.push_back({sample.time_s, *pose});
     }
     tree = FrameTree(links);
   }
-  demand_frame(tree, plan, plan.tip_frame, "tip");
-  if (wanted.size() > 1 && wanted[1] == sensor_frame(plan, streams)) demand_frame(tree, plan, wanted[1], "wrench");
-  for (const DepthStream& camera : streams.cameras) demand_frame(tree, plan, camera.frame, camera.name.c_str());
-  for (const CloudStream& cloud : streams.clouds) demand_frame(tree, plan, cloud.frame, cloud.name.c_str());
+  demand_frame(tree, plan, streams, plan.tip_frame, "tip", "frames.tip");
+  if (wanted.size() > 1 && wanted[1] == sensor_frame(plan, streams))
+    demand_frame(tree, plan, streams, wanted[1], "wrench", "frames.wrench");
+  for (const DepthStream& camera : streams.cameras) demand_frame(tree, plan, streams, camera.frame, camera.name, "topics.depth");
+  for (const CloudStream& cloud : streams.clouds) demand_frame(tree, plan, streams, cloud.frame, cloud.name, "topics.clouds");
   return tree;
 }
 
@@ -164,20 +182,21 @@ ClockOffset wrench_offset(const StreamPlan& plan, const SensorStreams& streams, 
       if (std::isfinite(change.amount)) changes.push_back(change);
     }
   }
-  const Track tip = tip_track(plan, streams, tree, 0.005);
+  const Track tip = tip_track(plan, tree, 0.0025);
   const double margin = plan.largest_offset_s + 1;
   found = find_offset(way_of(tip, true, from - margin, to + margin), changes, plan.largest_offset_s);
   found.sensor = "force";
   return found;
 }
 
-ClockOffset camera_offset(const StreamPlan& plan, const SensorStreams& streams, const FrameTree& tree,
-                          const DepthStream& camera) {
+ClockOffset camera_offset(const StreamPlan& plan, const FrameTree& tree, const DepthStream& camera) {
   constexpr std::size_t most_images = 600;
   constexpr double compared_s = 0.15;        // apart: the tool has to have moved beyond the noise of a pixel
   constexpr double largest_change_m = 0.02;  // edges jump by as much as the background is away: they count, but not for more
   ClockOffset found;
-  const Track tip = tip_track(plan, streams, tree, 0.01);
+  found.sensor = camera.name;
+  if (camera.times_s.empty()) return found;
+  const Track tip = tip_track(plan, tree, 0.005);
   const RunningSum way = way_of(tip, false, -1e300, 1e300);
   // Where most happens: the stretch of images over which the tip goes farthest.
   std::size_t begin = 0;
@@ -218,26 +237,6 @@ ClockOffset camera_offset(const StreamPlan& plan, const SensorStreams& streams, 
   found = find_offset(way, changes, plan.largest_offset_s, double(apart));
   found.sensor = camera.name;
   return found;
-}
-
-std::optional<std::vector<double>> joints_at(const SensorStreams& streams, double time_s) {
-  constexpr double near_s = 0.5;
-  const auto& samples = streams.joints;
-  const auto after = std::lower_bound(samples.begin(), samples.end(), time_s,
-                                      [](const JointSample& sample, double time) { return sample.time_s < time; });
-  if (after != samples.end() && after->time_s == time_s) return after->positions;
-  if (after == samples.begin() || after == samples.end()) {
-    if (samples.empty()) return std::nullopt;
-    const JointSample& end = after == samples.begin() ? samples.front() : samples.back();
-    return std::abs(end.time_s - time_s) < near_s ? std::optional(end.positions) : std::nullopt;
-  }
-  const JointSample &a = *(after - 1), &b = *after;
-  if (b.time_s - a.time_s > 2 * near_s) return std::nullopt;
-  const double share = (time_s - a.time_s) / (b.time_s - a.time_s);
-  std::vector<double> positions;
-  for (std::size_t k = 0; k < a.positions.size(); ++k)
-    positions.push_back((1 - share) * a.positions[k] + share * b.positions[k]);
-  return positions;
 }
 
 }  // namespace palpate::acquisition

@@ -26,13 +26,6 @@ Track track_of(const StreamPlan& plan, const SensorStreams& streams, const Frame
 ClockOffset wrench_offset(const StreamPlan& plan, const SensorStreams& streams, const FrameTree& tree);
 
 /// Offset of a camera's clock against the arm's, from how its picture changes while the tip moves.
-ClockOffset camera_offset(const StreamPlan& plan, const SensorStreams& streams, const FrameTree& tree,
-                          const DepthStream& camera);
-
-/// True when a robot's description has a joint of that name.
-bool knows(const RobotModel& robot, const std::string& joint);
-
-/// Joints at a time, interpolated; nothing away from any sample.
-std::optional<std::vector<double>> joints_at(const SensorStreams& streams, double time_s);
+ClockOffset camera_offset(const StreamPlan& plan, const FrameTree& tree, const DepthStream& camera);
 
 }  // namespace palpate::acquisition

@@ -76,6 +76,25 @@ std::optional<Pose> FrameTree::lookup(const std::string& target, const std::stri
   return T_meet_target->inverse() * *T_meet_source;
 }
 
+std::vector<double> FrameTree::times_s(const std::string& target, const std::string& source) const {
+  const std::vector<std::string> a = way_up(target), b = way_up(source);
+  if (a.back() != b.back()) return {};
+  std::vector<double> times;
+  const auto add = [&](const std::vector<std::string>& way, const std::vector<std::string>& other) {
+    for (const std::string& frame : way) {
+      if (std::find(other.begin(), other.end(), frame) != other.end()) return;  // where they meet
+      const FrameLink& link = above_.at(frame);
+      if (link.is_fixed) continue;
+      for (const PoseSample& sample : link.samples) times.push_back(sample.time_s);
+    }
+  };
+  add(a, b);
+  add(b, a);
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
+}
+
 std::vector<std::string> FrameTree::frames() const {
   std::vector<std::string> names;
   for (const auto& [child, link] : above_) {

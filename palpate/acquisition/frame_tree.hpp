@@ -21,8 +21,12 @@ class FrameTree {
   bool has_parent(const std::string& frame) const { return above_.count(frame) > 0; }
   /// True when a way leads from one to the other, at whatever time.
   bool connects(const std::string& a, const std::string& b) const;
+  /// The frame at the top of the way up; itself where it has no parent.
+  std::string root_of(const std::string& frame) const { return way_up(frame).back(); }
   /// T_target_source, or nothing when they are not connected or a link was not seen near that time.
   std::optional<Pose> lookup(const std::string& target, const std::string& source, double time_s) const;
+  /// Times, rising, at which a link that moves between the two was seen; empty where none is or they are not connected.
+  std::vector<double> times_s(const std::string& target, const std::string& source) const;
   std::vector<std::string> frames() const;
 
  private:

@@ -11,6 +11,7 @@
 #include "palpate/acquisition/force_track.hpp"
 #include "palpate/acquisition/repeated_notes.hpp"
 #include "palpate/acquisition/step_force.hpp"
+#include "palpate/acquisition/stream_joints.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/plane_mask.hpp"
@@ -85,7 +86,7 @@ class Assembly {
     wrench_offset_s_ = clock_of(plan_.wrench_clock, [&] { return wrench_offset(plan_, streams_, tree_); });
     for (const DepthStream& camera : streams_.cameras)
       camera_offset_s_.push_back(
-          clock_of(plan_.camera_clock, [&] { return camera_offset(plan_, streams_, tree_, camera); }));
+          clock_of(plan_.camera_clock, [&] { return camera_offset(plan_, tree_, camera); }));
     // Clouds come from the same device as the depth images, where there are any.
     cloud_offset_s_ = !camera_offset_s_.empty() ? camera_offset_s_.front() : plan_.camera_clock.offset_s;
   }
@@ -436,7 +437,7 @@ class Assembly {
 
   /// In the order of the recording's joint names; empty where one is missing.
   std::vector<double> joints_of(double time_s) const {
-    const auto all = joints_at(streams_, time_s);
+    const auto all = joints_at(streams_, plan_.recording.robot, time_s);
     std::vector<double> positions;
     for (const std::string& name : out_.recording.joint_names) {
       const auto place = std::find(streams_.joint_names.begin(), streams_.joint_names.end(), name);
@@ -451,25 +452,19 @@ class Assembly {
       throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description",
                   plan_.source + ": topics.depth");
     if (!mask_) mask_ = std::make_unique<sensing::RobotMask>(*plan_.recording.robot);
-    const std::vector<double> joints = joints_of(frame.time_s);
     const sensing::Kinematics& kinematics = mask_->kinematics();
     const std::string root = kinematics.robot().links[std::size_t(kinematics.root_link())].name;
     const auto base = pose_of(root, frame.time_s);
-    const std::vector<std::string>& names = out_.recording.joint_names;
-    const auto& free = kinematics.free_joints();
-    const auto missing = std::find_if(free.begin(), free.end(), [&](const std::string& one) {
-      return joints.empty() || std::find(names.begin(), names.end(), one) == names.end();
-    });
-    if (missing != free.end() || !base) {
-      const auto& heard = streams_.joint_names;
-      const bool is_heard = base && std::find(heard.begin(), heard.end(), *missing) != heard.end();
-      of_steps_.add("the robot is not masked in the image of", step_s,
-                    is_heard ? ": there is no joint state near that time"
-                    : base   ? ": its joint '" + *missing + "' is not in the joint states"
-                             : ": the pose of '" + root + "' is not known");
+    if (!base) {
+      of_steps_.add("the robot is not masked in the image of", step_s, ": the pose of '" + root + "' is not known");
       return frame;
     }
-    return sensing::with_mask(frame, mask_->mask(frame, names, joints, *base));
+    const NamedJoints joints = known_joints_at(streams_, plan_.recording.robot, frame.time_s);
+    if (const auto unmasked = unmasked_links(*mask_, joints, streams_)) {
+      of_steps_.add(unmasked->who + " not masked in the image of", step_s, ": " + unmasked->why);
+      if (unmasked->is_whole_robot) return frame;
+    }
+    return sensing::with_mask(frame, mask_->mask_known(frame, joints.names, joints.positions, *base));
   }
 
   const StreamPlan& plan_;

@@ -15,6 +15,14 @@ namespace palpate::io {
 namespace {
 
 constexpr double foreign_clock_s = 1;  // recorders are not that late: the headers then count from another zero
+constexpr double far_lengths = 10, far_s = 60;  // a bag played ten times as fast still says its own times
+
+/// A message whose stamp is no time of this bag.
+class StrayStamp : public Error {
+ public:
+  StrayStamp(double time_s, const std::string& where)
+      : Error("the stamp lies " + std::to_string(std::llround(time_s)) + " s from the bag's start", where) {}
+};
 
 /// ROS 1 let frames start with a slash.
 std::string plain(const std::string& frame) { return frame.starts_with("/") ? frame.substr(1) : frame; }
@@ -24,12 +32,16 @@ class StreamReader {
   StreamReader(const MessageSource& bag, const BagMapping& mapping) : bag_(bag), mapping_(mapping) {
     if (bag.messages.empty()) throw Error("holds no message" + (bag.warnings.empty() ? "" : ": " + bag.warnings.front()), bag.name);
     start_ns_ = bag.messages.front().log_time_ns;
+    const StreamPlan& plan = mapping.plan;
+    const double length_s = static_cast<double>(bag.messages.back().log_time_ns - start_ns_) * 1e-9;
+    far_s_ = far_s + far_lengths * length_s + std::abs(plan.camera_clock.offset_s) + std::abs(plan.wrench_clock.offset_s);
   }
 
   /// The messages of a topic. @throws Error when there is no such topic, or none of these types.
   struct Topic {
     const MessageTopic* about = nullptr;
     std::vector<const Message*> messages;
+    std::string mapped;  ///< file, line and field
   };
   Topic topic(const MappedTopic& mapped, const std::vector<std::string>& types) const {
     Topic found;
@@ -43,6 +55,7 @@ class StreamReader {
         continue;
       }
       found.about = &one;
+      found.mapped = mapped.where;
       for (const Message& message : bag_.messages)
         if (message.topic == i) found.messages.push_back(&message);
       return found;
@@ -58,7 +71,15 @@ class StreamReader {
                 mapped.where);
   }
 
+  /// @throws StrayStamp
   double seconds(const RosHeader& header, const Message& message) const {
+    const double time_s = stamped_s(header, message);
+    if (is_stray(time_s)) throw StrayStamp(time_s, bag_.name);
+    return time_s;
+  }
+  bool is_stray(double time_s) const { return std::abs(time_s) > far_s_; }
+  /// Whatever it says.
+  double stamped_s(const RosHeader& header, const Message& message) const {
     const bool by_log = mapping_.use_log_time || header.stamp_ns == 0;
     return static_cast<double>((by_log ? message.log_time_ns : header.stamp_ns) - (by_log ? log_start_ns() : start_ns_)) *
            1e-9;
@@ -67,42 +88,58 @@ class StreamReader {
     return static_cast<double>(message.log_time_ns - log_start_ns()) * 1e-9;
   }
 
-  /// Headers of a simulation count from another zero than the recorder's clock does: the first force tells by how much.
+  /// Headers of a simulation count from another zero than the recorder's clock does: the forces tell by how much. One without a
+  /// stamp, sent before the simulation's clock was heard, tells nothing, and one stamp alone may be nonsense: what most of them say
+  /// is the clock, and the first near it the start. (A simulation need not go as fast as the recorder's clock.)
   void settle_start(const Topic& wrench, std::vector<std::string>& warnings) {
     if (mapping_.use_log_time) return;
-    std::int64_t shift_ns = 0;
+    std::vector<std::int64_t> shifts_ns;
     for (const Message* message : wrench.messages) {
       try {
         const std::int64_t stamp = decode_header(message->data, where(wrench), wrench.about->encoding).stamp_ns;
-        if (stamp != 0) shift_ns = stamp - message->log_time_ns;
-        break;
+        if (stamp != 0) shifts_ns.push_back(stamp - message->log_time_ns);
       } catch (const Error&) {  // damaged: it is counted when the forces are read
       }
     }
-    const double shift_s = static_cast<double>(shift_ns) * 1e-9;
-    if (std::abs(shift_s) < foreign_clock_s) return;
-    start_ns_ += shift_ns;
-    warnings.push_back("the stamps in the messages' headers and the recorder's clock differ by " + std::to_string(shift_s) +
-                       " s; times count from the bag's start by the headers");
+    if (shifts_ns.empty()) return;
+    std::vector<std::int64_t> sorted = shifts_ns;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    const std::int64_t median_ns = *middle;
+    const auto seconds_of = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-9; };
+    const std::int64_t first_ns = *std::find_if(shifts_ns.begin(), shifts_ns.end(), [&](std::int64_t one) {
+      return std::abs(seconds_of(one - median_ns)) < far_s_;
+    });
+    if (std::min(std::abs(seconds_of(median_ns)), std::abs(seconds_of(first_ns))) < foreign_clock_s) return;
+    start_ns_ += first_ns;
+    warnings.push_back("the stamps in the messages' headers and the recorder's clock differ by " +
+                       std::to_string(seconds_of(first_ns)) + " s; times count from the bag's start by the headers");
   }
 
   std::string where(const Topic& topic) const { return bag_.name + ": " + topic.about->name; }
 
-  /// Runs `decode` on every message; those that are damaged are counted.
+  /// Runs `decode` on every message; those that are damaged, and those of no time of the bag, are counted.
+  /// @throws Error where no stamp of a topic is one: its clock is another
   template <typename Decode>
   void each(const Topic& topic, std::vector<std::string>& warnings, Decode decode) const {
-    std::size_t lost = 0;
-    std::string first;
+    std::size_t lost = 0, stray = 0;
+    std::string first_lost, first_stray;
     for (const Message* message : topic.messages) {
       try {
         decode(*message);
+      } catch (const StrayStamp& error) {
+        if (stray++ == 0) first_stray = error.message();
       } catch (const Error& error) {
-        if (lost++ == 0) first = error.message();
+        if (lost++ == 0) first_lost = error.message();
       }
     }
-    if (lost > 0)
-      warnings.push_back(std::to_string(lost) + " of " + std::to_string(topic.messages.size()) + " messages of " +
-                         topic.about->name + " were left out (" + first + ")");
+    const std::string all = std::to_string(topic.messages.size()) + " messages of ";
+    if (lost > 0) warnings.push_back(std::to_string(lost) + " of " + all + topic.about->name + " were left out (" + first_lost + ")");
+    if (stray == 0) return;
+    const std::string why = " (" + first_stray + "); clocks: {stamp: log} takes the recorder's times, an offset says how far a clock is off";
+    if (stray == topic.messages.size())
+      throw Error("no stamp of '" + topic.about->name + "' is a time of the bag" + why, topic.mapped);
+    warnings.push_back(std::to_string(stray) + " of " + all + topic.about->name + " were left out" + why);
   }
 
  private:
@@ -110,6 +147,7 @@ class StreamReader {
   const MessageSource& bag_;
   const BagMapping& mapping_;
   std::int64_t start_ns_ = 0;
+  double far_s_ = 0;  // further from the bag's start no stamp is believed
   mutable std::string mismatch_;
 };
 
@@ -167,13 +205,20 @@ void read_transforms(const StreamReader& reader, const StreamReader::Topic& topi
                      std::map<std::pair<std::string, std::string>, FrameLink>& links, SensorStreams& streams) {
   const bool fixed = topic.about->name.ends_with("tf_static");
   reader.each(topic, streams.warnings, [&](const Message& message) {
+    std::optional<double> stray_s;
     for (const RosTransform& one : decode_transforms(message.data, reader.where(topic), topic.about->encoding)) {
+      const double time_s = reader.stamped_s(one.header, message);
+      if (!fixed && reader.is_stray(time_s)) {  // what stands may have been said long before
+        stray_s = time_s;
+        continue;
+      }
       FrameLink& link = links[{plain(one.header.frame), plain(one.child)}];
       link.parent = plain(one.header.frame);
       link.child = plain(one.child);
       link.is_fixed |= fixed;
-      link.samples.push_back({reader.seconds(one.header, message), one.T_parent_child});
+      link.samples.push_back({time_s, one.T_parent_child});
     }
+    if (stray_s) throw StrayStamp(*stray_s, reader.where(topic));
   });
 }
 
@@ -351,7 +396,7 @@ SensorStreams read_streams(const MessageSource& bag, BagMapping& mapping) {
   if (transforms.empty()) {
     for (const MessageTopic& one : bag.topics)
       if (one.type == "tf2_msgs/msg/TFMessage" || one.type == "tf/msg/tfMessage")
-        transforms.push_back({one.name, mapping.plan.source});
+        transforms.push_back({one.name, mapping.plan.source + ": topics.transforms"});
   }
   for (const MappedTopic& one : transforms)
     read_transforms(reader, reader.topic(one, {"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"}), links, streams);

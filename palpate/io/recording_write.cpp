@@ -6,6 +6,7 @@
 #include "palpate/io/depth_file.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
+#include "palpate/io/part_folder.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_names.hpp"
 #include "palpate/io/recording_writer.hpp"
@@ -451,16 +452,19 @@ void RecordingWriter::end_push(const ForceDrift& drift) {
 
 void write_recording(const Recording& recording, const fs::path& folder) {
   std::error_code code;
-  if (fs::exists(folder, code) && !(fs::is_directory(folder, code) && fs::is_empty(folder, code))) {
+  // What a link leads to is filled; the link stays.
+  fs::path target = fs::weakly_canonical(folder, code);
+  if (code) target = folder.lexically_normal();
+  if (target.filename().empty()) target = target.parent_path();
+  if (fs::is_symlink(target, code))
+    throw Error("is a link to '" + fs::read_symlink(target, code).string() + "', which is not there; make that folder, or remove the link",
+                folder.string());
+  if (fs::exists(target, code) && !(fs::is_directory(target, code) && fs::is_empty(target, code))) {
     throw Error("is there already; choose another folder or remove it", folder.string());
   }
-  fs::path part = folder.lexically_normal();
-  if (part.filename().empty()) part = part.parent_path();
-  part += ".part";
-  fs::remove_all(part, code);
-  { RecordingWriter writer(part, recording); }
-  fs::rename(part, folder, code);
-  if (code) throw Error("cannot be put in place: " + code.message(), folder.string());
+  PartFolder part(target);
+  { RecordingWriter writer(part.path(), recording); }
+  part.become(target);
 }
 
 }  // namespace palpate::io

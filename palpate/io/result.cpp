@@ -13,6 +13,7 @@
 #include "palpate/io/file.hpp"
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/npy.hpp"
+#include "palpate/io/part_folder.hpp"
 #include "palpate/io/result_parts.hpp"
 
 namespace palpate::io {
@@ -52,19 +53,34 @@ MatrixX by_element(const std::vector<double>& of_region, const std::vector<int>&
   return out;
 }
 
+/// Files of a folder, its own folders' too.
+std::vector<fs::path> files_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code code;
+  for (fs::recursive_directory_iterator at(folder, code), end; !code && at != end; at.increment(code))
+    if (at->is_regular_file(code)) files.push_back(at->path().lexically_relative(folder));
+  if (code) throw Error("cannot be read: " + code.message(), folder.string());
+  return files;
+}
+
+bool ties_to_the_result(const fs::path& file) {
+  for (const char* one : {"recording.yaml", "object.vtu", "object.msh", "surface.obj"})
+    if (file == one) return false;
+  return true;
+}
+
 }  // namespace
 
-void write_result(const Identification& answer, const fs::path& folder) {
+void write_result(const Identification& answer, const fs::path& folder, const fs::path& model) {
   make_folder(folder);
-  std::error_code code;
-  fs::remove_all(folder / "fit", code);  // of an earlier result
+  PartFolder part(folder / "result");
   if (answer.surface.triangles.rows() > 0) {
-    make_folder(folder / "fit");
-    write_mesh(folder / "fit" / "surface.ply", answer.surface);
+    make_folder(part.path() / "fit");
+    write_mesh(part.path() / "fit" / "surface.ply", answer.surface);
     for (std::size_t i = 0; i < answer.steps.size(); ++i) {
       const StepFit& step = answer.steps[i];
       const auto put = [&](const char* what, const MatrixX& values) {
-        if (values.size() > 0) write_file(step_file(folder, i, what), npy_bytes(values));
+        if (values.size() > 0) write_file(step_file(part.path(), i, what), npy_bytes(values));
       };
       put("surface_m", step.surface_m);
       put("observed_m", step.observed_m);
@@ -73,9 +89,43 @@ void write_result(const Identification& answer, const fs::path& folder) {
       put("masked_m", step.masked_m);
     }
   }
+  nlohmann::json object = result_json(answer);
+  std::vector<fs::path> of_model;
+  if (!model.empty()) {
+    of_model = files_in(model);
+    nlohmann::json& digests = object["model_sha256"] = nlohmann::json::object();
+    for (const fs::path& file : of_model)
+      if (ties_to_the_result(file)) digests[file.generic_string()] = sha256_hex(read_file(model / file));
+  }
+  write_file(part.path() / "result.json", object.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+
+  // From here on only names change. An earlier result.json goes first: it must not stand beside another's model.
+  std::error_code code;
+  fs::remove(folder / "result.json", code);
+  for (const fs::path& file : of_model) {
+    fs::create_directories((folder / "model" / file).parent_path(), code);
+    put_in_place(model / file, folder / "model" / file);
+  }
+  fs::remove_all(folder / "fit", code);
+  if (fs::exists(part.path() / "fit", code)) put_in_place(part.path() / "fit", folder / "fit");
   // Last: who finds a result.json finds all that belongs to it.
-  write_file(folder / "result.json",
-             result_json(answer).dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  put_in_place(part.path() / "result.json", folder / "result.json");
+}
+
+void check_model(const fs::path& folder) {
+  const fs::path index = folder / "result.json";
+  const nlohmann::json object = nlohmann::json::parse(read_file(index), nullptr, false);
+  if (!object.is_object() || !object.contains("model_sha256")) return;
+  const nlohmann::json& digests = object["model_sha256"];
+  if (!digests.is_object()) throw Error("must be an object of file names; run `palpate estimate` again", index.string() + ": model_sha256");
+  std::error_code code;
+  for (const auto& [name, digest] : digests.items()) {
+    const fs::path file = folder / "model" / name;
+    if (!fs::is_regular_file(file, code) || digest != sha256_hex(read_file(file)))
+      throw Error("is not the file that " + index.string() +
+                      " was written with: a model of another estimate, or changed since; run `palpate estimate` again",
+                  file.string());
+  }
 }
 
 Identification read_result(const fs::path& given) {

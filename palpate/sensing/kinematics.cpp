@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/sensing/kinematics.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -86,40 +87,74 @@ Index Kinematics::link(const std::string& name) const {
   throw Error("has no link '" + name + "'; there are: " + names, "robot '" + robot_.name + "'");
 }
 
-std::vector<Pose> Kinematics::link_poses(const std::vector<std::string>& names, const std::vector<double>& positions) const {
+const RobotJoint& Kinematics::source(std::size_t joint) const {
+  const Index master = mimicked_[joint];
+  return robot_.joints[master < 0 ? joint : std::size_t(master)];
+}
+
+std::vector<double> Kinematics::values(const std::vector<std::string>& names, const std::vector<double>& positions) const {
   const std::string where = "robot '" + robot_.name + "'";
   if (names.size() != positions.size())
     throw Error(
         "got " + std::to_string(positions.size()) + " joint positions for " + std::to_string(names.size()) + " names",
         where);
-  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  std::vector<double> value(robot_.joints.size(), unknown);
+  std::vector<double> own(robot_.joints.size(), std::numeric_limits<double>::quiet_NaN());
   for (std::size_t k = 0; k < names.size(); ++k) {
     bool found = false;
     for (std::size_t j = 0; j < robot_.joints.size(); ++j)
       if (robot_.joints[j].name == names[k]) {
-        value[j] = positions[k];
+        own[j] = positions[k];
         found = true;
       }
     if (!found) throw Error("has no joint '" + names[k] + "'", where);
   }
+  std::vector<double> all = own;
+  for (std::size_t j = 0; j < all.size(); ++j)
+    if (mimicked_[j] >= 0)
+      all[j] = robot_.joints[j].mimic_multiplier * own[std::size_t(mimicked_[j])] + robot_.joints[j].mimic_offset;
+  return all;
+}
+
+Pose Kinematics::below(const Pose& parent, std::size_t joint, double value) const {
+  const RobotJoint& about = robot_.joints[joint];
+  return parent * about.T_parent_joint * (moves(about) ? joint_motion(about, value) : Pose(Pose::Identity()));
+}
+
+std::vector<Pose> Kinematics::link_poses(const std::vector<std::string>& names, const std::vector<double>& positions) const {
+  const std::vector<double> value = values(names, positions);
   std::vector<Pose> poses(robot_.links.size(), Pose::Identity());
-  for (const Index j : order_) {
-    const RobotJoint& joint = robot_.joints[std::size_t(j)];
-    Pose motion = Pose::Identity();
-    if (moves(joint)) {
-      const Index master = mimicked_[std::size_t(j)];
-      const double q =
-          master < 0 ? value[std::size_t(j)] : joint.mimic_multiplier * value[std::size_t(master)] + joint.mimic_offset;
-      if (!std::isfinite(q))
-        throw Error("has no finite position of the joint '" +
-                        (master < 0 ? joint.name : robot_.joints[std::size_t(master)].name) + "'",
-                    where);
-      motion = joint_motion(joint, q);
-    }
-    poses[std::size_t(child_[std::size_t(j)])] = poses[std::size_t(parent_[std::size_t(j)])] * joint.T_parent_joint * motion;
+  for (const Index at : order_) {
+    const auto j = std::size_t(at);
+    if (moves(robot_.joints[j]) && !std::isfinite(value[j]))
+      throw Error("has no finite position of the joint '" + source(j).name + "'", "robot '" + robot_.name + "'");
+    poses[std::size_t(child_[j])] = below(poses[std::size_t(parent_[j])], j, value[j]);
   }
   return poses;
+}
+
+std::vector<std::optional<Pose>> Kinematics::known_link_poses(const std::vector<std::string>& names,
+                                                              const std::vector<double>& positions) const {
+  const std::vector<double> value = values(names, positions);
+  std::vector<std::optional<Pose>> poses(robot_.links.size());
+  poses[std::size_t(root_)] = Pose::Identity();
+  for (const Index at : order_) {
+    const auto j = std::size_t(at);
+    const std::optional<Pose>& parent = poses[std::size_t(parent_[j])];
+    if (!parent || (moves(robot_.joints[j]) && !std::isfinite(value[j]))) continue;
+    poses[std::size_t(child_[j])] = below(*parent, j, value[j]);
+  }
+  return poses;
+}
+
+std::optional<std::string> Kinematics::missing_joint(Index link, const std::vector<std::string>& names) const {
+  std::optional<std::string> missing;
+  for (Index at = link; joint_above_[std::size_t(at)] >= 0;) {
+    const auto j = std::size_t(joint_above_[std::size_t(at)]);
+    if (moves(robot_.joints[j]) && std::find(names.begin(), names.end(), source(j).name) == names.end())
+      missing = source(j).name;
+    at = parent_[j];
+  }
+  return missing;
 }
 
 Mat3 Kinematics::position_covariance_m2(const std::vector<Pose>& poses, Index link, const Vec3& point_link_m,

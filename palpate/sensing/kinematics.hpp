@@ -2,6 +2,7 @@
 // Forward kinematics of a URDF tree: revolute, continuous, prismatic, fixed and mimic joints.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,13 @@ class Kinematics {
   /// @throws Error when a free joint has no value, a name is unknown, or the counts differ.
   std::vector<Pose> link_poses(const std::vector<std::string>& names, const std::vector<double>& positions) const;
 
+  /// The same where joints may lack a value: nothing of the links that hang on one.
+  /// @throws Error when a name is unknown, or the counts differ.
+  std::vector<std::optional<Pose>> known_link_poses(const std::vector<std::string>& names,
+                                                    const std::vector<double>& positions) const;
+  /// The free joint nearest to the root that a link hangs on and that is not among the names; nothing where all are.
+  std::optional<std::string> missing_joint(Index link, const std::vector<std::string>& names) const;
+
   /// Covariance of the position of a point of a link in the root's frame, m2, from independent errors of all joints above it:
   /// the sum of (lever arm times sigma) (lever arm times sigma)' at this pose; a prismatic joint adds nothing to it.
   Mat3 position_covariance_m2(const std::vector<Pose>& link_poses, Index link, const Vec3& point_link_m,
@@ -38,6 +46,13 @@ class Kinematics {
                         double joint_std_rad) const;
 
  private:
+  /// Of every joint, a mimic's too; NaN where it is not known.
+  std::vector<double> values(const std::vector<std::string>& names, const std::vector<double>& positions) const;
+  /// Of a joint's child.
+  Pose below(const Pose& parent, std::size_t joint, double value) const;
+  /// Whose value it takes: its own or that which it mimics.
+  const RobotJoint& source(std::size_t joint) const;
+
   RobotModel robot_;
   Index root_ = 0;
   std::vector<Index> order_;           // joints, parents first

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <optional>
 
 #include "palpate/core/error.hpp"
 
@@ -135,15 +137,35 @@ DepthImage RobotMask::render(const std::vector<Pose>& link_poses, const Camera& 
 
 MaskImage RobotMask::mask(const DepthFrame& frame, const std::vector<std::string>& joint_names,
                           const std::vector<double>& joints, const Pose& T_base_root) const {
-  const std::vector<Pose> poses = kinematics_.link_poses(joint_names, joints);
-  double std_m = 0;  // of the worst link
+  std::vector<std::size_t> shapes(links_.size());
+  std::iota(shapes.begin(), shapes.end(), std::size_t{0});
+  return mask_posed(frame, kinematics_.link_poses(joint_names, joints), shapes, T_base_root);
+}
+
+MaskImage RobotMask::mask_known(const DepthFrame& frame, const std::vector<std::string>& joint_names,
+                                const std::vector<double>& joints, const Pose& T_base_root) const {
+  const std::vector<std::optional<Pose>> known = kinematics_.known_link_poses(joint_names, joints);
+  std::vector<Pose> poses;
+  for (const std::optional<Pose>& one : known) poses.push_back(one.value_or(Pose::Identity()));
+  std::vector<std::size_t> shapes;
   for (std::size_t k = 0; k < links_.size(); ++k)
-    std_m = std::max(std_m, kinematics_.position_std_m(poses, links_[k], farthest_m_[k], options_.joint_std_rad));
+    if (known[std::size_t(links_[k])]) shapes.push_back(k);
+  return mask_posed(frame, poses, shapes, T_base_root);
+}
+
+MaskImage RobotMask::mask_posed(const DepthFrame& frame, const std::vector<Pose>& link_poses,
+                                const std::vector<std::size_t>& shapes, const Pose& T_base_root) const {
+  double std_m = 0;  // of the worst link
+  std::vector<PosedMesh> bodies;
+  for (const std::size_t k : shapes) {
+    std_m = std::max(std_m, kinematics_.position_std_m(link_poses, links_[k], farthest_m_[k], options_.joint_std_rad));
+    bodies.push_back({&meshes_[k], T_base_root * link_poses[std::size_t(links_[k])]});
+  }
   const double pose_margin = options_.pose_sigmas * std::hypot(std_m, options_.base_std_m, frame.pose_std_m);
   RenderMaskOptions margins = options_.margins;
   margins.lateral_margin_m += pose_margin;
   margins.depth_margin_m += pose_margin;
-  return mask_rendered(frame, render(poses, frame.camera, frame.T_base_camera, T_base_root), margins);
+  return mask_rendered(frame, render_depth(bodies, frame.camera, frame.T_base_camera), margins);
 }
 
 }  // namespace palpate::sensing

@@ -44,7 +44,16 @@ class RobotMask {
   MaskImage mask(const DepthFrame& frame, const std::vector<std::string>& joint_names, const std::vector<double>& joints,
                  const Pose& T_base_root = Pose::Identity()) const;
 
+  /// The same of those links alone whose pose these joints tell; the others stay in the image.
+  MaskImage mask_known(const DepthFrame& frame, const std::vector<std::string>& joint_names, const std::vector<double>& joints,
+                       const Pose& T_base_root = Pose::Identity()) const;
+  /// Links with a shape, in the order of the description.
+  const std::vector<Index>& shaped_links() const { return links_; }
+
  private:
+  MaskImage mask_posed(const DepthFrame& frame, const std::vector<Pose>& link_poses, const std::vector<std::size_t>& shapes,
+                       const Pose& T_base_root) const;
+
   Kinematics kinematics_;
   RobotMaskOptions options_;
   std::vector<Index> links_;      // those with geometry

@@ -33,5 +33,19 @@ TEST(FrameTree, AGapIsNotBridged) {
   EXPECT_EQ(tree.lookup("base", "arm", 9.99)->translation().x(), 1);
 }
 
+TEST(FrameTree, TimesAreThoseOfTheLinksThatMoveInBetween) {
+  const Pose at = Pose::Identity();
+  const FrameTree tree({{"base", "arm", false, {{1, at}, {3, at}}},
+                        {"arm", "tip", false, {{2, at}, {3, at}}},
+                        {"tip", "sensor", true, {{9, at}}},
+                        {"base", "camera", false, {{5, at}}},
+                        {"elsewhere", "thing", false, {{7, at}}}});
+  EXPECT_EQ(tree.times_s("base", "tip"), (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(tree.times_s("sensor", "arm"), (std::vector<double>{2, 3}));
+  EXPECT_EQ(tree.times_s("camera", "arm"), (std::vector<double>{1, 3, 5}));
+  EXPECT_TRUE(tree.times_s("base", "thing").empty());
+  EXPECT_TRUE(tree.times_s("tip", "sensor").empty());
+}
+
 }  // namespace
 }  // namespace palpate::acquisition

@@ -150,6 +150,31 @@ TEST(FromStreams, AClockThatCannotBeFoundIsLeftAlone) {
   EXPECT_THAT(made.notes, testing::Contains(HasSubstr("could not be aligned")));
 }
 
+/// A time that belongs to nothing else is no stretch to search: the arm's own times are.
+TEST(FromStreams, OneForceOfAnotherCenturyDoesNotHoldUpTheSearch) {
+  LabOptions late;
+  late.camera_late_s = 0.13;
+  SensorStreams streams = lab(late);
+  streams.wrenches.insert(streams.wrenches.begin(), {-1.7e9, Vec3::Zero(), Vec3::Zero()});
+  StreamPlan aligned = plan();
+  aligned.camera_clock.estimate = true;
+  aligned.wrench_clock.estimate = true;
+  const FromStreams made = recording_from(aligned, streams);
+  ASSERT_EQ(made.clocks.size(), 2u);
+  EXPECT_NEAR(made.clocks[0].offset_s, 0, 0.01);
+  EXPECT_NEAR(made.clocks[1].offset_s, -0.13, 0.02);
+}
+
+TEST(FromStreams, ACameraWithoutAnImageTellsNoClock) {
+  SensorStreams streams = lab();
+  streams.cameras[0].times_s.clear();
+  StreamPlan aligned = plan();
+  aligned.camera_clock.estimate = true;
+  const FromStreams made = recording_from(aligned, streams);
+  ASSERT_EQ(made.clocks.size(), 1u);
+  EXPECT_FALSE(made.clocks[0].usable);
+}
+
 TEST(FromStreams, AClockThatCloudsCannotTellIsSaid) {
   SensorStreams streams = lab();
   CloudStream clouds;

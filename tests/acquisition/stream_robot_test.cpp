@@ -40,6 +40,15 @@ RobotModel column() {
   return robot;
 }
 
+std::string refusal(const StreamPlan& plan, const SensorStreams& streams) {
+  try {
+    recording_from(plan, streams);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "nothing";
+}
+
 TEST(FromStreams, WithoutTransformsOfTheTipTheJointsTellWhereItIs) {
   SensorStreams streams = lab();
   FrameLink& tip = streams.frames[0];
@@ -134,6 +143,121 @@ TEST(FromStreams, TheRobotIsMaskedWhereItStandsAndOnceAndOnlyIfItIsWanted) {
   const auto notes = recording_from(masked, streams).notes;
   EXPECT_THAT(notes, testing::Contains(HasSubstr("there is no joint state near that time")));
   EXPECT_THAT(notes, testing::Not(testing::Contains(HasSubstr("is not in the joint states"))));
+}
+
+/// The column with a gripper that nobody tells anything of.
+RobotModel column_with_finger() {
+  RobotModel robot = column();
+  RobotLink finger{"finger", {}, {}};
+  RobotShape box;
+  box.kind = RobotShape::Kind::box;
+  box.size_m = Vec3(0.002, 0.002, 0.002);
+  box.T_link_shape.translation() = Vec3(0.05, 0, 0);
+  finger.visual.push_back(box);
+  robot.links.push_back(finger);
+  RobotJoint joint;
+  joint.kind = RobotJoint::Kind::prismatic;
+  joint.name = "finger_joint";
+  joint.parent = "tip";
+  joint.child = "finger";
+  joint.axis = Vec3::UnitX();
+  joint.lower = 0, joint.upper = 0.04;
+  robot.joints.push_back(joint);
+  return robot;
+}
+
+SensorStreams told_by_joints() {
+  SensorStreams streams = lab();
+  streams.joint_names = {"lift"};
+  for (const PoseSample& sample : streams.frames[0].samples)
+    streams.joints.push_back({sample.time_s, {height_m(sample.time_s)}});
+  streams.frames.erase(streams.frames.begin());
+  return streams;
+}
+
+TEST(FromStreams, AJointThatNobodyTellsHidesOnlyWhatHangsOnIt) {
+  const SensorStreams streams = told_by_joints();
+  StreamPlan by_joints = plan();
+  by_joints.recording.robot = column_with_finger();
+  const auto made = recording_from(by_joints, streams).recording, expected = recording_from(plan(), lab()).recording;
+  ASSERT_EQ(made.pushes.size(), 1u);
+  ASSERT_EQ(made.pushes[0].steps.size(), expected.pushes[0].steps.size());
+  for (std::size_t i = 1; i + 1 < made.pushes[0].steps.size(); ++i)
+    EXPECT_NEAR(travel_of(made.pushes[0].steps[i]), travel_of(expected.pushes[0].steps[i]), 1e-9);
+
+  by_joints.tip_frame = "finger";
+  by_joints.tip_where = "mapping.yaml:7: frames.tip";
+  const std::string said = refusal(by_joints, streams);
+  EXPECT_THAT(said, HasSubstr("mapping.yaml:7: frames.tip"));
+  EXPECT_THAT(said, HasSubstr("frame 'finger'"));
+  EXPECT_THAT(said, HasSubstr("joint 'finger_joint'"));
+  EXPECT_THAT(said, HasSubstr("topics.joints"));
+}
+
+/// A whole arm in the picture would be taken for the object.
+TEST(FromStreams, LinksThatAreKnownAreMaskedWithoutThoseThatAreNot) {
+  SensorStreams streams = lab();
+  streams.joint_names = {"lift"};
+  for (const PoseSample& sample : streams.frames[0].samples)
+    streams.joints.push_back({sample.time_s, {height_m(sample.time_s)}});
+  Pose above = Pose::Identity();
+  above.linear() = tip_at(0).linear();
+  above.translation() = Vec3(0.3, 0.1, 0.5);
+  streams.frames[2].samples[0].T_parent_child = above;
+  streams.cameras[0].like.camera = {64, 48, 200, 200, 31.5, 23.5, DistortionModel::none, {}};
+  streams.cameras[0].image = [](std::size_t) { return DepthImage(DepthImage::Constant(48, 64, 0.5f)); };
+  StreamPlan masked = plan();
+  masked.recording.robot = column_with_finger();
+  const FromStreams made = recording_from(masked, streams);
+  int frames = 0;
+  for (const Step& step : made.recording.pushes[0].steps)
+    for (const Observation& one : step.observations) {
+      const auto* frame = std::get_if<DepthFrame>(&one);
+      if (frame == nullptr) continue;
+      ++frames;
+      ASSERT_EQ(frame->mask.rows(), 48);
+      EXPECT_EQ(frame->mask(24, 32), 1) << "the tool";
+      EXPECT_EQ(frame->mask(24, 56), 0) << "where a closed finger would be";
+    }
+  EXPECT_GT(frames, 3);
+  EXPECT_THAT(made.notes, testing::Contains(testing::AllOf(HasSubstr("'finger'"), HasSubstr("not masked"), HasSubstr("'finger_joint'"))));
+}
+
+/// Half a turn the short way is no turn back through everything.
+TEST(FromStreams, AJointThatTurnsWithoutEndGoesTheShortWay) {
+  SensorStreams streams = lab();
+  streams.joint_names = {"lift", "turn", "elbow"};
+  for (int i = 0; i <= 300; ++i) {
+    const double one = i % 2 == 0 ? 3.13 : -3.13;
+    streams.joints.push_back({0.1 * i + 0.003, {height_m(0.1 * i + 0.003), one, one}});
+  }
+  StreamPlan turning = plan();
+  RobotModel robot = column();
+  RobotJoint joint;
+  joint.kind = RobotJoint::Kind::continuous;
+  joint.name = "turn";
+  joint.parent = "tip";
+  joint.child = "spindle";
+  joint.axis = Vec3::UnitZ();
+  robot.links.push_back({"spindle", {}, {}});
+  robot.joints.push_back(joint);
+  joint.kind = RobotJoint::Kind::revolute;
+  joint.name = "elbow";
+  joint.parent = "spindle";
+  joint.child = "flap";
+  joint.lower = -3.2, joint.upper = 3.2;
+  robot.links.push_back({"flap", {}, {}});
+  robot.joints.push_back(joint);
+  turning.recording.robot = robot;
+  streams.cameras.clear();
+  bool went_back = false;
+  const FromStreams made = recording_from(turning, streams);
+  for (const Step& step : made.recording.pushes[0].steps) {
+    ASSERT_EQ(step.joints_rad.size(), 3u);
+    EXPECT_LT(std::cos(step.joints_rad[1]), std::cos(3.129)) << step.joints_rad[1];
+    went_back |= std::cos(step.joints_rad[2]) > -0.9;
+  }
+  EXPECT_TRUE(went_back) << "a revolute joint has no other way";
 }
 
 }  // namespace

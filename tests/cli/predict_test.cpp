@@ -113,5 +113,40 @@ TEST_F(LearnedBlock, WhoseLawNobodyKnowsIsNotExported) {
   EXPECT_FALSE(std::filesystem::exists(files_ / "out"));
 }
 
+/// Of two estimates neither has anything of the other.
+TEST_F(LearnedBlock, BelongsToItsResult) {
+  namespace fs = std::filesystem;
+  const std::string press = " --radius 0.006 --contact 0.03 0.02 0.03 --force 0.1";
+  const std::string again = "estimate " + (files_ / "recording").string() + " --poisson-ratio 0.3 --quiet -o ";
+  const std::string before = io::read_file(files_ / "result" / "result.json");
+
+  // A second estimate that does not come to its end leaves the first as it was.
+  const std::string mesh = io::read_file(files_ / "result" / "model" / "material.json");
+  fs::remove(files_ / "result" / "report.html");
+  fs::create_directories(files_ / "result" / "report.html" / "in_the_way");
+  EXPECT_EQ(run(again + (files_ / "result").string()).exit_code, 3);
+  EXPECT_EQ(io::read_file(files_ / "result" / "result.json"), before);
+  EXPECT_EQ(io::read_file(files_ / "result" / "model" / "material.json"), mesh);
+  EXPECT_FALSE(fs::exists(files_ / "result" / "model.part"));
+  EXPECT_EQ(predict("--contact 0.03 0.02 0.03 --force 0.1").exit_code, 0);
+
+  ASSERT_EQ(run(again + (files_ / "other").string()).exit_code, 0);
+  EXPECT_EQ(run("predict " + (files_ / "other").string() + press).exit_code, 0);
+  fs::remove_all(files_ / "other" / "model");
+  fs::copy(files_ / "result" / "model", files_ / "other" / "model", fs::copy_options::recursive);
+  for (const std::string& verb : {"predict " + (files_ / "other").string() + press,
+                                  "export " + (files_ / "other").string() + " --to calculix -o " + (files_ / "out").string()}) {
+    const Outcome outcome = run(verb);
+    EXPECT_EQ(outcome.exit_code, 3) << verb;
+    EXPECT_THAT(outcome.text, testing::AllOf(HasSubstr("other/model/material.json"), HasSubstr("other/result.json"))) << verb;
+  }
+
+  // An earlier version's result says nothing of its model.
+  nlohmann::json old = nlohmann::json::parse(io::read_file(files_ / "other" / "result.json"));
+  old.erase("model_sha256");
+  io::write_file(files_ / "other" / "result.json", old.dump());
+  EXPECT_EQ(run("predict " + (files_ / "other").string() + press).exit_code, 0);
+}
+
 }  // namespace
 }  // namespace palpate

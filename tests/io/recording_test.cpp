@@ -306,6 +306,40 @@ TEST(WriteRecording, HostileNamesSurvive) {
   EXPECT_EQ(back.pushes[0].name, recording.pushes[0].name);
 }
 
+/// Beside the target may lie what is called as a part of it would be.
+TEST(WriteRecording, NothingOfOthersIsTouchedAndNothingIsLeft) {
+  namespace fs = std::filesystem;
+  const TemporaryFolder folder("beside");
+  put_cube_recording(folder);
+  const Recording recording = read_recording(folder.path());
+  const fs::path root = folder.path() / "out";
+  fs::create_directories(root / "copy.part");
+  folder.put("out/copy.part/diary.txt", "mine");
+  write_recording(recording, root / "copy");
+  EXPECT_EQ(folder.get("out/copy.part/diary.txt"), "mine");
+  EXPECT_EQ(read_recording(root / "copy").pushes.size(), recording.pushes.size());
+
+  fs::create_directory(root / "empty");
+  fs::create_directory_symlink("empty", root / "link");
+  write_recording(recording, root / "link");
+  EXPECT_TRUE(fs::is_symlink(root / "link"));
+  EXPECT_EQ(read_recording(root / "empty").pushes.size(), recording.pushes.size());
+
+  fs::create_directory_symlink("nowhere", root / "dangling");
+  EXPECT_THROW(write_recording(recording, root / "dangling"), Error);
+  Recording broken = recording;
+  Markers lost;
+  lost.names = {"a"};
+  lost.rest_m = Points::Constant(1, 3, NAN);
+  lost.observed_m = Points::Zero(1, 3);
+  broken.pushes[0].steps.back().observations = {lost};
+  EXPECT_THROW(write_recording(broken, root / "broken"), Error);
+  EXPECT_FALSE(fs::exists(root / "broken"));
+  for (const auto& one : fs::recursive_directory_iterator(root))
+    EXPECT_TRUE(one.path().extension() != ".part" || one.path() == root / "copy.part") << one.path();
+  EXPECT_FALSE(fs::exists(root / "copy.part2"));
+}
+
 TEST(RecordingWriter, AfterEveryStepTheFolderIsAWholeRecording) {
   const TemporaryFolder folder("steps");
   put_cube_recording(folder);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/io/result.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -118,6 +119,55 @@ TEST(Result, ComesBackAsItWasWritten) {
   EXPECT_TRUE(back.steps[0].residual_m.isApprox(answer.steps[0].residual_m, 1e-6));
   EXPECT_EQ(back.steps[1].surface_m.rows(), 0);
   EXPECT_EQ(read_result(folder.path() / "out" / "result.json").material, "neo_hookean");
+}
+
+/// Its model is moved in, its own; what others put there stays, and nothing unfinished is left.
+TEST(Result, KnowsItsModel) {
+  namespace fs = std::filesystem;
+  TemporaryFolder folder("model");
+  const Identification answer = whole_answer();
+  const auto said = [&] {
+    try {
+      check_model(folder.path() / "out");
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const auto put_model = [&](const std::string& mesh) {
+    for (const char* name : {"recording.yaml", "object.vtu", "deep/region.txt"}) folder.put(std::string("new/") + name, "1");
+    folder.put("new/rest.vtu", mesh);
+  };
+  folder.put("out/model/mine.txt", "mine");
+  folder.put("out/result.part/mine.txt", "mine");
+  put_model("a");
+  write_result(answer, folder.path() / "out", folder.path() / "new");
+  EXPECT_EQ(folder.get("out/model/rest.vtu"), "a");
+  EXPECT_EQ(folder.get("out/model/deep/region.txt"), "1");
+  EXPECT_EQ(folder.get("out/model/mine.txt"), "mine");
+  EXPECT_EQ(folder.get("out/result.part/mine.txt"), "mine");
+  EXPECT_FALSE(fs::exists(folder.path() / "out" / "result.part2"));
+  EXPECT_EQ(said(), "");
+  folder.put("out/model/recording.yaml", "density_kg_m3: 30");
+  folder.put("out/model/object.vtu", "for others");
+  EXPECT_EQ(said(), "") << "may be changed by hand";
+  folder.put("out/model/rest.vtu", "b");
+  EXPECT_THAT(said(), testing::AllOf(testing::HasSubstr("model/rest.vtu: is not the file that"), testing::HasSubstr("out/result.json")));
+  fs::remove(folder.path() / "out/model/rest.vtu");
+  EXPECT_THAT(said(), testing::HasSubstr("model/rest.vtu"));
+
+  put_model("b");
+  write_result(answer, folder.path() / "out", folder.path() / "new");
+  EXPECT_EQ(said(), "");
+  // What cannot be put in place leaves no result beside a foreign model.
+  put_model("c");
+  fs::remove(folder.path() / "out/model/rest.vtu");
+  folder.put("out/model/rest.vtu/in_the_way", "1");
+  EXPECT_THROW(write_result(answer, folder.path() / "out", folder.path() / "new"), Error);
+  EXPECT_FALSE(fs::exists(folder.path() / "out" / "result.json"));
+
+  write_result(answer, folder.path() / "old");
+  EXPECT_NO_THROW(check_model(folder.path() / "old")) << "one that says nothing of it";
 }
 
 TEST(Result, AnAnswerWithoutNumbersIsWrittenToo) {

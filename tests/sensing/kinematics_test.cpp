@@ -127,5 +127,26 @@ TEST(Kinematics, EveryBrokenTreeIsRefusedByName) {
   EXPECT_THROW(arm.link_poses({"shoulder", "elbow", "extend", "open_a"}, {0, NAN, 0, 0}), Error);
 }
 
+/// A gripper that nobody tells anything of, an elbow that is not known: what hangs on it is not, the rest is.
+TEST(Kinematics, AJointWithoutAValueHidesWhatHangsOnIt) {
+  const Kinematics arm(planar());
+  const auto whole = arm.link_poses({"shoulder", "elbow", "extend", "open_a"}, {0.3, -0.4, 0.05, 0.01});
+  const auto closed = arm.known_link_poses({"shoulder", "elbow", "extend"}, {0.3, -0.4, 0.05});
+  for (const char* name : {"world", "upper", "lower", "slide"}) {
+    const auto i = std::size_t(arm.link(name));
+    ASSERT_TRUE(closed[i]) << name;
+    EXPECT_EQ(closed[i]->matrix(), whole[i].matrix()) << name;
+  }
+  EXPECT_FALSE(closed[std::size_t(arm.link("finger_a"))]);
+  EXPECT_FALSE(closed[std::size_t(arm.link("finger_b"))]) << "it mimics the other";
+  const auto stiff = arm.known_link_poses({"shoulder", "elbow", "open_a"}, {0.3, NAN, 0.01});
+  EXPECT_TRUE(stiff[std::size_t(arm.link("upper"))]);
+  for (const char* name : {"lower", "slide", "finger_a"}) EXPECT_FALSE(stiff[std::size_t(arm.link(name))]) << name;
+  EXPECT_EQ(arm.missing_joint(arm.link("finger_b"), {"shoulder", "elbow", "extend"}), "open_a");
+  EXPECT_EQ(arm.missing_joint(arm.link("finger_b"), {"shoulder"}), "elbow") << "the first from the root";
+  EXPECT_EQ(arm.missing_joint(arm.link("slide"), {"extend", "shoulder", "elbow"}), std::nullopt);
+  EXPECT_THROW(arm.known_link_poses({"knee"}, {0}), Error);
+}
+
 }  // namespace
 }  // namespace palpate::sensing
