@@ -27,6 +27,7 @@
 #include "palpate/estimation/solve_count.hpp"
 #include "palpate/estimation/step_fits.hpp"
 #include "palpate/estimation/verdicts.hpp"
+#include "palpate/estimation/young_bounds.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -270,7 +271,9 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   const auto look_around = [&] {
     factor = residuals.points > 0 ? tukey_information_factor(loss.tukey) : 1;
     moving = free_unknowns(unknowns);
-    hessian = optimum.evaluation.information(factor)(moving, moving);
+    MatrixX information = optimum.evaluation.information(factor);
+    bound_young(information, unknowns);
+    hessian = information(moving, moving);
     covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
   };
   look_around();

@@ -12,6 +12,7 @@
 #include "palpate/estimation/posterior.hpp"
 #include "palpate/estimation/unknown_names.hpp"
 #include "palpate/estimation/verdicts.hpp"
+#include "palpate/estimation/young_bounds.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -133,7 +134,9 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   const ResidualSummary residuals = objective.summarise(optimum.loss);
   const double factor = residuals.points > 0 ? tukey_information_factor(optimum.loss.tukey) : 1;
   const std::vector<int> moving = free_unknowns(unknowns);
-  const MatrixX hessian = optimum.evaluation.information(factor)(moving, moving);
+  MatrixX information = optimum.evaluation.information(factor);
+  bound_young(information, unknowns);
+  const MatrixX hessian = information(moving, moving);
   const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
   answer.nuisances = nuisances_from(objective, optimum, covariance, moving);
   answer.budget = error_budget(unknowns, hessian, moving, object.region_names);

@@ -94,15 +94,17 @@ MatrixX along_axes(const MatrixX& span) {
 MatrixX pin_free_motions(const TetMesh& mesh, Holds& holds) {
   const Vec3 centre = mesh.nodes_m.colwise().mean();
   const double length = diagonal_m(mesh);
-  MatrixX rows(0, 6);
-  const auto append = [&](Index node, const Vec3& direction) {
-    rows.conservativeResize(rows.rows() + 1, 6);
-    rows.row(rows.rows() - 1) = direction.transpose() * rigid_motions(mesh.nodes_m.row(node).transpose() - centre, length);
+  std::size_t count = holds.carried().size();
+  for (const auto& [node, held] : holds.directions()) count += held.size();
+  MatrixX rows(static_cast<Index>(count), 6);  // at once: row by row all of them would be copied for each
+  Index next = 0;
+  const auto put = [&](Index node, const Vec3& direction) {
+    rows.row(next++) = direction.transpose() * rigid_motions(mesh.nodes_m.row(node).transpose() - centre, length);
   };
   for (const auto& [node, held] : holds.directions()) {
-    for (const auto& direction : held) append(node, direction);
+    for (const auto& direction : held) put(node, direction);
   }
-  for (const auto& [node, direction] : holds.carried()) append(node, direction);
+  for (const auto& [node, direction] : holds.carried()) put(node, direction);
   const MatrixX free = along_axes(null_space(rows));
   if (free.cols() == 0) return MatrixX(3 * mesh.nodes_m.rows(), 0);
 
@@ -121,7 +123,8 @@ MatrixX pin_free_motions(const TetMesh& mesh, Holds& holds) {
       }
     }
     holds.add(best_node, best_motion.normalized());
-    append(best_node, best_motion.normalized());
+    rows.conservativeResize(next + 1, 6);
+    put(best_node, best_motion.normalized());
     left = null_space(rows);
   }
 

@@ -9,6 +9,7 @@
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/estimation/own_poisson.hpp"
 #include "palpate/estimation/unknown_names.hpp"
+#include "palpate/estimation/young_bounds.hpp"
 #include "palpate/fem/materials.hpp"
 
 namespace palpate::estimation {
@@ -72,7 +73,9 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
   const Evaluation before = objective.assemble(objective.last_rows(), optimum.unknowns, all);
   const Evaluation after = objective.assemble(changed, optimum.unknowns, all);
   const std::vector<int> moving = free_unknowns(objective.unknowns());
-  const VectorX change = MatrixX(before.curvature(moving, moving))
+  MatrixX curvature = before.curvature;
+  bound_young(curvature, objective.unknowns());  // else the mesh would move what nothing tells by rounding over rounding
+  const VectorX change = MatrixX(curvature(moving, moving))
                              .ldlt()
                              .solve(VectorX(before.gradient(moving)) - VectorX(after.gradient(moving)));
   if (!change.allFinite()) return std::nullopt;

@@ -314,12 +314,17 @@ VectorX find_start(Objective& objective, double poisson_start) {
   wide.along_rays = false;
   double best_cost = std::numeric_limits<double>::infinity();
   double best_decade = 5;
+  std::vector<StepPrediction> scaled = stiff;  // once: derivatives are large, and stay what they are
   const auto try_at = [&](double decade) {
     const double ratio = std::exp(guess(log_young) - decade * std::log(10.0));
-    std::vector<StepPrediction> scaled = stiff;
     bool sensible = true;
-    for (auto& prediction : scaled) {
+    for (std::size_t s = 0; s < scaled.size(); ++s) {
+      StepPrediction& prediction = scaled[s];
       if (prediction.surface_m.rows() == 0) continue;
+      prediction.surface_m = stiff[s].surface_m;
+      prediction.material_m = stiff[s].material_m;
+      prediction.force_n = stiff[s].force_n;
+      prediction.travel_m = stiff[s].travel_m;
       // The part that scales with 1/E is the derivative to -log E; imposed motions do not scale.
       const VectorX loaded = -prediction.d_surface.col(0);
       for (Index v = 0; v < prediction.surface_m.rows(); ++v) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/young_bounds.hpp"
+
 namespace palpate::estimation {
 namespace {
 
@@ -17,6 +19,7 @@ double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 /// Mean, standard deviation of log E and log determinant, all given nu, from the Hessian; and the slope over nu of the least
 /// cost that the others leave.
 struct Conditional {
+  bool young_told = true;  // false: what is said of log E is what its bounds say
   double log_determinant = 0, cost_slope = 0;
   VectorX log_young, std_dev, slope;  // a region; slope: d log E / d nu along the ridge
   MatrixX correlation;
@@ -30,18 +33,28 @@ Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& un
   }
   const MatrixX information = evaluation.information(factor);
   const VectorX cross = information.col(poisson)(others);
+  MatrixX given_poisson = information(others, others);
+  Eigen::LDLT<MatrixX> factorised(given_poisson);
+  Conditional out;
+  out.young_told = tells_young(given_poisson, factorised, list);
   // The cost's slope leads to the estimate, the information says how sharp it is.
   const MatrixX& hessian = evaluation.curvature;
   const VectorX hessian_cross = hessian.col(poisson)(others);
-  const Eigen::LDLT<MatrixX> held(hessian(others, others));
+  MatrixX bends = hessian(others, others);
+  if (!out.young_told) {
+    bends(0, 0) += information_of_bounds(list);
+    given_poisson(0, 0) += information_of_bounds(list);
+    factorised.compute(given_poisson);
+  }
+  const Eigen::LDLT<MatrixX> held(bends);
   const double slope = evaluation.gradient(poisson) - hessian_cross.dot(held.solve(VectorX(evaluation.gradient(others))));
   const double sharpness = hessian(poisson, poisson) - hessian_cross.dot(held.solve(hessian_cross));
-  const Eigen::LDLT<MatrixX> factorised(information(others, others));
   // log E of the first region comes first, then the log ratios of the others: a region's log E is the sum of two.
   const Index regions = 1 + list.ratio_count();
   MatrixX sum = MatrixX::Zero(static_cast<Index>(others.size()), regions);
-  Conditional out;
-  out.log_young = VectorX::Constant(regions, unknowns(log_young));
+  // A slope that goes on beyond the bound where the search ended says where E is, too.
+  const bool pushed = std::abs(evaluation.gradient(log_young)) * (list[log_young].upper - list[log_young].lower) > 1;
+  out.log_young = VectorX::Constant(regions, out.young_told || pushed ? unknowns(log_young) : middle_of_bounds(list[log_young]));
   sum.row(0).setOnes();
   for (Index r = 1; r < regions; ++r) {
     const int ratio = first_ratio + static_cast<int>(r) - 1;
@@ -186,10 +199,10 @@ double Posterior::log_young_quantile(double probability) const {
     }
     (below < probability ? low : high) = at;
     const double next = density > 0 ? at - (below - probability) / density : at;
-    if (std::abs(next - at) < close_enough) return at;
+    if (std::abs(next - at) < close_enough) break;
     at = next > low && next < high ? next : 0.5 * (low + high);
   }
-  return at;
+  return std::clamp(at, log_young_lower, log_young_upper);
 }
 
 double Posterior::poisson_std() const { return std::sqrt(std::max(covariance(1, 1), 0.0)); }
@@ -203,6 +216,8 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   const double lower = list[poisson].lower, upper = list[poisson].upper;
   Posterior posterior;
   posterior.correlation = at.correlation;
+  posterior.log_young_lower = list[log_young].lower;
+  posterior.log_young_upper = list[log_young].upper;
   if (list[poisson].fixed) {
     posterior.poisson = VectorX::Constant(1, nu);
     fill(posterior, at.log_young.transpose(), at.std_dev.transpose());
@@ -212,7 +227,8 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
 
   // Standard deviation of nu with everything else free.
   const std::vector<int> moving = free_unknowns(list);
-  const MatrixX hessian = optimum.evaluation.information(information_factor)(moving, moving);
+  MatrixX hessian = optimum.evaluation.information(information_factor)(moving, moving);
+  if (!at.young_told) hessian(0, 0) += information_of_bounds(list);
   VectorX unit = VectorX::Zero(hessian.rows());
   unit(1) = 1;
   const double variance = hessian.ldlt().solve(unit)(1);
@@ -269,6 +285,7 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
     for (std::size_t k = 0; k < others.size(); ++k) {
       begin(others[k]) += (node(i) - walk.unknowns(poisson)) * along(static_cast<Index>(k));
     }
+    if (!at.young_told) begin(log_young) = walk.unknowns(log_young);  // its share of the ridge is rounding
     begin(poisson) = node(i);
     objective.hold_poisson(true);
     Optimum conditional = optimise(objective, begin, loss, few, keep_going);
@@ -327,7 +344,10 @@ PosteriorGrid posterior_grid(const Posterior& posterior) {
   constexpr int size = 61;
   const double span = 4 * posterior.log_young_std_total();
   const double middle = posterior.log_young_quantile(0.5);
-  grid.young_modulus_pa = VectorX::LinSpaced(size, middle - span, middle + span).array().exp();
+  grid.young_modulus_pa =
+      VectorX::LinSpaced(size, std::max(middle - span, posterior.log_young_lower), std::min(middle + span, posterior.log_young_upper))
+          .array()
+          .exp();
   const double nu_low = posterior.poisson_quantile(1e-4), nu_high = posterior.poisson_quantile(1 - 1e-4);
   grid.poisson_ratio = VectorX::LinSpaced(size, nu_low, nu_high);
   grid.density.resize(size, size);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
+
 #include "palpate/core/identification.hpp"
 #include "palpate/estimation/optimise.hpp"
 
@@ -16,6 +18,8 @@ struct Posterior {
   MatrixX region_std;
   MatrixX correlation;        ///< of log E of all regions given nu, at the optimum (1 x 1 where there is one)
   MatrixX covariance;         ///< 2 x 2 of (log E, nu)
+  double log_young_lower = -std::numeric_limits<double>::infinity();  ///< bounds of the search, which no quantile leaves
+  double log_young_upper = std::numeric_limits<double>::infinity();
   bool cancelled = false;     ///< the caller asked to stop: nothing else is filled
   bool quadrature = false;    ///< conditional optima were solved at several nu (else Laplace, cut at the bounds)
 

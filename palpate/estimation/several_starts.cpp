@@ -29,6 +29,24 @@ std::pair<double, double> spread_at(const Optimum& at, const Unknowns& unknowns)
   return {std_of(log_young), std_of(poisson)};
 }
 
+/// Whatever was solved before, so that candidates compare. Where no equilibrium is found from rest, from that of a stiffer body: a
+/// search comes from there, too.
+Evaluation evaluate_anew(Objective& objective, const VectorX& at, const Loss& loss, const OnProgress& progress) {
+  objective.model().forget();
+  Evaluation out = objective.evaluate(at, loss, progress);
+  VectorX stiffer = at;
+  for (int doubled = 1; doubled <= 3 && !out.usable && out.reason != "cancelled"; ++doubled) {
+    stiffer(log_young) = std::min(at(log_young) + doubled * std::log(2.0), objective.unknowns()[log_young].upper);
+    objective.model().forget();
+    out = objective.evaluate(stiffer, loss, progress);
+    for (int halved = doubled - 1; halved >= 0 && out.usable; --halved) {
+      stiffer(log_young) = at(log_young) + halved * std::log(2.0);
+      out = objective.evaluate(stiffer, loss, progress);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<Minimum> distinct_minima(std::vector<Minimum> found, double log_young_std, double poisson_std, double scale) {
@@ -82,12 +100,20 @@ Optimum optimise_from_several(Objective& objective, const VectorX& start, const 
 
   // Candidates are compared by one loss, the widest: a narrow one would favour the fit that gives most points up.
   Loss common = best.evaluation.usable ? fitting_loss(objective, final_loss) : final_loss;
+  bool cancelled = false;
   const auto cost_of = [&](const Optimum& at) {
     if (!at.evaluation.usable) return std::numeric_limits<double>::infinity();
-    objective.model().forget();
-    return objective.evaluate(at.unknowns, common, progress).cost;
+    const Evaluation compared = evaluate_anew(objective, at.unknowns, common, progress);
+    cancelled = compared.reason == "cancelled";
+    return compared.usable ? compared.cost : std::numeric_limits<double>::infinity();
+  };
+  const auto stopped = [&] {
+    best.termination = Termination::cancelled;
+    best.message = "stopped by the caller";
+    return best;
   };
   double lowest = cost_of(best);
+  if (cancelled) return stopped();
   note(best, lowest);
   for (double factor : {0.25, 4.0}) {
     VectorX other = start;
@@ -97,6 +123,7 @@ Optimum optimise_from_several(Objective& objective, const VectorX& start, const 
     if (candidate.termination == Termination::cancelled) return candidate;
     candidate.iterations += best.iterations;
     const double cost = cost_of(candidate);
+    if (cancelled) return stopped();
     note(candidate, cost);
     if (cost < lowest) {
       lowest = cost;
@@ -104,8 +131,13 @@ Optimum optimise_from_several(Objective& objective, const VectorX& start, const 
     }
   }
   if (best.evaluation.usable) {  // the last evaluation is the answer's again
-    objective.model().forget();
-    best.evaluation = objective.evaluate(best.unknowns, best.loss, progress);
+    Evaluation again = evaluate_anew(objective, best.unknowns, best.loss, progress);
+    if (again.reason == "cancelled") return stopped();
+    if (!again.usable) {
+      best.termination = Termination::failed;
+      best.message = again.reason;
+    }
+    best.evaluation = std::move(again);
   }
   if (best.evaluation.usable) {
     starts.scale = std::max(1.0, objective.residual_scale());

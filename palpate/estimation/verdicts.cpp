@@ -34,11 +34,13 @@ void judge_end(const VerdictInput& in, std::vector<Verdict>& out) {
 void judge_young(const VerdictInput& in, std::vector<Verdict>& out) {
   for (const auto& parameter : in.answer.parameters) {
     if (parameter.name != "young_modulus" || parameter.determined) continue;
+    const double factor = parameter.upper_95 / parameter.lower_95;
+    constexpr double all_solids = 1e12;
     out.push_back({"e_not_determined",
-                   "These data hardly determine Young's modulus" +
+                   std::string("These data ") + (factor > all_solids ? "say nothing of" : "hardly determine") + " Young's modulus" +
                        (parameter.region.empty() ? "" : " of region '" + parameter.region + "' (does a push reach it?)") +
-                       ": its interval spans a factor of " +
-                       number(parameter.upper_95 / parameter.lower_95, "{:.2g}") +
+                       ": its interval " +
+                       (factor > all_solids ? std::string("is all that is searched") : "spans a factor of " + number(factor, "{:.2g}")) +
                        ". A motion without its force, or a force without a visible deformation, cannot: press harder, and "
                        "record both."});
   }

@@ -166,7 +166,7 @@ void LinearResponse::make_polynomial() const {
 
 std::shared_ptr<const ResponseSpan> LinearResponse::span(Index rows, double poisson_ratio) const {
   const std::lock_guard lock(mutex_);
-  if (coefficients_.empty() || poisson_ratio < options_.poisson_lower || poisson_ratio > options_.poisson_upper) return nullptr;
+  if (coefficients_.empty() || coefficients_[0].cols() == 0 || poisson_ratio < options_.poisson_lower || poisson_ratio > options_.poisson_upper) return nullptr;
   if (!span_) {
     const double low = poisson_to_z(options_.poisson_lower), high = poisson_to_z(options_.poisson_upper);
     span_ = std::make_shared<const ResponseSpan>(span_of(coefficients_, rows, 0.5 * (low + high), 0.5 * (high - low)));

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/geometry/nearest_vertices.hpp"
 
 namespace palpate::fem {
 namespace {
@@ -51,8 +53,8 @@ Vec3 element_centre(const TetMesh& mesh, Index element) {
 std::vector<int> regions_of(const TetMesh& mesh, const std::vector<Region>& regions, const TetMesh* listed) {
   const Points centres = centres_of(mesh);
   const std::vector<int> named = named_elements(regions, listed);
-  Points listed_centres;
-  if (!named.empty() && listed->tetrahedra.rows() != mesh.tetrahedra.rows()) listed_centres = centres_of(*listed);
+  std::optional<geometry::NearestVertices> listed_centres;
+  if (!named.empty() && listed->tetrahedra.rows() != mesh.tetrahedra.rows()) listed_centres.emplace(centres_of(*listed));
   std::vector<int> region(static_cast<std::size_t>(mesh.tetrahedra.rows()), -1);
   std::vector<Index> count(regions.size(), 0);
   for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
@@ -60,7 +62,11 @@ std::vector<int> regions_of(const TetMesh& mesh, const std::vector<Region>& regi
     int mine = -1, listing = -1, rest = -1, around = -1;
     if (!named.empty()) {
       Index nearest = e;
-      if (listed_centres.rows() > 0) (listed_centres.rowwise() - at.transpose()).rowwise().squaredNorm().minCoeff(&nearest);
+      if (listed_centres) {
+        geometry::NearestVertices::Memory none;
+        nearest = listed_centres->nearest(at, none).vertex;
+        if (nearest < 0) throw Error("the centre of element " + std::to_string(e) + " is not finite; check its nodes", "mesh");
+      }
       listing = named[static_cast<std::size_t>(nearest)];
     }
     double nearest = std::numeric_limits<double>::infinity();

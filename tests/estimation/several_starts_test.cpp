@@ -68,6 +68,76 @@ TEST(SeveralStarts, ThreeThatEndInOnePlaceAreSaidSo) {
   EXPECT_NE(said.find("minimum:"), std::string::npos) << said;
 }
 
+/// What a search from three starts asks for, and where it was stopped.
+struct Search {
+  Recording recording = pushed_block_recording();
+  Unknowns unknowns;
+  std::unique_ptr<ForwardModel> model;
+  std::unique_ptr<Objective> objective;
+
+  Search(const std::string& material, const Inputs& inputs, const TetMesh& mesh, double force_n, fem::StaticsOptions options = {}) {
+    for (Step& step : recording.pushes[0].steps) step.loads[0].force_n = *step.loads[0].force_n * force_n / 0.12;
+    model = std::make_unique<ForwardModel>(recording, simulated(mesh, material), unknowns, options);
+    objective = std::make_unique<Objective>(*model, inputs, unknowns);
+  }
+  VectorX start(double young_pa) const {
+    VectorX at = unknowns.prior_mean();
+    at(log_young) = std::log(young_pa);
+    at(poisson) = 0.3;
+    return at;
+  }
+};
+
+/// A clamp that stands elsewhere, so that nothing fits.
+PushedBlock elsewhere(const std::string& material) {
+  PushedBlock truth;
+  truth.clamp.translation_m = Vec3(0.001, -0.002, 0.004);
+  truth.clamp.rotation_rad = Vec3(0.02, 0.06, -0.03);
+  truth.material = material;
+  truth.finer = 1;
+  truth.points = 60;
+  return truth;
+}
+
+TEST(SeveralStarts, ACallerWhoStopsIsToldSoWhereverThatWas) {
+  const Inputs inputs = clouds_of(elsewhere("linear"));
+  Search search("linear", inputs, kuhn_block(3, 2, 2, block_size_m), 0.12);
+  int calls = 0, last = 1 << 30;
+  const OnProgress count = [&](std::string_view, double) { return ++calls < last; };
+  const auto run = [&] {
+    calls = 0;
+    search.model->forget();
+    return optimise_from_several(*search.objective, search.start(2e4), Loss{}, {}, count);
+  };
+  const Optimum whole = run();
+  ASSERT_EQ(whole.termination, Termination::converged) << whole.message;
+  const int all = calls;
+  for (last = 1; last <= all; ++last) {
+    const Optimum at = run();
+    EXPECT_EQ(at.termination, Termination::cancelled) << last << " of " << all << ": " << at.message;
+  }
+}
+
+/// Few steps of Newton's method lead to the deepest equilibria from a neighbour, as a search comes there, and not from rest.
+TEST(SeveralStarts, WhatRestDoesNotLeadToIsNoBetterForIt) {
+  constexpr double force_n = 2;
+  Recording pressed = pushed_block_recording();
+  for (Step& step : pressed.pushes[0].steps) step.loads[0].force_n = *step.loads[0].force_n * force_n / 0.12;
+  const Inputs inputs = clouds_of(elsewhere("neo_hookean"), pressed);
+  const TetMesh mesh = kuhn_block(3, 2, 2, block_size_m);
+  fem::StaticsOptions few;
+  few.max_newton_steps = 4;
+  few.max_load_steps = 1;
+  Search patient("neo_hookean", inputs, mesh, force_n), hasty("neo_hookean", inputs, mesh, force_n, few);
+  const Optimum best = optimise_from_several(*patient.objective, patient.start(1e5), Loss{}, {}, {});
+  const Optimum same = optimise_from_several(*hasty.objective, hasty.start(1e5), Loss{}, {}, {});
+  ASSERT_TRUE(same.evaluation.usable) << same.message << ": " << same.evaluation.reason;
+  EXPECT_EQ(same.termination, Termination::converged);
+  EXPECT_NEAR(same.unknowns(log_young), best.unknowns(log_young), 0.01);
+  hasty.model->forget();
+  EXPECT_FALSE(hasty.objective->evaluate(same.unknowns, same.loss).usable) << "the case that is meant";
+}
+
 /// A bar whose first quarter is stretched while the rest, with ridges every 8 mm, moves along as one piece; seen is a window of the
 /// ridges that is nowhere near their end. Moved by 11 mm under its full load, it looks as if moved by 3 or by 43 mm.
 /// @param stated_m  what is said of noise that is 0.6 mm

@@ -56,6 +56,24 @@ TEST(UncommonRecordings, NoPushIsRefusedForEveryLaw) {
   }
 }
 
+TEST(UncommonRecordings, NothingPressedIsRefusedForEveryLawAndMethod) {
+  for (const char* material : {"linear", "neo_hookean"}) {
+    for (const char* method : {"palpate", "paper"}) {
+      for (const bool touched : {true, false}) {
+        Recording recording = block_with_clouds("linear");
+        recording.model.material = material;
+        for (Step& step : recording.pushes[0].steps) {
+          if (touched) step.loads[0].force_n = Vec3::Zero();
+          else step.loads.clear();
+        }
+        IdentifyOptions options;
+        options.method = method;
+        EXPECT_THAT(complaint(recording, options), AllOf(HasSubstr("pushes.steps.loads"), HasSubstr("force_n"))) << material << ", " << method;
+      }
+    }
+  }
+}
+
 TEST(UncommonRecordings, APushThatMetNothingChangesNothing) {
   Recording recording = block_with_clouds("linear");
   Push second = recording.pushes[0];

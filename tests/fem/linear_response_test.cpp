@@ -145,6 +145,17 @@ TEST_P(LinearResponseContract, SpansItsAnswers) {
   }
 }
 
+TEST_P(LinearResponseContract, SpansNothingWhereNothingActs) {
+  Boundary held = driven();
+  held.forces.resize(held.forces.rows(), 0);
+  held.motions.resize(held.motions.rows(), 0);
+  const Statics statics(mesh, "linear", held, options);
+  const LinearResponse response(statics, everything(), range);
+  const double middle = 0.5 * (range.poisson_lower + range.poisson_upper);
+  for (const double nu : {middle, range.poisson_lower, range.poisson_upper}) EXPECT_EQ(response.at(nu)->force.cols(), 0);
+  EXPECT_EQ(response.span(static_cast<Index>(everything().rows()), middle), nullptr);
+}
+
 INSTANTIATE_TEST_SUITE_P(Elements, LinearResponseContract,
                          testing::Values(Case{4, Dilatation::pointwise, 0, 0.49}, Case{4, Dilatation::averaged, 0.05, 0.499},
                                          Case{10, Dilatation::pointwise, -0.5, 0.45},

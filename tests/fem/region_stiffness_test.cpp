@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ctime>
 
 #include "fem/fem_meshes.hpp"
 #include "palpate/core/error.hpp"
@@ -194,6 +195,25 @@ TEST(RegionsOf, ElementsBelongWhereTheirCentresAre) {
   EXPECT_THROW(regions_of(bar.mesh, {low, listed}, &bar.mesh), Error);  // nobody takes the end
   low.box_max_m = Vec3(-0.5, 1, 1);
   EXPECT_THROW(regions_of(bar.mesh, {rest, low}), Error);  // nothing in it
+}
+
+// Two meshes of one body, some 60 000 elements each: as the nearest of all centres says, without asking all of them.
+TEST(RegionsOf, ListsOfAnotherMeshAreFollowedQuickly) {
+  const Vec3 size_m(0.3, 0.24, 0.14);
+  const TetMesh given = block_mesh(29, 25, 14, size_m), other = distorted(block_mesh(30, 24, 14, size_m), 0.001, 5);
+  Region listed = part("listed", RegionSelection::elements);
+  for (Index e = 0; e < given.tetrahedra.rows(); ++e)
+    if (e % 3 == 0) listed.elements.push_back(e);
+  const std::clock_t before = std::clock();
+  const auto region = regions_of(other, {listed, part("rest", RegionSelection::rest)}, &given);
+  EXPECT_LT(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC, 2);
+  Points centres_m(given.tetrahedra.rows(), 3);
+  for (Index e = 0; e < given.tetrahedra.rows(); ++e) centres_m.row(e) = element_centre(given, e);
+  for (Index e = 0; e < other.tetrahedra.rows(); e += 499) {
+    Index nearest = 0;
+    (centres_m.rowwise() - element_centre(other, e).transpose()).rowwise().squaredNorm().minCoeff(&nearest);
+    EXPECT_EQ(region[static_cast<std::size_t>(e)], nearest % 3 == 0 ? 0 : 1) << e;
+  }
 }
 
 }  // namespace
