@@ -140,7 +140,7 @@ TEST_F(AbsurdRecording, WhatIsMeasuredTwiceInOneStepIsRefused) {
 TEST_F(AbsurdRecording, WhatIsOnlyOddIsSaidAndRead) {
   EXPECT_THAT(warnings_with("radius_m: 0.02", "radius_m: 0.5"), ElementsAre(HasSubstr("more than the whole object")));
   EXPECT_THAT(warnings_with("fx_px: 10", "fx_px: 30"), ElementsAre(HasSubstr("pixels are mostly square")));
-  EXPECT_THAT(warnings_with("cx_px: 3.5", "cx_px: 20"), ElementsAre(HasSubstr("far from the middle of the image of 8 x 6")));
+  EXPECT_THAT(warnings_with("cx_px: 3.5", "cx_px: 20"), testing::Contains(HasSubstr("far from the middle of the image of 8 x 6")));
   EXPECT_THAT(warnings_with("sigma_m: 0.002", "sigma_m: 0.9"), ElementsAre(HasSubstr("nothing is seen so")));
   EXPECT_THAT(warnings_with("sigma_m: 0.002", "sigma_m: 1e-8"), ElementsAre(HasSubstr("finer than any sensor")));
   EXPECT_THAT(warnings_with("force_std_n: 0.02", "force_std_n: 5"), ElementsAre(HasSubstr("worse than itself")));
@@ -152,16 +152,17 @@ TEST_F(AbsurdRecording, WhatIsOnlyOddIsSaidAndRead) {
               ElementsAre(HasSubstr("gravity_m_s2")));
 }
 
-// The inverse of a hand-eye calibration, the commonest mistake of all: what it shows is elsewhere, and E was found all the same.
+// An E was found of what a camera of a wrong pose saw elsewhere.
 TEST_F(AbsurdRecording, ACameraThatShowsTheObjectNowhereIsSaid) {
-  EXPECT_THAT(warnings_with("quaternion_xyzw: [1, 0, 0, 0]", "quaternion_xyzw: [0, 0, 0, 1]"),  // looks up
+  EXPECT_THAT(warnings_with("position_m: [0.05, 0.05, 0.6]", "position_m: [1.5, 0.05, 0.6]"),
               ElementsAre(HasSubstr("none of the 2 images and clouds shows anything where the object is")));
 }
 
 TEST_F(AbsurdRecording, APushThatPullsAllTheTimeIsSaid) {
-  folder.put("recording.yaml", replaced(replaced(replaced(whole_index, "[0, 0, -1], contact_m: [0.05, 0.05, 0.1], force", "[0, 0, 1], direction: [0, 0, -1], contact_m: [0.05, 0.05, 0.1], force"),
-                                                 "force_n: [0, 0, -2], ", "force_n: [0, 0, 2], direction: [0, 0, -1], "),
-                                        "force_n: [0, 0, -2.1]", "force_n: [0, 0, 2.1]"));
+  std::string index = replaced(whole_index, "force_n: [0, 0, -1]", "direction: [0, 0, -1], force_n: [0, 0, 1]");
+  index = replaced(index, "force_n: [0, 0, -2]", "direction: [0, 0, -1], force_n: [0, 0, 2]");
+  index = replaced(index, "          - {kind: travel, travel_m: 0.002, sigma_m: 0.0005}\n", "");
+  folder.put("recording.yaml", replaced(index, "force_n: [0, 0, -2.1]", "force_n: [0, 0, 2.1]"));
   EXPECT_THAT(read_recording(folder.path()).warnings, testing::Contains(HasSubstr("in all of push 'seen'")));
 }
 
