@@ -241,9 +241,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     solved_->bodies = std::move(earlier->bodies);
     solved_->rest_tree = earlier->rest_tree;
     solved_->surface_edges = earlier->surface_edges;
-    for (auto& bodies : solved_->bodies) {
-      for (const auto& push : recording.pushes) drop_if_unfit(bodies, push);
-    }
+    for (auto& bodies : solved_->bodies) drop_if_unfit(bodies);
   }
   solves_.assign(workers_, 0);
   load_cases_before_ = unit_load_cases();

@@ -232,8 +232,8 @@ class ForwardModel {
   VectorX region_poisson(const VectorX& unknowns) const;
   std::vector<int> parameter_columns() const;
   void place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const;
-  /// Forgets the push's body where it lacks columns of a contact.
-  void drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies, const Push& push) const;
+  /// Forgets bodies that lack columns of a contact.
+  void drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies) const;
   Body& body_of(const Push& push, std::size_t worker);
   const Body& body_of(std::size_t s) const;  // one that was made
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;

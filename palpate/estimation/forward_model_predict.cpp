@@ -174,7 +174,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
         out.d_travel.row(l) += part.weight * direction.transpose() * at.d_conjugate.middleRows<3>(part.first);
         if (part.unknown < 0) continue;
         const auto own = std::find(out.columns.begin(), out.columns.end(), part.unknown);
-        out.d_travel(l, own - out.columns.begin()) += direction.dot(at.conjugate_m.segment<3>(part.first));
+        out.d_travel(l, own - out.columns.begin()) += part.per_unknown * direction.dot(at.conjugate_m.segment<3>(part.first));
       }
       if (whole.empty()) continue;
       // A turned clamp turns the object under the tool's direction.
