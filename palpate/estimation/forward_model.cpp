@@ -8,6 +8,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/names_of_unknowns.hpp"
 #include "palpate/estimation/slips.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/materials.hpp"
@@ -184,10 +185,11 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
       const std::string in_step = "[" + push.name + ":" + std::to_string(s) + "]";
       clamp_.push_back(clamp != nullptr && clamp->pose_varies == PoseVaries::step ? add_clamp(in_step) : push_clamp);
       std::vector<int> errors, shifts, radii;
-      for (const auto& load : push.steps[s].loads) {
-        const std::string stretch = stretch_of(push, s), shift = stretch + key_of(load);
+      for (std::size_t l = 0; l < push.steps[s].loads.size(); ++l) {
+        const Load& load = push.steps[s].loads[l];
+        const std::string shift = stretch_of(push, s) + key_of(load), of_this = of_load(push, s, l);
         if (load.contact_std_m > 0 && has_place(recording, load) && shift_of.count(shift) == 0) {
-          shift_of[shift] = unknowns.add_block("contact_shift" + stretch, "m", load.contact_std_m, {"_1", "_2"});
+          shift_of[shift] = unknowns.add_block("contact_shift" + of_contact(push, s, load), "m", load.contact_std_m, {"_1", "_2"});
           shift_direction_[shift_of[shift]] = load.direction;
         }
         const auto known = shift_of.find(shift);
@@ -199,8 +201,8 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
           radii.back() = own->second;
         }
         const double std_n = load.force_n ? std::hypot(load.force_std_n, load.force_relative_std * load.force_n->norm()) : 0;
-        errors.push_back(load.travel_m ? unknowns.add_block("travel_error" + in_step, "m", travel_std_m(push.steps[s], load), {""})
-                                       : unknowns.add_block("force_error" + in_step, "N", std_n, xyz));
+        errors.push_back(load.travel_m ? unknowns.add_block("travel_error" + of_this, "m", travel_std_m(push.steps[s], load), {""})
+                                       : unknowns.add_block("force_error" + of_this, "N", std_n, xyz));
       }
       force_error_.push_back(errors);
       contact_shift_.push_back(shifts);
