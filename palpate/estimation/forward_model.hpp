@@ -243,6 +243,9 @@ class ForwardModel {
   void add_slide_unknowns(Unknowns& unknowns);
   void slide(std::size_t s, const Body& body, const VectorX& unknowns, const std::vector<int>& columns, bool derivatives,
              fem::ResponseState& at) const;
+  /// What a tool whose motion is imposed presses with, and its derivatives.
+  static Vec3 driven_force_n(const Body& body, const Load& load, const fem::ResponseState& at);
+  static Eigen::Matrix<double, 3, Eigen::Dynamic> d_driven_force(const Body& body, const Load& load, const fem::ResponseState& at);
   struct TrueForce;  // of a load: its reading without what the sensor errs by
   TrueForce true_force(std::size_t s, std::size_t l, const VectorX& unknowns) const;
   struct LoadPart;  // of one load: columns that work together

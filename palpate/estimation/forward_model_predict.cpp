@@ -49,6 +49,20 @@ void ForwardModel::add_surface(std::size_t s, const VectorX& unknowns, StepPredi
   place_surface(s, unknowns, predicted.in_span->moved_m(), predicted);
 }
 
+/// Of a rigid body all of it, whichever way its push goes: what a face without friction takes is along its normal. Of a platen whose
+/// nodes are moved the part along its motion.
+Vec3 ForwardModel::driven_force_n(const Body& body, const Load& load, const fem::ResponseState& at) {
+  const int m = body.motion_column.at(load.tool), contact = m - body.node_motions;
+  if (contact < 0) return at.reaction_n(m) * load.direction.normalized();
+  return at.driven_force_n.segment<3>(3 * contact);
+}
+
+Eigen::Matrix<double, 3, Eigen::Dynamic> ForwardModel::d_driven_force(const Body& body, const Load& load, const fem::ResponseState& at) {
+  const int m = body.motion_column.at(load.tool), contact = m - body.node_motions;
+  if (contact < 0) return load.direction.normalized() * at.d_reaction.row(m);
+  return at.d_driven_force.middleRows<3>(3 * contact);
+}
+
 Vec3 ForwardModel::mean_motion(const std::vector<LoadPart>& parts, const fem::ResponseState& at) {
   Vec3 motion_m = Vec3::Zero();
   for (const LoadPart& part : parts) motion_m += part.weight * at.conjugate_m.segment<3>(part.first);
@@ -70,7 +84,7 @@ void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficie
     if (load.travel_m) {
       const int m = body.motion_column.at(load.tool);
       travel_m = c.motion(m) + support_compliance(unknowns) * given_way_along(s, load);
-      out.force_n[l] = scale * at.reaction_n(m) * direction;
+      out.force_n[l] = scale * driven_force_n(body, load, at);
       if (tare < 0) continue;
       out.force_n[l] += tare_axis.norm() > 0 ? Vec3(unknowns(tare) * tare_axis) : Vec3(unknowns.segment<3>(tare));
     } else {
@@ -157,12 +171,10 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     const auto at_load = static_cast<std::size_t>(l);
     const Load& load = now.loads[at_load];
     if (load.travel_m) {
-      const Vec3 direction = load.direction.normalized();
       const int m = body.motion_column.at(load.tool);
-      const Eigen::RowVectorXd d_reaction = at.d_reaction.row(m);
-      out.d_force[at_load] = scale * direction * d_reaction;
+      out.d_force[at_load] = scale * d_driven_force(body, load, at);
       for (Index k = parameters_; k < count; ++k) {
-        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += at.reaction_n(m) * direction;
+        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += driven_force_n(body, load, at);
         out.d_travel(l, k) = c.d_motion(m, k - parameters_);
         if (out.columns[static_cast<std::size_t>(k)] == support_compliance_unknown_) out.d_travel(l, k) += given_way_along(s, load);
       }
@@ -208,7 +220,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     if (!now.loads[l].travel_m) continue;
     if (force_scale_ >= 0 && std::find(c.columns.begin(), c.columns.end(), force_scale_) == c.columns.end()) {
       const Index at_scale = reading_column(force_scale_);
-      out.d_force[l].col(at_scale) += at.reaction_n(body.motion_column.at(now.loads[l].tool)) * now.loads[l].direction.normalized();
+      out.d_force[l].col(at_scale) += driven_force_n(body, now.loads[l], at);
     }
     if (tare_[p] < 0) continue;
     const bool along = tare_axis_[p].norm() > 0;
