@@ -137,6 +137,10 @@ class ForwardModel {
   /// Adds the surface to a prediction that was made with coordinates alone, at the same unknowns.
   void add_surface(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const;
 
+  /// Puts a prediction's surface to where the object would be if nothing deformed it: its clamp, its support and the rest surface's error
+  /// as these unknowns have them.
+  void undeform(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const;
+
   /// Elements whose volume is gone at these unknowns; solves the step in full where the prediction cannot rule them out.
   int inverted_elements(std::size_t s, const VectorX& unknowns);
 

@@ -63,6 +63,10 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> ForwardModel::d_driven_force(const Body
   return at.d_driven_force.middleRows<3>(3 * contact);
 }
 
+void ForwardModel::undeform(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const {
+  place_surface(s, unknowns, VectorX::Zero(3 * object_.surface.vertex_count()), predicted);
+}
+
 Vec3 ForwardModel::mean_motion(const std::vector<LoadPart>& parts, const fem::ResponseState& at) {
   Vec3 motion_m = Vec3::Zero();
   for (const LoadPart& part : parts) motion_m += part.weight * at.conjugate_m.segment<3>(part.first);
