@@ -222,14 +222,14 @@ std::vector<ForwardModel::LoadPart> ForwardModel::load_parts(std::size_t s, std:
 }
 
 ForwardModel::TrueForce ForwardModel::true_force(std::size_t s, std::size_t l, const VectorX& unknowns) const {
-  const std::size_t p = steps_[s].push;
+  const ToolErrors& errors = errors_of(s, l);
   const Load& load = step(s).loads[l];
   const int error = force_error_[s][l];
   Vec3 measured = load.force_n.value_or(Vec3::Zero());
   if (error >= 0) measured += unknowns.segment<3>(error);
   if (time_offset_ >= 0) measured += unknowns(time_offset_) * load.force_rate_n_s;
   // What the sensor reads across of what acts along: a strain gauge's axes are not quite square.
-  const int cross = cross_talk_[p];
+  const int cross = errors.cross_talk;
   const Vec3 along = load.direction.normalized();
   const std::array<Vec3, 2> across = tangents(along);
   const Vec3 leaks = cross >= 0 ? Vec3(unknowns(cross) * across[0] + unknowns(cross + 1) * across[1]) : Vec3(Vec3::Zero());
@@ -243,12 +243,12 @@ ForwardModel::TrueForce ForwardModel::true_force(std::size_t s, std::size_t l, c
   if (force_scale_ >= 0) out.derivatives.emplace_back(force_scale_, measured);
   if (time_offset_ >= 0) out.derivatives.emplace_back(time_offset_, scale * straightened(load.force_rate_n_s));
   for (int k = 0; cross >= 0 && k < 2; ++k) out.derivatives.emplace_back(cross + k, -scale * read_along_n * across[static_cast<std::size_t>(k)]);
-  if (tare_[p] < 0) return out;
-  const bool one_axis = tare_axis_[p].norm() > 0;
+  if (errors.tare < 0) return out;
+  const bool one_axis = errors.tare_axis.norm() > 0;
   for (int k = 0; k < (one_axis ? 1 : 3); ++k) {
-    const Vec3 axis = one_axis ? tare_axis_[p] : Vec3(Vec3::Unit(k));
-    out.force_n += unknowns(tare_[p] + k) * axis;
-    out.derivatives.emplace_back(tare_[p] + k, axis);
+    const Vec3 axis = one_axis ? errors.tare_axis : Vec3(Vec3::Unit(k));
+    out.force_n += unknowns(errors.tare + k) * axis;
+    out.derivatives.emplace_back(errors.tare + k, axis);
   }
   return out;
 }
@@ -302,7 +302,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
         const int place = column(support_compliance_unknown_);
         c.d_motion(at, place) = -given_way;
       }
-      for (const int off : {travel_offset_[p], force_error_[s][l]}) {
+      for (const int off : {errors_of(s, l).travel_offset, force_error_[s][l]}) {
         if (off < 0) continue;
         c.motion(at) += unknowns(off);
         const int place = column(off);

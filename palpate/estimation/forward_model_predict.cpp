@@ -76,8 +76,6 @@ Vec3 ForwardModel::mean_motion(const std::vector<LoadPart>& parts, const fem::Re
 void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficients& c, const VectorX& unknowns,
                                 const fem::ResponseState& at, StepPrediction& out) const {
   const Step& now = step(s);
-  const int tare = tare_[steps_[s].push];
-  const Vec3& tare_axis = tare_axis_[steps_[s].push];
   const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
   out.travel_m = VectorX::Zero(static_cast<Index>(now.loads.size()));
   out.force_n.assign(now.loads.size(), Vec3::Zero());
@@ -89,8 +87,9 @@ void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficie
       const int m = body.motion_column.at(load.tool);
       travel_m = c.motion(m) + support_compliance(unknowns) * given_way_along(s, load);
       out.force_n[l] = scale * driven_force_n(body, load, at);
-      if (tare < 0) continue;
-      out.force_n[l] += tare_axis.norm() > 0 ? Vec3(unknowns(tare) * tare_axis) : Vec3(unknowns.segment<3>(tare));
+      const ToolErrors& errors = errors_of(s, l);
+      if (errors.tare < 0) continue;
+      out.force_n[l] += errors.tare_axis.norm() > 0 ? Vec3(unknowns(errors.tare) * errors.tare_axis) : Vec3(unknowns.segment<3>(errors.tare));
     } else {
       out.force_n[l] = load.force_n.value_or(Vec3::Zero());
       const std::vector<LoadPart> parts = load_parts(s, l, body, unknowns);
@@ -165,7 +164,6 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   }
 
   // What the readings depend on.
-  const std::size_t p = steps_[s].push;
   const Step& now = step(s);
   const Index loads = static_cast<Index>(now.loads.size());
   out.d_travel = MatrixX::Zero(loads, count);
@@ -226,11 +224,12 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
       const Index at_scale = reading_column(force_scale_);
       out.d_force[l].col(at_scale) += driven_force_n(body, now.loads[l], at);
     }
-    if (tare_[p] < 0) continue;
-    const bool along = tare_axis_[p].norm() > 0;
+    const ToolErrors& errors = errors_of(s, l);
+    if (errors.tare < 0) continue;
+    const bool along = errors.tare_axis.norm() > 0;
     for (int k = 0; k < (along ? 1 : 3); ++k) {
-      const Index at_tare = reading_column(tare_[p] + k);
-      const Vec3 axis = along ? tare_axis_[p] : Vec3(Vec3::Unit(k));
+      const Index at_tare = reading_column(errors.tare + k);
+      const Vec3 axis = along ? errors.tare_axis : Vec3(Vec3::Unit(k));
       out.d_force[l].col(at_tare) += axis;
     }
   }
