@@ -4,13 +4,17 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
+#include <set>
 #include <string_view>
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/exact_inputs.hpp"
+#include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/names_of_unknowns.hpp"
 #include "palpate/estimation/slips.hpp"
 #include "palpate/fem/regions.hpp"
 
@@ -39,15 +43,18 @@ Doubted doubted(const Recording& recording, const TetMesh& mesh) {
     out.unknowns.push_back(std::move(unknowns));
   };
   for (auto& push : out.recording.pushes) {
-    for (auto& step : push.steps) {
-      for (auto& load : step.loads) {
+    std::set<std::string> contacts;
+    for (std::size_t s = 0; s < push.steps.size(); ++s) {
+      for (auto& load : push.steps[s].loads) {
         const auto tool = std::find_if(out.recording.tools.begin(), out.recording.tools.end(),
                                        [&](const Tool& each) { return each.name == load.tool; });
         const bool round = tool->shape == ToolShape::sphere || tool->shape == ToolShape::disc;
         if (!round || !load.force_n || load.force_n->norm() == 0) continue;
         if (load.contact_std_m == 0) {
-          const std::string shift = "contact_shift[" + push.name + "]";
-          ask(Doubt::About::contact, push.name, tool->radius_m, {shift + "_1", shift + "_2"});
+          if (contacts.insert(stretch_of(push, s) + key_of(load)).second) {
+            const std::string ending = of_contact(push, s, load), shift = "contact_shift" + ending;
+            ask(Doubt::About::contact, ending.substr(1, ending.size() - 2), tool->radius_m, {shift + "_1", shift + "_2"});
+          }
           load.contact_std_m = tool->radius_m;
         }
         if (tool->radius_std_m == 0) {
@@ -87,13 +94,21 @@ bool divide(SimulatedObject& object, const Recording& recording) {
   return true;
 }
 
-/// Where each of the fit's unknowns is among more of them: in the same order.
+/// Where each of the fit's unknowns is among more of them, which may stand in another order: an unknown comes where it is first needed.
 std::vector<int> places(const Unknowns& fitted, const Unknowns& more) {
+  std::map<std::string, std::vector<int>> named;
+  for (int j = 0; j < more.size(); ++j) named[more[j].name].push_back(j);
+  std::map<std::string, std::size_t> seen;
   std::vector<int> at;
-  int j = 0;
-  for (int i = 0; i < fitted.size(); ++i, ++j) {
-    while (j < more.size() && more[j].name != fitted[i].name) ++j;
-    at.push_back(j);
+  for (int i = 0; i < fitted.size(); ++i) {
+    const std::string& name = fitted[i].name;
+    const std::vector<int>& there = named[name];
+    const std::size_t number = seen[name]++;
+    if (number >= there.size())
+      throw Error("is fitted, and there is no such unknown where what is stated as exactly known is asked about; give names that differ to "
+                  "pushes, tools and supports, or run without cross-checks",
+                  "unknown " + name);
+    at.push_back(there[number]);
   }
   return at;
 }

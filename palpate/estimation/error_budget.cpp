@@ -13,6 +13,7 @@ namespace {
 std::string group_of(const std::string& name) {
   std::string group = name.substr(0, name.find('['));
   if (group.rfind("marker_", 0) == 0) return "marker positions";
+  if (group.rfind("frame", 0) == 0) group.erase(5, std::min(group.find('_'), group.size()) - 5);  // "frame2_x": a step's second one
   if (group.size() > 2 && group[group.size() - 2] == '_' && group.back() >= 'x' && group.back() <= 'z') group.resize(group.size() - 2);
   return group;
 }

@@ -11,6 +11,8 @@
 #include "palpate/estimation/error_budget.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/names_of_unknowns.hpp"
+#include "palpate/estimation/slips.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -51,17 +53,18 @@ class Exact {
       if (push.force_tare_std_n > 0 || !(highest_n > 0)) continue;
       const double size_n = errors_.force_share * highest_n;
       more_.pushes[p].force_tare_std_n = size_n;
-      const std::string name = "force_tare[" + push.name + "]";
-      for (const std::string& axis : {std::string(), along_xyz[0], along_xyz[1], along_xyz[2]})
-        add("force_tare", fmt::format("{:g} % of the push's highest force", 100 * errors_.force_share), "force_tare_std_n",
-            {{name + axis}, size_n});
+      for (const std::string& tool : tools_of(push))
+        for (const std::string& axis : {std::string(), along_xyz[0], along_xyz[1], along_xyz[2]})
+          add("force_tare", fmt::format("{:g} % of the push's highest force", 100 * errors_.force_share), "force_tare_std_n",
+              {{"force_tare" + of_push(push, tool) + axis}, size_n});
     }
     if (stated_.force_cross_talk_std == 0 && any) {
       more_.force_cross_talk_std = errors_.force_share;
       for (const Push& push : stated_.pushes)
-        for (const char* axis : {"_1", "_2"})
-          add("force_cross_talk", fmt::format("{:g} % of the force along the push", 100 * errors_.force_share), "force_cross_talk_std",
-              {{"force_cross_talk[" + push.name + "]" + axis}, errors_.force_share});
+        for (const std::string& tool : tools_of(push))
+          for (const char* axis : {"_1", "_2"})
+            add("force_cross_talk", fmt::format("{:g} % of the force along the push", 100 * errors_.force_share), "force_cross_talk_std",
+                {{"force_cross_talk" + of_push(push, tool) + axis}, errors_.force_share});
     }
     if (stated_.force_scale_std > 0 || !any) return;
     more_.force_scale_std = errors_.force_share;
@@ -71,7 +74,8 @@ class Exact {
   void of_contacts() {
     std::set<std::string> radii;
     for (std::size_t p = 0; p < stated_.pushes.size(); ++p) {
-      bool known = true;
+      const Push& push = stated_.pushes[p];
+      std::set<std::string> contacts;
       for (std::size_t s = 0; s < stated_.pushes[p].steps.size(); ++s) {
         for (std::size_t l = 0; l < stated_.pushes[p].steps[s].loads.size(); ++l) {
           const Load& load = stated_.pushes[p].steps[s].loads[l];
@@ -80,10 +84,10 @@ class Exact {
           if (load.contact_std_m == 0 && has_place(stated_, load)) {
             Load& shifted = more_.pushes[p].steps[s].loads[l];
             if (shifted.contact_std_m == 0) shifted.contact_std_m = errors_.contact_m;
-            for (const char* axis : {"_1", "_2"})
-              if (known) add("contact_shift", words_m(errors_.contact_m) + " across the push", "contact_std_m",
-                             {{"contact_shift[" + stated_.pushes[p].name + "]" + axis}, errors_.contact_m});
-            known = false;
+            if (contacts.insert(stretch_of(push, s) + key_of(load)).second)
+              for (const char* axis : {"_1", "_2"})
+                add("contact_shift", words_m(errors_.contact_m) + " across the push", "contact_std_m",
+                    {{"contact_shift" + of_contact(push, s, load) + axis}, errors_.contact_m});
           }
           const std::size_t t = tool_of(load);
           const Tool& tool = stated_.tools[t];
@@ -121,7 +125,8 @@ class Exact {
       if (push.travel_offset_std_m > 0 || !(driven || read)) continue;
       more_.pushes[p].travel_offset_std_m = errors_.travel_m;
       for (const char* name : {"travel_offset", "travel_zero"})
-        add(name, words_m(errors_.travel_m), "travel_offset_std_m", {{std::string(name) + "[" + push.name + "]"}, errors_.travel_m});
+        for (const std::string& tool : tools_of(push))
+          add(name, words_m(errors_.travel_m), "travel_offset_std_m", {{name + of_push(push, tool)}, errors_.travel_m});
     }
   }
 
@@ -156,17 +161,19 @@ class Exact {
 
   /// What a camera errs by it errs by in all its images.
   void of_sensors(Inputs& more) {
-    std::map<std::string, std::set<std::string>> offsets, turns;  // of a camera: endings of its unknowns' names
+    std::map<std::string, std::set<std::pair<std::string, std::string>>> offsets, turns;  // of a camera: how its unknowns' names begin and end
     std::set<std::string> biased, marked;
     std::size_t s = 0;
     for (const Push& push : stated_.pushes) {
       for (std::size_t k = 0; k < push.steps.size(); ++k, ++s) {
         const std::string in_step = "[" + push.name + ":" + std::to_string(k) + "]";
+        int frames = 0;
         for (std::size_t i = 0; i < inputs_[s].size(); ++i) {
           const auto pose = [&](auto& seen, const std::string& camera) {
-            const std::string ending = "[" + camera + "]";
-            if (seen.pose_std_m == 0) offsets[camera].insert(camera.empty() ? in_step : ending), seen.pose_std_m = errors_.camera_m;
-            if (seen.pose_std_rad == 0) turns[camera].insert(camera.empty() ? in_step : ending), seen.pose_std_rad = errors_.camera_rad;
+            const std::string begins = of_frame(frames++);
+            const auto name = camera.empty() ? std::pair(begins, in_step) : std::pair(std::string("camera"), "[" + camera + "]");
+            if (seen.pose_std_m == 0) offsets[camera].insert(name), seen.pose_std_m = errors_.camera_m;
+            if (seen.pose_std_rad == 0) turns[camera].insert(name), seen.pose_std_rad = errors_.camera_rad;
           };
           if (auto* cloud = std::get_if<PointCloud>(&more[s][i])) pose(*cloud, "");
           if (auto* rays = std::get_if<RayObservation>(&more[s][i])) {
@@ -187,11 +194,10 @@ class Exact {
       }
     }
     const auto poses = [&](const auto& cameras, const std::string& what, double size, const std::string& words, const std::string& field) {
-      for (const auto& [camera, endings] : cameras) {
+      for (const auto& [camera, names] : cameras) {
         for (const std::string& axis : along_xyz) {
           ExactInput::Way way{{}, size};
-          for (const std::string& ending : endings)
-            way.unknowns.push_back((camera.empty() ? "frame" : "camera") + std::string(what == "camera" ? "" : "_rotation") + axis + ending);
+          for (const auto& [begins, ends] : names) way.unknowns.push_back(begins + (what == "camera" ? "" : "_rotation") + axis + ends);
           add(what, words, field, std::move(way));
         }
       }

@@ -8,6 +8,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/names_of_unknowns.hpp"
 #include "palpate/estimation/slips.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/materials.hpp"
@@ -161,33 +162,43 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     const Push& push = recording.pushes[p];
     const std::string in_push = "[" + push.name + "]";
     int push_clamp = clamp != nullptr && clamp->pose_varies == PoseVaries::push ? add_clamp(in_push) : common_clamp;
-    // A single-axis load cell has a tare along its axis only.
-    Vec3 axis = Vec3::Zero();
-    for (const auto& step : push.steps) {
-      for (const auto& observation : step.observations) {
-        if (const auto* wrench = std::get_if<Wrench>(&observation)) axis = wrench->along;
+    std::map<std::string, std::size_t> errors_of_tool;
+    for (const std::string& name : tools_of(push)) {  // each has sensors of its own
+      const std::string of_tool = of_push(push, name);
+      errors_of_tool[name] = tool_errors_.size();
+      ToolErrors& errors = tool_errors_.emplace_back();
+      // A single-axis load cell has a tare along its axis only.
+      for (const auto& step : push.steps) {
+        for (const auto& observation : step.observations) {
+          const auto* wrench = std::get_if<Wrench>(&observation);
+          if (wrench != nullptr && (name.empty() || wrench->tool.empty() || wrench->tool == name)) errors.tare_axis = wrench->along;
+        }
       }
+      const bool one_axis = errors.tare_axis.norm() > 0;
+      errors.tare = unknowns.add_block("force_tare" + of_tool, "N", push.force_tare_std_n, one_axis ? std::vector<std::string>{""} : xyz);
+      // A sensor that reads one axis reads nothing across it.
+      const bool reads_across = !one_axis && std::any_of(push.steps.begin(), push.steps.end(), [&](const Step& step) {
+        return std::any_of(step.loads.begin(), step.loads.end(),
+                           [&](const Load& load) { return load.tool == name && load.force_n && load.force_n->norm() > 0; });
+      });
+      if (reads_across)
+        errors.cross_talk = unknowns.add_block("force_cross_talk" + of_tool, "1", recording.force_cross_talk_std, {"_1", "_2"});
+      const double offset_std_m =
+          driven_tools(push).count(name) == 0 ? 0 : push.travel_offset_std_m;  // else it belongs to the readings
+      errors.travel_offset = unknowns.add_block("travel_offset" + of_tool, "m", offset_std_m, {""});
     }
-    tare_axis_.push_back(axis);
-    tare_.push_back(unknowns.add_block("force_tare" + in_push, "N", push.force_tare_std_n,
-                                       axis.norm() > 0 ? std::vector<std::string>{""} : xyz));
-    // A sensor that reads one axis reads nothing across it.
-    const bool reads_across = axis.norm() == 0 && std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) {
-      return std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) { return load.force_n && load.force_n->norm() > 0; });
-    });
-    cross_talk_.push_back(reads_across ? unknowns.add_block("force_cross_talk" + in_push, "1", recording.force_cross_talk_std, {"_1", "_2"}) : -1);
-    const double offset_std_m =
-        driven_tools(push).empty() ? 0 : push.travel_offset_std_m;  // else it belongs to the readings
-    travel_offset_.push_back(unknowns.add_block("travel_offset" + in_push, "m", offset_std_m, {""}));
     for (std::size_t s = 0; s < push.steps.size(); ++s) {
       steps_.push_back({p, s});
       const std::string in_step = "[" + push.name + ":" + std::to_string(s) + "]";
       clamp_.push_back(clamp != nullptr && clamp->pose_varies == PoseVaries::step ? add_clamp(in_step) : push_clamp);
       std::vector<int> errors, shifts, radii;
-      for (const auto& load : push.steps[s].loads) {
-        const std::string stretch = stretch_of(push, s), shift = stretch + key_of(load);
+      errors_of_.emplace_back();
+      for (std::size_t l = 0; l < push.steps[s].loads.size(); ++l) {
+        const Load& load = push.steps[s].loads[l];
+        const std::string shift = stretch_of(push, s) + key_of(load), of_this = of_load(push, s, l);
+        errors_of_.back().push_back(errors_of_tool.at(load.tool));
         if (load.contact_std_m > 0 && has_place(recording, load) && shift_of.count(shift) == 0) {
-          shift_of[shift] = unknowns.add_block("contact_shift" + stretch, "m", load.contact_std_m, {"_1", "_2"});
+          shift_of[shift] = unknowns.add_block("contact_shift" + of_contact(push, s, load), "m", load.contact_std_m, {"_1", "_2"});
           shift_direction_[shift_of[shift]] = load.direction;
         }
         const auto known = shift_of.find(shift);
@@ -199,8 +210,8 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
           radii.back() = own->second;
         }
         const double std_n = load.force_n ? std::hypot(load.force_std_n, load.force_relative_std * load.force_n->norm()) : 0;
-        errors.push_back(load.travel_m ? unknowns.add_block("travel_error" + in_step, "m", travel_std_m(push.steps[s], load), {""})
-                                       : unknowns.add_block("force_error" + in_step, "N", std_n, xyz));
+        errors.push_back(load.travel_m ? unknowns.add_block("travel_error" + of_this, "m", travel_std_m(push.steps[s], load), {""})
+                                       : unknowns.add_block("force_error" + of_this, "N", std_n, xyz));
       }
       force_error_.push_back(errors);
       contact_shift_.push_back(shifts);
@@ -241,9 +252,7 @@ ForwardModel::ForwardModel(const Recording& recording, SimulatedObject object, U
     solved_->bodies = std::move(earlier->bodies);
     solved_->rest_tree = earlier->rest_tree;
     solved_->surface_edges = earlier->surface_edges;
-    for (auto& bodies : solved_->bodies) {
-      for (const auto& push : recording.pushes) drop_if_unfit(bodies, push);
-    }
+    for (auto& bodies : solved_->bodies) drop_if_unfit(bodies);
   }
   solves_.assign(workers_, 0);
   load_cases_before_ = unit_load_cases();

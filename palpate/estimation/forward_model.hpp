@@ -137,6 +137,10 @@ class ForwardModel {
   /// Adds the surface to a prediction that was made with coordinates alone, at the same unknowns.
   void add_surface(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const;
 
+  /// Puts a prediction's surface to where the object would be if nothing deformed it: its clamp, its support and the rest surface's error
+  /// as these unknowns have them.
+  void undeform(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const;
+
   /// Elements whose volume is gone at these unknowns; solves the step in full where the prediction cannot rule them out.
   int inverted_elements(std::size_t s, const VectorX& unknowns);
 
@@ -232,8 +236,8 @@ class ForwardModel {
   VectorX region_poisson(const VectorX& unknowns) const;
   std::vector<int> parameter_columns() const;
   void place_surface(std::size_t s, const VectorX& unknowns, const VectorX& moved_m, StepPrediction& out) const;
-  /// Forgets the push's body where it lacks columns of a contact.
-  void drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies, const Push& push) const;
+  /// Forgets bodies that lack columns of a contact.
+  void drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies) const;
   Body& body_of(const Push& push, std::size_t worker);
   const Body& body_of(std::size_t s) const;  // one that was made
   Coefficients coefficients(std::size_t s, const Body& body, const VectorX& unknowns) const;
@@ -243,6 +247,15 @@ class ForwardModel {
   void add_slide_unknowns(Unknowns& unknowns);
   void slide(std::size_t s, const Body& body, const VectorX& unknowns, const std::vector<int>& columns, bool derivatives,
              fem::ResponseState& at) const;
+  struct ToolErrors {  // what the sensors of a tool err by all along a push: unknowns, or -1
+    int tare = -1, cross_talk = -1;  // first of three, first of two
+    int travel_offset = -1;
+    Vec3 tare_axis = Vec3::Zero();  // zero: three unknowns, else one along this axis
+  };
+  const ToolErrors& errors_of(std::size_t s, std::size_t l) const { return tool_errors_[errors_of_[s][l]]; }
+  /// What a tool whose motion is imposed presses with, and its derivatives.
+  static Vec3 driven_force_n(const Body& body, const Load& load, const fem::ResponseState& at);
+  static Eigen::Matrix<double, 3, Eigen::Dynamic> d_driven_force(const Body& body, const Load& load, const fem::ResponseState& at);
   struct TrueForce;  // of a load: its reading without what the sensor errs by
   TrueForce true_force(std::size_t s, std::size_t l, const VectorX& unknowns) const;
   struct LoadPart;  // of one load: columns that work together
@@ -289,9 +302,8 @@ class ForwardModel {
   int support_compliance_unknown_ = -1;          // what it is more than stated, or -1
   std::vector<int> spread_;                      // a support that spreads: the unknown
   std::vector<double> effort_;                   // a step: its load as a share of the highest
-  std::vector<int> tare_, travel_offset_;        // a push: first of three, the one; or -1
-  std::vector<int> cross_talk_;                  // a push: first of two unknowns, or -1
-  std::vector<Vec3> tare_axis_;                  // a push: zero = three unknowns, else one along this axis
+  std::vector<ToolErrors> tool_errors_;
+  std::vector<std::vector<std::size_t>> errors_of_;  // a step and load: which of them
   int force_scale_ = -1, time_offset_ = -1, density_ = -1;
   std::map<std::string, int> compliance_;  // a tool whose compliance is not exactly known
   int parameters_ = first_ratio;  ///< log E, nu, the regions' ratios and their own nu: the first columns of every derivative

@@ -53,7 +53,10 @@ std::optional<ActingForce> ForwardModel::acting_force(std::size_t s, std::size_t
   for (const LoadPart& part : parts) {
     const Vec3 middle = middle_m(body.forces, part.first, object_.mesh.nodes_m);
     place_m += part.weight * middle;
-    if (part.unknown >= 0) moves.emplace_back(part.unknown, across(rotation * middle));
+    if (part.unknown < 0) continue;
+    const Vec3 way = part.per_unknown * across(rotation * middle);
+    const auto own = std::find_if(moves.begin(), moves.end(), [&](const auto& one) { return one.first == part.unknown; });
+    own == moves.end() ? void(moves.emplace_back(part.unknown, way)) : void(own->second += way);
   }
   const auto by_clamp = clamp.derivative(place_m);
   for (int k = 0; clamp_[s] >= 0 && k < 6; ++k) moves.emplace_back(clamp_[s] + k, across(by_clamp.col(k)));

@@ -215,6 +215,7 @@ bool ForwardModel::solve_contact_step(std::size_t s, Body& body, const Coefficie
     seen.d_watched = less_rest(now->state.d_watched, rest ? &rest->state.d_watched : nullptr);
     seen.d_conjugate = less_rest(now->state.d_conjugate, rest ? &rest->state.d_conjugate : nullptr);
     seen.d_reaction = in_order(now->state.d_reaction, now->columns, columns);
+    seen.d_driven_force = in_order(now->state.d_driven_force, now->columns, columns);
   }
   seen.solution = std::move(solution);
   memory_[s].seen = std::make_shared<SolvedAt>(SolvedAt{unknowns, std::move(columns), seen});

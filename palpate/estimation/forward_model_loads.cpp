@@ -66,19 +66,19 @@ bool has_columns(const Load& load) {
   return !load.travel_m && load.force_n.value_or(Vec3::Zero()).norm() + load.force_std_n > 0;
 }
 
-void ForwardModel::drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies, const Push& push) const {
-  const auto known = bodies.find(body_key(push));
-  if (known == bodies.end()) return;
-  for (const auto& step : push.steps) {
-    for (const auto& load : step.loads) {
-      if (!has_columns(load)) continue;
-      const auto at = known->second->contacts.find(key_of(load));
-      const bool shifts = load.contact_std_m > 0 && has_place(*recording_, load);
-      if (at == known->second->contacts.end() ||
-          (shifts && (at->second.shift < 0 || at->second.direction != load.direction)) ||
-          (has_radius(tool(load.tool), load) && at->second.radius < 0)) {
+void ForwardModel::drop_if_unfit(std::map<std::string, std::unique_ptr<Body>>& bodies) const {
+  for (std::size_t s = 0; s < steps_.size(); ++s) {
+    const std::vector<Load>& loads = step(s).loads;
+    if (std::none_of(loads.begin(), loads.end(), has_columns)) continue;
+    const auto known = bodies.find(body_key(push(s)));
+    if (known == bodies.end()) continue;
+    for (std::size_t l = 0; l < loads.size(); ++l) {
+      if (!has_columns(loads[l])) continue;
+      const auto at = known->second->contacts.find(key_of(loads[l]));
+      if (at == known->second->contacts.end() || (contact_shift_[s][l] >= 0 && !at->second.shifts_across(shift_direction_.at(contact_shift_[s][l]))) ||
+          (has_radius(tool(loads[l].tool), loads[l]) && at->second.radius < 0)) {
         bodies.erase(known);
-        return;
+        break;
       }
     }
   }
@@ -105,10 +105,13 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
 
   // Columns of every contact of the pushes that share this body.
   std::vector<Eigen::SparseMatrix<double>> parts;
+  std::size_t s = 0;
   for (const auto& other : recording_->pushes) {
-    if (body_key(other) != body_key(push)) continue;
-    for (const auto& step : other.steps) {
-      for (const auto& load : step.loads) {
+    const bool shares = body_key(other) == body_key(push);
+    for (std::size_t k = 0; k < other.steps.size(); ++k, ++s) {
+      const std::vector<Load>& loads = other.steps[k].loads;
+      for (std::size_t l = 0; shares && l < loads.size(); ++l) {
+        const Load& load = loads[l];
         if (!has_columns(load)) continue;
         Body::Contact& contact = body->contacts[key_of(load)];
         const auto next_column = [&] { return static_cast<int>(3 * parts.size()); };
@@ -117,10 +120,16 @@ ForwardModel::Body& ForwardModel::body_of(const Push& push, std::size_t worker) 
           contact.force = next_column();
           parts.push_back(load_columns(object_.mesh, tool, load));
         }
-        if (contact.shift < 0 && load.contact_std_m > 0 && has_place(*recording_, load)) {
-          contact.shift = next_column();
-          contact.direction = load.direction;
-          for (const Vec3& tangent : tangents(load.direction)) parts.push_back(shifted_columns(object_.mesh, tool, load, tangent));
+        if (contact_shift_[s][l] >= 0) {
+          const Vec3& direction = shift_direction_.at(contact_shift_[s][l]);
+          if (contact.shift < 0) {
+            contact.shift = next_column();
+            contact.direction = direction;
+            for (const Vec3& tangent : tangents(direction)) parts.push_back(shifted_columns(object_.mesh, tool, load, tangent));
+          } else if (!contact.shifts_across(direction)) {
+            contact.along = next_column();
+            parts.push_back(shifted_columns(object_.mesh, tool, load, contact.direction.normalized()));
+          }
         }
         if (contact.radius < 0 && has_radius(tool, load)) {
           contact.radius = next_column();
@@ -193,10 +202,19 @@ std::vector<ForwardModel::LoadPart> ForwardModel::load_parts(std::size_t s, std:
   std::vector<LoadPart> parts{{contact.force}};
   const int shift = contact_shift_[s][l];
   if (shift >= 0) {
-    const std::array<Vec3, 2> across = tangents(contact.direction);
+    const Vec3& direction = shift_direction_.at(shift);
+    const std::array<Vec3, 2> across = tangents(direction), known = tangents(contact.direction);
     for (int k = 0; k < 2; ++k) {
-      const double from_found_m = unknowns(shift + k) - across[static_cast<std::size_t>(k)].dot(step(s).loads[l].contact_found_m);
-      parts.push_back({contact.shift + 3 * k, from_found_m, shift + k});
+      const Vec3& way = across[static_cast<std::size_t>(k)];
+      const double from_found_m = unknowns(shift + k) - way.dot(step(s).loads[l].contact_found_m);
+      if (direction == contact.direction) {
+        parts.push_back({contact.shift + 3 * k, from_found_m, shift + k});
+        continue;
+      }
+      // A push another way at the same place: its tangents put together of the ways that there are columns of.
+      const auto add = [&](int first, double share) { parts.push_back({first, share * from_found_m, shift + k, share}); };
+      for (int j = 0; j < 2; ++j) add(contact.shift + 3 * j, way.dot(known[static_cast<std::size_t>(j)]));
+      add(contact.along, way.dot(contact.direction.normalized()));
     }
   }
   if (const int radius = patch_radius_[s][l]; radius >= 0) parts.push_back({contact.radius, unknowns(radius), radius});
@@ -204,14 +222,14 @@ std::vector<ForwardModel::LoadPart> ForwardModel::load_parts(std::size_t s, std:
 }
 
 ForwardModel::TrueForce ForwardModel::true_force(std::size_t s, std::size_t l, const VectorX& unknowns) const {
-  const std::size_t p = steps_[s].push;
+  const ToolErrors& errors = errors_of(s, l);
   const Load& load = step(s).loads[l];
   const int error = force_error_[s][l];
   Vec3 measured = load.force_n.value_or(Vec3::Zero());
   if (error >= 0) measured += unknowns.segment<3>(error);
   if (time_offset_ >= 0) measured += unknowns(time_offset_) * load.force_rate_n_s;
   // What the sensor reads across of what acts along: a strain gauge's axes are not quite square.
-  const int cross = cross_talk_[p];
+  const int cross = errors.cross_talk;
   const Vec3 along = load.direction.normalized();
   const std::array<Vec3, 2> across = tangents(along);
   const Vec3 leaks = cross >= 0 ? Vec3(unknowns(cross) * across[0] + unknowns(cross + 1) * across[1]) : Vec3(Vec3::Zero());
@@ -225,12 +243,12 @@ ForwardModel::TrueForce ForwardModel::true_force(std::size_t s, std::size_t l, c
   if (force_scale_ >= 0) out.derivatives.emplace_back(force_scale_, measured);
   if (time_offset_ >= 0) out.derivatives.emplace_back(time_offset_, scale * straightened(load.force_rate_n_s));
   for (int k = 0; cross >= 0 && k < 2; ++k) out.derivatives.emplace_back(cross + k, -scale * read_along_n * across[static_cast<std::size_t>(k)]);
-  if (tare_[p] < 0) return out;
-  const bool one_axis = tare_axis_[p].norm() > 0;
+  if (errors.tare < 0) return out;
+  const bool one_axis = errors.tare_axis.norm() > 0;
   for (int k = 0; k < (one_axis ? 1 : 3); ++k) {
-    const Vec3 axis = one_axis ? tare_axis_[p] : Vec3(Vec3::Unit(k));
-    out.force_n += unknowns(tare_[p] + k) * axis;
-    out.derivatives.emplace_back(tare_[p] + k, axis);
+    const Vec3 axis = one_axis ? errors.tare_axis : Vec3(Vec3::Unit(k));
+    out.force_n += unknowns(errors.tare + k) * axis;
+    out.derivatives.emplace_back(errors.tare + k, axis);
   }
   return out;
 }
@@ -284,7 +302,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
         const int place = column(support_compliance_unknown_);
         c.d_motion(at, place) = -given_way;
       }
-      for (const int off : {travel_offset_[p], force_error_[s][l]}) {
+      for (const int off : {errors_of(s, l).travel_offset, force_error_[s][l]}) {
         if (off < 0) continue;
         c.motion(at) += unknowns(off);
         const int place = column(off);
@@ -295,7 +313,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
     const std::vector<LoadPart> parts = load_parts(s, l, body, unknowns);
     if (parts.empty()) continue;
     const auto [force, derivatives] = true_force(s, l, unknowns);
-    for (const auto& [first, weight, own_unknown] : parts) {
+    for (const auto& [first, weight, own_unknown, per_unknown] : parts) {
       add_vector(first, weight * force);
       for (const auto& [unknown, d] : derivatives) {
         const int at = column(unknown);
@@ -303,7 +321,7 @@ ForwardModel::Coefficients ForwardModel::coefficients(std::size_t s, const Body&
       }
       if (own_unknown >= 0) {
         const int at = column(own_unknown);
-        c.d_force.block<3, 1>(first, at) += into_object * force;
+        c.d_force.block<3, 1>(first, at) += per_unknown * (into_object * force);
       }
     }
   }

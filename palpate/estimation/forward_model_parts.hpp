@@ -57,8 +57,10 @@ struct ForwardModel::Body {
   struct Contact {
     int force = -1;                 // first of three columns
     int shift = -1;                 // first of six, or -1
+    int along = -1;                 // of a shift along `direction`: first of three, or -1 where all pushes here go that way
     int radius = -1;                // first of three, or -1
-    Vec3 direction = Vec3::Zero();  // that the shifts are across
+    Vec3 direction = Vec3::Zero();  // that the six are across
+    bool shifts_across(const Vec3& push) const { return shift >= 0 && (along >= 0 || push == direction); }
   };
   std::map<std::string, Contact> contacts;   // of a load's key
   std::map<std::string, int> motion_column;  // of a platen
@@ -115,11 +117,12 @@ struct ForwardModel::TrueForce {
 };
 
 /// Where a load acts: its columns, and the derivatives of those to a shift of the contact along two tangents and to the
-/// radius of its patch.
+/// radius of its patch. An unknown may have several parts.
 struct ForwardModel::LoadPart {
-  int first = -1;     // of three columns
-  double weight = 1;  // 1, or how far the unknown is from its mean
-  int unknown = -1;   // -1: the columns themselves
+  int first = -1;          // of three columns
+  double weight = 1;       // 1, or how far the unknown is from its mean
+  int unknown = -1;        // -1: the columns themselves
+  double per_unknown = 1;  // what the weight grows by with it
 };
 
 }  // namespace palpate::estimation

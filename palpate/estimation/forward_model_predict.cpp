@@ -49,6 +49,24 @@ void ForwardModel::add_surface(std::size_t s, const VectorX& unknowns, StepPredi
   place_surface(s, unknowns, predicted.in_span->moved_m(), predicted);
 }
 
+/// Of a rigid body all of it, whichever way its push goes: what a face without friction takes is along its normal. Of a platen whose
+/// nodes are moved the part along its motion.
+Vec3 ForwardModel::driven_force_n(const Body& body, const Load& load, const fem::ResponseState& at) {
+  const int m = body.motion_column.at(load.tool), contact = m - body.node_motions;
+  if (contact < 0) return at.reaction_n(m) * load.direction.normalized();
+  return at.driven_force_n.segment<3>(3 * contact);
+}
+
+Eigen::Matrix<double, 3, Eigen::Dynamic> ForwardModel::d_driven_force(const Body& body, const Load& load, const fem::ResponseState& at) {
+  const int m = body.motion_column.at(load.tool), contact = m - body.node_motions;
+  if (contact < 0) return load.direction.normalized() * at.d_reaction.row(m);
+  return at.d_driven_force.middleRows<3>(3 * contact);
+}
+
+void ForwardModel::undeform(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const {
+  place_surface(s, unknowns, VectorX::Zero(3 * object_.surface.vertex_count()), predicted);
+}
+
 Vec3 ForwardModel::mean_motion(const std::vector<LoadPart>& parts, const fem::ResponseState& at) {
   Vec3 motion_m = Vec3::Zero();
   for (const LoadPart& part : parts) motion_m += part.weight * at.conjugate_m.segment<3>(part.first);
@@ -58,8 +76,6 @@ Vec3 ForwardModel::mean_motion(const std::vector<LoadPart>& parts, const fem::Re
 void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficients& c, const VectorX& unknowns,
                                 const fem::ResponseState& at, StepPrediction& out) const {
   const Step& now = step(s);
-  const int tare = tare_[steps_[s].push];
-  const Vec3& tare_axis = tare_axis_[steps_[s].push];
   const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
   out.travel_m = VectorX::Zero(static_cast<Index>(now.loads.size()));
   out.force_n.assign(now.loads.size(), Vec3::Zero());
@@ -70,9 +86,10 @@ void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficie
     if (load.travel_m) {
       const int m = body.motion_column.at(load.tool);
       travel_m = c.motion(m) + support_compliance(unknowns) * given_way_along(s, load);
-      out.force_n[l] = scale * at.reaction_n(m) * direction;
-      if (tare < 0) continue;
-      out.force_n[l] += tare_axis.norm() > 0 ? Vec3(unknowns(tare) * tare_axis) : Vec3(unknowns.segment<3>(tare));
+      out.force_n[l] = scale * driven_force_n(body, load, at);
+      const ToolErrors& errors = errors_of(s, l);
+      if (errors.tare < 0) continue;
+      out.force_n[l] += errors.tare_axis.norm() > 0 ? Vec3(unknowns(errors.tare) * errors.tare_axis) : Vec3(unknowns.segment<3>(errors.tare));
     } else {
       out.force_n[l] = load.force_n.value_or(Vec3::Zero());
       const std::vector<LoadPart> parts = load_parts(s, l, body, unknowns);
@@ -147,7 +164,6 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   }
 
   // What the readings depend on.
-  const std::size_t p = steps_[s].push;
   const Step& now = step(s);
   const Index loads = static_cast<Index>(now.loads.size());
   out.d_travel = MatrixX::Zero(loads, count);
@@ -157,12 +173,10 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     const auto at_load = static_cast<std::size_t>(l);
     const Load& load = now.loads[at_load];
     if (load.travel_m) {
-      const Vec3 direction = load.direction.normalized();
       const int m = body.motion_column.at(load.tool);
-      const Eigen::RowVectorXd d_reaction = at.d_reaction.row(m);
-      out.d_force[at_load] = scale * direction * d_reaction;
+      out.d_force[at_load] = scale * d_driven_force(body, load, at);
       for (Index k = parameters_; k < count; ++k) {
-        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += at.reaction_n(m) * direction;
+        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += driven_force_n(body, load, at);
         out.d_travel(l, k) = c.d_motion(m, k - parameters_);
         if (out.columns[static_cast<std::size_t>(k)] == support_compliance_unknown_) out.d_travel(l, k) += given_way_along(s, load);
       }
@@ -174,7 +188,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
         out.d_travel.row(l) += part.weight * direction.transpose() * at.d_conjugate.middleRows<3>(part.first);
         if (part.unknown < 0) continue;
         const auto own = std::find(out.columns.begin(), out.columns.end(), part.unknown);
-        out.d_travel(l, own - out.columns.begin()) += direction.dot(at.conjugate_m.segment<3>(part.first));
+        out.d_travel(l, own - out.columns.begin()) += part.per_unknown * direction.dot(at.conjugate_m.segment<3>(part.first));
       }
       if (whole.empty()) continue;
       // A turned clamp turns the object under the tool's direction.
@@ -208,13 +222,14 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     if (!now.loads[l].travel_m) continue;
     if (force_scale_ >= 0 && std::find(c.columns.begin(), c.columns.end(), force_scale_) == c.columns.end()) {
       const Index at_scale = reading_column(force_scale_);
-      out.d_force[l].col(at_scale) += at.reaction_n(body.motion_column.at(now.loads[l].tool)) * now.loads[l].direction.normalized();
+      out.d_force[l].col(at_scale) += driven_force_n(body, now.loads[l], at);
     }
-    if (tare_[p] < 0) continue;
-    const bool along = tare_axis_[p].norm() > 0;
+    const ToolErrors& errors = errors_of(s, l);
+    if (errors.tare < 0) continue;
+    const bool along = errors.tare_axis.norm() > 0;
     for (int k = 0; k < (along ? 1 : 3); ++k) {
-      const Index at_tare = reading_column(tare_[p] + k);
-      const Vec3 axis = along ? tare_axis_[p] : Vec3(Vec3::Unit(k));
+      const Index at_tare = reading_column(errors.tare + k);
+      const Vec3 axis = along ? errors.tare_axis : Vec3(Vec3::Unit(k));
       out.d_force[l].col(at_tare) += axis;
     }
   }

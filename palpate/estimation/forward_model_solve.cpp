@@ -63,6 +63,7 @@ bool ForwardModel::follow(std::size_t s, const VectorX& unknowns, fem::ResponseS
   seen = before;
   seen.watched_m += before.d_watched * change;
   seen.reaction_n += before.d_reaction * change;  // imposed motions do not move with E, but their reactions do
+  if (before.d_driven_force.size() > 0) seen.driven_force_n += before.d_driven_force * change;
   double share = 0;
   const auto within = [&](const VectorX& now, const VectorX& was) {
     if (now.size() == 0) return true;

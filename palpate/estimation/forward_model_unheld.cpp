@@ -65,7 +65,7 @@ void ForwardModel::drop_what_nothing_holds(std::size_t s, const Body& body, cons
         c.d_force.middleRows<3>(part.first) -= part.weight * d_dropped.middleRows<3>(3 * l);
         const auto own = std::find(c.columns.begin(), c.columns.end(), part.unknown);
         if (part.unknown >= 0 && own != c.columns.end())
-          c.d_force.block<3, 1>(part.first, static_cast<Index>(own - c.columns.begin())) -= sideways;
+          c.d_force.block<3, 1>(part.first, static_cast<Index>(own - c.columns.begin())) -= part.per_unknown * sideways;
       }
     }
     left -= of_forces * dropped;

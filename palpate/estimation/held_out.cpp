@@ -58,6 +58,13 @@ void add_distance(PartialFits& fits, std::size_t s, const StepPrediction& predic
   }
 }
 
+/// The object where its clamp holds it, with the rest surface as it is known, as if nothing had deformed it.
+StepPrediction at_rest(const ForwardModel& model, std::size_t s, const VectorX& unknowns, const StepPrediction& predicted) {
+  StepPrediction other = predicted;
+  model.undeform(s, unknowns, other);
+  return other;
+}
+
 StepPrediction with_surface(const StepPrediction& predicted, const Points& surface_m) {
   StepPrediction other = predicted;
   other.surface_m = surface_m;
@@ -65,16 +72,16 @@ StepPrediction with_surface(const StepPrediction& predicted, const Points& surfa
   return other;
 }
 
-/// Where the surface stood before a step; of a push whose highest loads are left out, before all of them.
-const Points& surface_before(PartialFits& fits, std::size_t s, const StepFlags* left_out) {
+/// Where the surface stood before a step; of a push whose highest loads are left out, before all of them. Nothing: at rest.
+const Points* surface_before(PartialFits& fits, std::size_t s, const StepFlags* left_out) {
   const ForwardModel& model = fits.model();
   for (std::size_t before = s; before > 0 && model.index(before - 1).push == model.index(s).push;) {
     --before;
     if (left_out != nullptr && (*left_out)[before] != 0) continue;
     if (fits.joint_prediction(before).surface_m.rows() == 0) break;
-    return fits.joint_prediction(before).surface_m;
+    return &fits.joint_prediction(before).surface_m;
   }
-  return model.object().surface.rest().vertices_m;
+  return nullptr;
 }
 
 struct Sums {
@@ -160,7 +167,6 @@ LeftOut highest_loads(const PartialFits& fits, const std::vector<StepFlags>& pus
 
 HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<PartialYoung>& pushes, std::vector<Optimum>* learned) {
   ForwardModel& model = fits.model();
-  const Points& rest_m = model.object().surface.rest().vertices_m;
   HeldOut out;
   out.what = left_out.what;
   Sums sums;
@@ -178,8 +184,10 @@ HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<P
       const StepPrediction now = model.predict(s, others.unknowns);
       if (!now.converged) return out;
       add_distance(fits, s, now, others.unknowns, sums.predicted);
-      add_distance(fits, s, with_surface(now, rest_m), others.unknowns, sums.undeformed);
-      add_distance(fits, s, with_surface(now, surface_before(fits, s, left_out.whole_pushes ? nullptr : &held)), others.unknowns, sums.as_before);
+      const StepPrediction still = at_rest(model, s, others.unknowns, now);
+      const Points* before_m = surface_before(fits, s, left_out.whole_pushes ? nullptr : &held);
+      add_distance(fits, s, still, others.unknowns, sums.undeformed);
+      add_distance(fits, s, before_m != nullptr ? with_surface(now, *before_m) : still, others.unknowns, sums.as_before);
       add_distance(fits, s, fits.joint_prediction(s), fits.optimum().unknowns, sums.fitted);
       add_reactions(model.step(s), now, sums);
       force_driven = force_driven || is_force_driven(model.step(s));

@@ -18,8 +18,11 @@ Objective::Objective(ForwardModel& model, const std::vector<std::vector<TermInpu
   std::size_t terms = 0;
   for (std::size_t s = 0; s < model.step_count(); ++s) {
     terms_.emplace_back();
+    int frames = 0;
     for (const auto& input : inputs[s]) {
-      if (auto term = make_term(input, {model, s, unknowns, shared_})) terms_.back().push_back(std::move(term));
+      const bool is_frame = std::holds_alternative<PointCloud>(input) || std::holds_alternative<RayObservation>(input);
+      const TermContext context{model, s, unknowns, shared_, is_frame ? frames++ : 0};
+      if (auto term = make_term(input, context)) terms_.back().push_back(std::move(term));
     }
     for (const auto& term : terms_.back()) terms += term->is_about_object();
   }

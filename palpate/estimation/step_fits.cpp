@@ -65,8 +65,9 @@ std::vector<StepFit> step_fits(const Objective& objective) {
         fit.force_predicted_n = predicted.force_n.front().dot(direction);
       }
       for (const auto& observation : model.step(s).observations) {
-        if (const auto* travel = std::get_if<ToolTravel>(&observation)) fit.travel_m = travel->travel_m;
-        if (const auto* wrench = std::get_if<Wrench>(&observation)) fit.force_measured_n = wrench->force_n.dot(direction);
+        const auto of_this_tool = [&](const auto* read) { return read != nullptr && (read->tool.empty() || read->tool == load.tool); };
+        if (const auto* travel = std::get_if<ToolTravel>(&observation); of_this_tool(travel)) fit.travel_m = travel->travel_m;
+        if (const auto* wrench = std::get_if<Wrench>(&observation); of_this_tool(wrench)) fit.force_measured_n = wrench->force_n.dot(direction);
       }
     }
     Index points = 0;

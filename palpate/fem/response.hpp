@@ -74,7 +74,8 @@ struct ResponseState {
   VectorX watched_m;    ///< r
   VectorX conjugate_m;  ///< k: F' u, work-conjugate to the forces
   VectorX reaction_n;   ///< m: work-conjugate to the motions
-  MatrixX d_watched, d_conjugate, d_reaction;  ///< r, k, m x columns
+  VectorX driven_force_n;  ///< of a driven contact on the body, three each: what its reaction is a part of
+  MatrixX d_watched, d_conjugate, d_reaction, d_driven_force;  ///< r, k, m, 3 a driven contact x columns
   Index parameters = 2;  ///< columns before the directions
   double error = 0;      ///< of `watched_m`, relative to its largest value: the reduced model's own estimate and the mesh's
   /// Counted where `solved`; a branch has none; superposed: 0 where small gradients rule them out, else -1, not counted.

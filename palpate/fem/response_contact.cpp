@@ -107,9 +107,12 @@ ResponseState TouchingResponse::solve(const ResponseQuery& query, const LoadDire
   if (at->converged) {
     out.reaction_n.resize(query.motion.size());
     out.reaction_n.head(node_motions_) = at->motion_reaction;
-    for (std::size_t t = 0; t < driven_.size(); ++t)
-      out.reaction_n(node_motions_ + static_cast<Index>(t)) =
-          driven_[t].direction.dot(at->touches[driven_[t].contact].wrench.head<3>());
+    out.driven_force_n.resize(3 * static_cast<Index>(driven_.size()));
+    for (std::size_t t = 0; t < driven_.size(); ++t) {
+      const Vec3 force_n = at->touches[driven_[t].contact].wrench.head<3>();
+      out.driven_force_n.segment<3>(3 * static_cast<Index>(t)) = force_n;
+      out.reaction_n(node_motions_ + static_cast<Index>(t)) = driven_[t].direction.dot(force_n);
+    }
   }
   if (at->converged && query.derivatives) {
     const Index count = parameters_ + static_cast<Index>(along.force.cols());
@@ -131,6 +134,9 @@ ResponseState TouchingResponse::solve(const ResponseQuery& query, const LoadDire
         statics_.sensitivity_along(*at, moved, carries_on ? *start.from->touching_along : before_touching_along(along.motion, count)));
     solution->derivative = d->displacement;
     out.d_reaction = reactions_along(*d);
+    out.d_driven_force.resize(out.driven_force_n.size(), d->displacement.cols());
+    for (std::size_t t = 0; t < driven_.size(); ++t)
+      out.d_driven_force.middleRows<3>(3 * static_cast<Index>(t)) = d->wrench[driven_[t].contact].topRows<3>();
     solution->touching_along = std::move(d);
   }
   out.solution = std::move(solution);

@@ -89,6 +89,21 @@ TEST(CrossCheck, APredictionOfAnotherBodyIsSeenToBeWrong) {
   EXPECT_NEAR(held_out.force_error, 1.0 / 3, 0.06);
 }
 
+// A clamp that stands 5 mm off is no deformation: an object that nothing bends is not seen where the recording has it, but there.
+TEST(CrossCheck, AClampThatIsElsewhereExplainsNoDeformation) {
+  Recording recording = one_push_and_back({0, 0.12, 0.24, 0});
+  recording.supports[0].pose_std_m = 5e-3;
+  PushedBlock as_stated, elsewhere;
+  elsewhere.clamp.translation_m = Vec3(0, 3e-3, 4e-3);
+  std::vector<HeldOut> found;
+  for (const PushedBlock& truth : {as_stated, elsewhere}) {
+    found.push_back(fit(recording, coarse_block(), clouds_of(truth, one_push_and_back({0, 0.12, 0.24, 0})), {}).prediction);
+    ASSERT_TRUE(found.back().available);
+  }
+  EXPECT_NEAR(found[1].baseline_no_deformation_rms_m, found[0].baseline_no_deformation_rms_m, 0.1 * found[0].baseline_no_deformation_rms_m);
+  EXPECT_NEAR(found[1].baseline_last_step_rms_m, found[0].baseline_last_step_rms_m, 0.1 * found[0].baseline_last_step_rms_m);
+}
+
 TEST(CrossCheck, WhereNothingLoadedCanBeLeftOutNothingIsSaid) {
   const Recording recording = one_push_and_back({0, 0, 0.1, 0});
   EXPECT_FALSE(fit(recording, coarse_block(), clouds_of({}, recording), {}).prediction.available);

@@ -108,6 +108,50 @@ TEST_P(ShiftedTool, IsAToolThatStandsThere) {
 
 INSTANTIATE_TEST_SUITE_P(Laws, ShiftedTool, testing::Values(ContactLaw::bonded, ContactLaw::frictionless));
 
+/// A ball that travels at 30 degrees to the normal of a flat face, the block glued below.
+Recording slanted_ball(ContactLaw law) {
+  Recording recording = bent_block(law, Vec3(0.03, 0.02, block_size_m.z()));
+  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
+  recording.force_scale_std = 0.02;
+  recording.pushes[0].force_tare_std_n = 0.05;
+  for (auto& step : recording.pushes[0].steps) step.loads[0].direction = Vec3(0.5, 0, -std::sqrt(0.75));
+  return recording;
+}
+
+// A sensor of three axes reads all of it: without friction along the face's normal, whichever way the tool goes.
+TEST(SlantedTool, PressesAlongTheNormalOfASmoothFace) {
+  for (const ContactLaw law : {ContactLaw::frictionless, ContactLaw::bonded}) {
+    const Recording recording = slanted_ball(law);
+    Unknowns unknowns;
+    ForwardModel model(recording, block(), unknowns, tight());
+    VectorX at = unknowns.prior_mean();
+    at(log_young) = std::log(young_pa);
+    at(poisson) = 0.3;
+    const StepPrediction here = model.predict(1, at);
+    ASSERT_TRUE(here.converged) << here.reason;
+    const Vec3 force_n = here.force_n[0];
+    const double sideways = std::hypot(force_n.x(), force_n.y()) / force_n.norm();
+    if (law == ContactLaw::frictionless) {
+      EXPECT_LT(sideways, 0.1);  // a dent leans a little
+    } else {
+      EXPECT_GT(sideways, 0.15);
+    }
+    at(unknowns.named({"force_scale"}).at(0)) = 0.01;
+    const StepPrediction scaled = model.predict(1, at);
+    for (int k = 0; k < unknowns.size(); ++k) {
+      const double h = k <= poisson ? 1e-5 : 1e-3 * unknowns[k].prior_std;
+      VectorX ahead = at, behind = at;
+      ahead(k) += h;
+      behind(k) -= h;
+      const Vec3 measured = (model.predict(1, ahead, false).force_n[0] - model.predict(1, behind, false).force_n[0]) / (2 * h);
+      Vec3 claimed = Vec3::Zero();
+      for (std::size_t c = 0; c < scaled.columns.size(); ++c)
+        if (scaled.columns[c] == k) claimed += scaled.d_force[0].col(static_cast<Index>(c));
+      EXPECT_LT((claimed - measured).norm(), 1e-4 * measured.norm() + 1e-7) << unknowns[k].name;
+    }
+  }
+}
+
 TEST(WayAlongSurface, FollowsTheSurfaceThatItStandsOn) {
   // A face that falls by one in two along x: half a millimetre lower a millimetre on.
   TetMesh wedge = kuhn_block(4, 2, 2, block_size_m);

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/names_of_unknowns.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
 
 namespace palpate::estimation {
@@ -58,7 +59,7 @@ int add_pose(Unknowns& unknowns, const std::string& what, const std::string& suf
 
 int add_frame_pose(const TermContext& context, double pose_std_m, double pose_std_rad) {
   if (!(pose_std_m > 0) && !(pose_std_rad > 0)) return -1;
-  return add_pose(context.unknowns, "frame", step_suffix(context), pose_std_m, pose_std_rad);
+  return add_pose(context.unknowns, of_frame(context.frame), step_suffix(context), pose_std_m, pose_std_rad);
 }
 
 int add_camera_pose(const TermContext& context, const std::string& camera, double pose_std_m, double pose_std_rad) {

@@ -108,6 +108,7 @@ struct TermContext {
   Unknowns& unknowns;
   /// Unknowns that several terms share, by name (depth bias of a push, marker offsets): first index.
   std::map<std::string, int>& shared;
+  int frame = 0;  ///< of a cloud or depth image: how many of them the step has before it
 };
 
 /// Makes the term of an observation and registers its nuisances. nullptr when the observation adds nothing (the reading of a

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/names_of_unknowns.hpp"
 #include "palpate/estimation/slips.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
 
@@ -93,7 +94,7 @@ std::unique_ptr<Term> make_travel_term(const ToolTravel& travel, const TermConte
   const double offset_std_m = std::hypot(push.travel_offset_std_m, slip_m);
   int offset = -1;
   if (offset_std_m > 0) {
-    const std::string name = "travel_zero" + stretch_of(push, step);
+    const std::string name = "travel_zero" + of_stretch(push, step, loaded.tool);
     if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, offset_std_m});
     offset = context.shared[name];
   }

@@ -6,6 +6,7 @@
 #include "palpate/core/cross_matrix.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/load_columns.hpp"
+#include "palpate/estimation/names_of_unknowns.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
 
 namespace palpate::estimation {
@@ -75,16 +76,15 @@ std::unique_ptr<Term> make_torque_term(const Wrench& wrench, std::size_t load, c
   if (!(wrench.torque_sigma_nm > 0)) {
     throw Error("the torque needs its standard deviation (torque_sigma_nm > 0)", model.step(context.step).source + " wrench");
   }
-  const auto shared = [&](const std::string& name, const char* unit, double std, const std::string& suffix,
-                          const std::vector<std::string>& axes) {
-    const std::string known = name + "[" + push.name + "]" + suffix;
-    const auto [at, fresh] = context.shared.try_emplace(known, -1);
-    if (fresh) at->second = context.unknowns.add_block(name + "[" + push.name + "]", unit, std, axes);
+  // Two tools of a push have two sensors, and where they press along different ways two pairs of axes across.
+  const auto of_tool = [&](const std::string& what, const char* unit, double std, const std::vector<std::string>& axes) {
+    const std::string name = what + of_push(push, pressed.tool);
+    const auto [at, fresh] = context.shared.try_emplace(name, -1);
+    if (fresh) at->second = context.unknowns.add_block(name, unit, std, axes);
     return at->second;
   };
-  // Two tools of a push that press along different ways have two pairs of axes across.
-  const int tip = shared("tip_offset", "m", push.tip_std_m, pressed.tool, {"_1", "_2"});
-  const int tare = shared("torque_tare", "N m", push.torque_tare_std_nm, "", {"_x", "_y", "_z"});
+  const int tip = of_tool("tip_offset", "m", push.tip_std_m, {"_1", "_2"});
+  const int tare = of_tool("torque_tare", "N m", push.torque_tare_std_nm, {"_x", "_y", "_z"});
   return std::make_unique<TorqueTerm>(wrench, context, load, pressed.direction, tip, tare);
 }
 
