@@ -199,6 +199,7 @@ int run(const Options& given, Session& session) {
   LiveReport live(given.live, session, given.out.filename().string());
   const auto robot = push_robot(given.robot, session.seed);
   Recording scene = scene_of(given, *robot);
+  must_clear(scene.tools, given.explore.push);
   Options loop = given;
   loop.explore.go_on = exists;
   TruthFile truth(given.out / "truth.json", robot->truth());

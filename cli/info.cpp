@@ -299,7 +299,7 @@ int look(Session& session, const Arguments& given) {
   for (const io::Problem& problem : problems) session.warn(fmt::format("wrong      {}: {}", problem.where, problem.what));
   const std::size_t left_out = all.contains("bag") ? all["bag"]["left_out"].size() : 0;
   if (problems.empty())
-    session.say(left_out == 0 ? "nothing is wrong with it"
+    session.say(left_out == 0 ? recording.warnings.empty() ? "nothing is wrong with it" : "it can be used as it is; mind the warnings"
                               : fmt::format("nothing is wrong with what the mapping names; {} left out",
                                             left_out == 1 ? "1 topic of use is" : fmt::format("{} topics of use are", left_out)));
   session.result(all);

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/push_options.hpp"
 
+#include <fmt/format.h>
+
 #include "cli/number_checks.hpp"
+#include "palpate/core/error.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -89,6 +92,14 @@ void check_push_options(acquisition::PushOptions push) {
   if (!(push.travel_limit_m > 0)) push.travel_limit_m = acquisition::PushOptions{}.travel_limit_m;
   if (!(push.force_step_n > 0)) push.force_step_n = acquisition::PushOptions{}.force_step_n;
   acquisition::check(push);
+}
+
+void must_clear(const std::vector<Tool>& tools, const acquisition::PushOptions& push) {
+  for (const Tool& tool : tools)
+    if (push.clearance_m <= tool.radius_m)
+      throw Error(fmt::format("{} m is not more than the radius of the tool '{}', {} m: on its way between pushes it would touch the object",
+                              push.clearance_m, tool.name, tool.radius_m),
+                  "--clearance");
 }
 
 }  // namespace palpate::cli

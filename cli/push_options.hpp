@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <vector>
 
 #include "palpate/acquisition/push_protocol.hpp"
 
@@ -18,5 +19,8 @@ void add_force_step_option(CLI::App& app, acquisition::PushOptions& push);
 /// Before anything moves; what is left to the object counts as fine.
 /// @throws Error naming the option that is out of range.
 void check_push_options(acquisition::PushOptions push);
+
+/// @throws Error where a tool is as wide as the way that is left for it around the object.
+void must_clear(const std::vector<Tool>& tools, const acquisition::PushOptions& push);
 
 }  // namespace palpate::cli

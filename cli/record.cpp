@@ -122,6 +122,7 @@ int record_pushes(Session& session, const RecordArguments& arguments) {
   TruthFile truth(truth_file, robot->truth());
   if (!truth.is_known() && !arguments.truth.empty()) throw Error("nobody knows the truth of a driver's world; leave it out", "--truth");
   Recording recording = robot->scene();
+  must_clear(recording.tools, protocol);
   std::vector<acquisition::PushPlan> plans;
   for (std::size_t site = 0; site < robot->sites(); ++site) plans.push_back(robot->plan(site));
   if (exists) {

@@ -426,6 +426,12 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
     std::vector<char> seen;
     ShapeOfViews views;
     object = build_simulated_object(recording, progress, completion, &seen, &views);  // sec. IV-C: tetrahedral model
+    if (progress && !progress("quality", 1)) {  // a mesh that was stopped at is valid and poor: nothing is made of it
+      out.answer = {};
+      out.answer.termination = Termination::cancelled;
+      out.answer.message = "the fit was stopped before it began";
+      return;
+    }
     const double unseen = drop_unseen_side(recording, seen, observed);
     if (unseen > 0 && options.method != "paper" && !doubt) doubt = other_shapes(as_given, unseen, views.symmetries);
     if (unseen > 0 && doubt) doubt->side = unseen_side(as_given, recording, seen);

@@ -57,6 +57,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
   Optimum best;
   best.unknowns = start;
   keep_own_poisson_inside(unknowns, best.unknowns);  // a caller's guess may lie outside
+  best.unknowns(log_young) = std::clamp(best.unknowns(log_young), unknowns[log_young].lower, unknowns[log_young].upper);
   best.evaluation = objective.evaluate(best.unknowns, loss, progress);
   if (!best.evaluation.usable) {
     best.termination = best.evaluation.reason == "cancelled" ? Termination::cancelled : Termination::failed;

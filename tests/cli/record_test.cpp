@@ -95,6 +95,20 @@ TEST_F(Record, AClosedTerminalStopsTheArm) {
   EXPECT_TRUE(check_recording(made()).empty());
 }
 
+// A name with a slip in it began a new run, and the arm moved.
+TEST_F(Record, NothingGoesOnWhereNothingIs) {
+  EXPECT_EQ(palpate(with_contact(spring, {"--resume"})), input);
+  EXPECT_THAT(said, HasSubstr("holds nothing to go on with"));
+  EXPECT_FALSE(fs::exists(path("recording")));
+  EXPECT_FALSE(fs::exists(path("calls")));
+}
+
+TEST_F(Record, TheWayAroundTheObjectIsWiderThanTheTool) {
+  EXPECT_EQ(palpate(with_contact(spring, {"--clearance", "0.001"})), usage);
+  EXPECT_THAT(said, HasSubstr("--clearance: 0.001 m is not more than the radius of the tool"));
+  EXPECT_FALSE(fs::exists(path("recording")));
+}
+
 // From 0.15 m above the place where the push begins: 7.5 s of the robot's clock.
 TEST_F(Record, CtrlCOnALongWayStopsItThere) {
   const pid_t child = start(with_contact(PALPATE_PATIENT_ROBOT));

@@ -10,6 +10,7 @@
 #include "estimation/pushed_block.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/optimise.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
 
@@ -170,6 +171,28 @@ TEST(UncommonRecordings, ACallerWhoStopsIsToldSo) {
     with_values += answer.parameters.empty() ? 0 : 1;
   }
   EXPECT_GT(with_values, 3u);
+}
+
+/// A mesh that is stopped at is poor: going on with it, and with all that is tried to mend it, took longer than not to stop.
+TEST(UncommonRecordings, WhoStopsWhileTheObjectIsFilledWaitsForNoFit) {
+  Recording recording = block_with_clouds("linear");
+  recording.rest.surface = geometry::boundary_surface(*recording.rest.volume).surface;
+  recording.rest.volume.reset();
+  recording.supports[0].kind = SupportKind::plane;
+  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
+  for (const std::string_view at : {"lattice", "quality"}) {
+    bool stopped = false;
+    int later = 0;
+    const Identified found = identify(recording, {}, [&](std::string_view stage, double) {
+      later += stopped && stage != at && stage != "quality" ? 1 : 0;
+      stopped = stopped || stage == at;
+      return !stopped;
+    });
+    EXPECT_TRUE(stopped);
+    EXPECT_EQ(found.answer.termination, Termination::cancelled);
+    EXPECT_TRUE(found.answer.parameters.empty());
+    EXPECT_EQ(later, 0) << at;
+  }
 }
 
 /// The block from low above the table: many rays graze its top. What the fit leaves out itself is no outlier.
