@@ -178,6 +178,8 @@ int estimate(Session& session, const Options& given) {
   IdentifyOptions options = identify_options(given, session);
   options.fit.on_estimate = live.on_estimate(recording);
   Identified found = identify(recording, options, progress);
+  for (const std::string& warning : found.object.warnings)  // of the shape, once it was filled
+    if (std::find(recording.warnings.begin(), recording.warnings.end(), warning) == recording.warnings.end()) session.warn(warning);
   name_push_for_poisson(recording, found, session.thread_count(), progress);
   Identification& answer = found.answer;
   answer.provenance["recording path"] = std::filesystem::absolute(given.recording).lexically_normal().string();
