@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/recording_values.hpp"
 #include "palpate/core/version.hpp"
 #include "palpate/estimation/contacts_on_surface.hpp"
 #include "palpate/estimation/deep_loads.hpp"
@@ -410,6 +411,7 @@ std::optional<estimation::FootDoubt> foot_doubt(const Recording& built, double s
 }
 
 Identified identify(const Recording& given, const IdentifyOptions& options, const OnProgress& progress) {
+  demand_right_values(wrong_values(given));
   Recording as_given = with_overrides(given, options);
   demand_loads(as_given);
   if (options.method == "paper") as_given.regions.clear();  // the paper fits one stiffness

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/recording_values.hpp"
 #include "palpate/estimation/contacts_on_surface.hpp"
 #include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/slips.hpp"
@@ -60,6 +61,7 @@ OnlineEstimator::OnlineEstimator(const Recording& scene, const IdentifyOptions& 
   demand(options.method == "palpate", "method " + options.method, "the paper's method wants all steps at once: call identify");
   demand(options.regions != "by-site" || !recording_.regions.empty(), "regions by-site",
          "no site has been pushed yet: give the recording its regions");
+  demand_right_values(wrong_values(recording_));
   take_in(recording_);
   light_ = recording_;
   light_.rest.views.clear();
@@ -109,6 +111,7 @@ void OnlineEstimator::begin(const Push& push) {
   }
   Recording alone = light_;
   alone.pushes = {push};
+  demand_right_values(wrong_values(alone));
   take_in(alone);
   recording_.pushes.push_back(push);
   light_.pushes.push_back(without_surfaces(push));
@@ -145,6 +148,10 @@ void OnlineEstimator::build(const OnProgress& progress) {
 
 const Identification& OnlineEstimator::add(const Step& step, const OnProgress& progress) {
   if (recording_.pushes.empty()) throw Error("say which push the step belongs to (begin)", "OnlineEstimator.add");
+  const std::vector<Step>& before = light_.pushes.back().steps;
+  const std::string place = "pushes[" + std::to_string(light_.pushes.size() - 1) + "].steps[" + std::to_string(before.size()) + "].";
+  demand_right_values(wrong_values(step, light_.tools, place));
+  if (!before.empty() && step.time_s < before.back().time_s) throw Error("goes back, from that of the step before", place + "time_s");
   Recording alone = light_;
   alone.pushes = {light_.pushes.back()};
   alone.pushes.back().steps = {step};

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/core/recording_values.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+class ValueChecker {
+ public:
+  void check(const Recording& recording) {
+    tools_ = &recording.tools;
+    spread("force_scale_std", recording.force_scale_std);
+    spread("force_cross_talk_std", recording.force_cross_talk_std);
+    spread("time_offset_std_s", recording.time_offset_std_s);
+    spread("density_kg_m3", recording.density_kg_m3);
+    spread("density_std_kg_m3", recording.density_std_kg_m3);
+    finite("environment.gravity_m_s2", recording.environment.gravity_m_s2);
+    check(recording.rest);
+    for (std::size_t i = 0; i < recording.tools.size(); ++i) check(recording.tools[i], "tools[" + std::to_string(i) + "].");
+    for (std::size_t p = 0; p < recording.pushes.size(); ++p) {
+      const Push& push = recording.pushes[p];
+      const std::string at = "pushes[" + std::to_string(p) + "].";
+      spread(at + "force_tare_std_n", push.force_tare_std_n);
+      spread(at + "travel_offset_std_m", push.travel_offset_std_m);
+      spread(at + "torque_tare_std_nm", push.torque_tare_std_nm);
+      spread(at + "tip_std_m", push.tip_std_m);
+      for (std::size_t s = 0; s < push.steps.size(); ++s) {
+        const std::string step = at + "steps[" + std::to_string(s) + "].";
+        check(push.steps[s], recording.tools, step);
+        if (s > 0 && push.steps[s].time_s < push.steps[s - 1].time_s) add(step + "time_s", "goes back, from that of the step before; order steps by time");
+      }
+    }
+  }
+
+  void check(const Step& step, const std::vector<Tool>& tools, const std::string& at) {
+    tools_ = &tools;
+    finite(at + "time_s", step.time_s);
+    if (step.T_base_tip) finite(at + "T_base_tip", step.T_base_tip->matrix());
+    for (const double angle : step.joints_rad)
+      if (!finite(at + "joints_rad", angle)) break;
+    for (std::size_t l = 0; l < step.loads.size(); ++l) check(step.loads[l], at + "loads[" + std::to_string(l) + "].");
+    for (std::size_t o = 0; o < step.observations.size(); ++o)
+      std::visit([&](const auto& one) { check(one, at + "observations[" + std::to_string(o) + "]."); }, step.observations[o]);
+  }
+
+  std::vector<WrongValue> found() && { return std::move(found_); }
+
+ private:
+  void add(std::string where, std::string what) { found_.push_back({std::move(where), std::move(what)}); }
+
+  bool finite(const std::string& where, double value) {
+    if (!std::isfinite(value)) add(where, "is not a finite number");
+    return std::isfinite(value);
+  }
+  template <typename Derived>
+  bool finite(const std::string& where, const Eigen::MatrixBase<Derived>& values) {
+    const bool fine = values.allFinite();
+    if (!fine) add(where, "holds NaN or infinity");
+    return fine;
+  }
+  void spread(const std::string& where, double value) {
+    if (finite(where, value) && value < 0) add(where, "is negative, " + std::to_string(value) + "; it must be 0 or more");
+  }
+  void sigma(const std::string& where, double value) {
+    if (!(value > 0) || !std::isfinite(value)) add(where, "must be a number above 0: the standard deviation of what was measured");
+  }
+
+  template <typename Indices>
+  void indices(const std::string& where, const Indices& of, Eigen::Index count) {
+    if (of.size() > 0 && (of.minCoeff() < 0 || of.maxCoeff() >= count))
+      add(where, "names vertices from " + std::to_string(of.minCoeff()) + " to " + std::to_string(of.maxCoeff()) + ", there are " + std::to_string(count));
+  }
+
+  void check(const Rest& rest) {
+    if (rest.volume) {
+      finite("rest.volume.nodes_m", rest.volume->nodes_m);
+      indices("rest.volume.tetrahedra", rest.volume->tetrahedra, rest.volume->nodes_m.rows());
+    }
+    if (rest.surface) {
+      if (rest.surface->triangles.rows() == 0) add("rest.surface.triangles", "is empty; give the shape of the object, or views of it");
+      finite("rest.surface.vertices_m", rest.surface->vertices_m);
+      indices("rest.surface.triangles", rest.surface->triangles, rest.surface->vertices_m.rows());
+    }
+    for (std::size_t v = 0; v < rest.views.size(); ++v) check(rest.views[v], "rest.views[" + std::to_string(v) + "].");
+    spread("rest.surface_std_m", rest.surface_std_m);
+  }
+
+  void check(const Tool& tool, const std::string& at) {
+    spread(at + "radius_m", tool.radius_m);
+    spread(at + "radius_std_m", tool.radius_std_m);
+    spread(at + "length_m", tool.length_m);
+    spread(at + "friction_coefficient", tool.friction_coefficient);
+    spread(at + "compliance_m_per_n", tool.compliance_m_per_n);
+    spread(at + "compliance_std_m_per_n", tool.compliance_std_m_per_n);
+  }
+
+  void check(const Load& load, const std::string& at) {
+    known(at + "tool", load.tool);
+    if (!load.force_n && !load.travel_m) add(at + "force_n", "is not given, and travel_m neither; one of the two acts on the object");
+    if (load.force_n) finite(at + "force_n", *load.force_n);
+    if (load.travel_m) finite(at + "travel_m", *load.travel_m);
+    spread(at + "force_std_n", load.force_std_n);
+    spread(at + "force_relative_std", load.force_relative_std);
+    spread(at + "contact_std_m", load.contact_std_m);
+    finite(at + "force_rate_n_s", load.force_rate_n_s);
+    finite(at + "contact_m", load.contact_m);
+    if (finite(at + "direction", load.direction) && !(load.direction.norm() > 1e-9)) add(at + "direction", "has no length; it is the unit vector of the push");
+  }
+
+  void check(const DepthFrame& frame, const std::string& at) {
+    finite(at + "time_s", frame.time_s);
+    finite(at + "T_base_camera", frame.T_base_camera.matrix());
+    spread(at + "pose_std_m", frame.pose_std_m);
+    spread(at + "pose_std_rad", frame.pose_std_rad);
+    const Camera& camera = frame.camera;
+    if (!(camera.fx_px > 0) || !(camera.fy_px > 0) || !std::isfinite(camera.fx_px + camera.fy_px + camera.cx_px + camera.cy_px))
+      add(at + "camera", "fx_px and fy_px must be above 0, cx_px and cy_px finite");
+    const auto size_of = [](const auto& image) { return std::to_string(image.cols()) + " x " + std::to_string(image.rows()); };
+    if (frame.depth_m.cols() != camera.width_px || frame.depth_m.rows() != camera.height_px)
+      add(at + "depth_m", "is " + size_of(frame.depth_m) + " pixels, its camera has " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px));
+    else if (frame.mask.size() > 0 && (frame.mask.cols() != frame.depth_m.cols() || frame.mask.rows() != frame.depth_m.rows()))
+      add(at + "mask", "is " + size_of(frame.mask) + " pixels, the image " + size_of(frame.depth_m));
+  }
+  void check(const PointCloud& cloud, const std::string& at) {
+    finite(at + "points_m", cloud.points_m);
+    spread(at + "pose_std_m", cloud.pose_std_m);
+    spread(at + "pose_std_rad", cloud.pose_std_rad);
+    if (cloud.sigma_m.size() > 0 && !((cloud.sigma_m.array() > 0) && cloud.sigma_m.array().isFinite()).all())
+      sigma(at + "sigma_m", 0);
+  }
+  void check(const Markers& markers, const std::string& at) { sigma(at + "sigma_m", markers.sigma_m); }
+  void check(const ToolTravel& travel, const std::string& at) {
+    if (!travel.tool.empty()) known(at + "tool", travel.tool);
+    finite(at + "travel_m", travel.travel_m);
+    sigma(at + "sigma_m", travel.sigma_m);
+  }
+  void check(const Wrench& wrench, const std::string& at) {
+    if (!wrench.tool.empty()) known(at + "tool", wrench.tool);
+    finite(at + "force_n", wrench.force_n);
+    sigma(at + "force_sigma_n", wrench.force_sigma_n);
+    if (!wrench.has_torque) return;
+    finite(at + "torque_nm", wrench.torque_nm);
+    sigma(at + "torque_sigma_nm", wrench.torque_sigma_nm);
+  }
+
+  void known(const std::string& where, const std::string& name) {
+    const auto is_it = [&](const Tool& tool) { return tool.name == name; };
+    if (std::none_of(tools_->begin(), tools_->end(), is_it)) add(where, "'" + name + "' is no tool of this recording; name one of its tools");
+  }
+
+  const std::vector<Tool>* tools_ = nullptr;
+  std::vector<WrongValue> found_;
+};
+
+}  // namespace
+
+std::vector<WrongValue> wrong_values(const Recording& recording) {
+  ValueChecker checker;
+  checker.check(recording);
+  return std::move(checker).found();
+}
+
+std::vector<WrongValue> wrong_values(const Step& step, const std::vector<Tool>& tools, const std::string& place) {
+  ValueChecker checker;
+  checker.check(step, tools, place);
+  return std::move(checker).found();
+}
+
+void demand_right_values(const std::vector<WrongValue>& wrong) {
+  if (wrong.empty()) return;
+  const std::string more = wrong.size() > 1 ? " (" + std::to_string(wrong.size() - 1) + " more are wrong)" : "";
+  throw Error(wrong.front().what + more, wrong.front().where);
+}
+
+}  // namespace palpate

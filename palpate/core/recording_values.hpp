@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// What no recording can hold, wherever it was made: files are refused by their readers, recordings that a program put together
+// have nobody else to look.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "palpate/core/recording.hpp"
+
+namespace palpate {
+
+struct WrongValue {
+  std::string where;  ///< "pushes[0].steps[2].loads[0].force_n"
+  std::string what;   ///< and what to do
+};
+
+/// Numbers that are not finite, standard deviations that are negative, indices of nothing, tools without a name in Recording::tools,
+/// images of another size than their camera's, times that go back. Of every field the first one; says nothing of what is only unlikely.
+std::vector<WrongValue> wrong_values(const Recording& recording);
+
+/// The same of one step.
+/// @param place   of the step, for messages
+std::vector<WrongValue> wrong_values(const Step& step, const std::vector<Tool>& tools, const std::string& place);
+
+/// @throws Error for the first of them, if any.
+void demand_right_values(const std::vector<WrongValue>& wrong);
+
+}  // namespace palpate

@@ -1,0 +1,123 @@
+// label: unit
+// SPDX-License-Identifier: Apache-2.0
+// Recordings that a program put together: what no file could hold is named by its place.
+#include "palpate/core/recording_values.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+
+Recording right() {
+  Recording recording;
+  TriMesh surface;
+  surface.vertices_m.resize(4, 3);
+  surface.vertices_m << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1;
+  surface.triangles.resize(4, 3);
+  surface.triangles << 0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3;
+  recording.rest.surface = surface;
+  Tool stick;
+  stick.name = "stick";
+  stick.radius_m = 0.01;
+  recording.tools = {stick};
+  Push push;
+  push.name = "push 1";
+  for (int s = 0; s < 2; ++s) {
+    Step& step = push.steps.emplace_back();
+    step.time_s = s;
+    Load load;
+    load.tool = "stick";
+    load.force_n = Vec3(0, 0, -s);
+    step.loads = {load};
+    DepthFrame frame;
+    frame.camera = {4, 3, 5, 5, 1.5, 1, DistortionModel::none, {}};
+    frame.depth_m = DepthImage::Zero(3, 4);
+    PointCloud cloud;
+    cloud.points_m = Points::Zero(2, 3);
+    cloud.sigma_m = VectorX::Constant(1, 1e-3);
+    Markers markers;
+    markers.sigma_m = 1e-3;
+    ToolTravel travel;
+    travel.sigma_m = 1e-4;
+    Wrench wrench;
+    wrench.force_sigma_n = 0.1;
+    wrench.has_torque = true;
+    wrench.torque_sigma_nm = 0.01;
+    step.observations = {frame, cloud, markers, travel, wrench};
+  }
+  recording.pushes = {push};
+  return recording;
+}
+
+TEST(RecordingValues, WhatIsRightIsRight) {
+  EXPECT_TRUE(wrong_values(right()).empty());
+  EXPECT_NO_THROW(demand_right_values({}));
+}
+
+TEST(RecordingValues, WhatIsWrongIsNamedByItsPlace) {
+  const auto step = [](Recording& r) -> Step& { return r.pushes[0].steps[1]; };
+  const auto load = [](Recording& r) -> Load& { return r.pushes[0].steps[1].loads[0]; };
+  const auto seen = [](Recording& r, std::size_t o) -> Observation& { return r.pushes[0].steps[1].observations[o]; };
+  const std::string in_step = "pushes[0].steps[1].", in_load = in_step + "loads[0].";
+  const auto observed = [&](int o, const std::string& field) { return in_step + "observations[" + std::to_string(o) + "]." + field; };
+  const std::vector<std::pair<std::string, std::function<void(Recording&)>>> cases = {
+      {"force_scale_std", [&](Recording& r) { r.force_scale_std = nan; }},
+      {"force_cross_talk_std", [&](Recording& r) { r.force_cross_talk_std = -0.1; }},
+      {"density_kg_m3", [&](Recording& r) { r.density_kg_m3 = infinity; }},
+      {"environment.gravity_m_s2", [&](Recording& r) { r.environment.gravity_m_s2.z() = nan; }},
+      {"rest.surface.triangles", [&](Recording& r) { r.rest.surface->triangles(0, 0) = 4; }},
+      {"rest.surface.triangles", [&](Recording& r) { r.rest.surface->triangles.resize(0, 3); }},
+      {"rest.surface.vertices_m", [&](Recording& r) { r.rest.surface->vertices_m(0, 0) = nan; }},
+      {"tools[0].radius_m", [&](Recording& r) { r.tools[0].radius_m = -1; }},
+      {"pushes[0].force_tare_std_n", [&](Recording& r) { r.pushes[0].force_tare_std_n = -1; }},
+      {in_step + "time_s", [&](Recording& r) { step(r).time_s = nan; }},
+      {in_step + "time_s", [&](Recording& r) { step(r).time_s = -1; }},
+      {in_step + "joints_rad", [&](Recording& r) { step(r).joints_rad = {0, nan}; }},
+      {in_load + "tool", [&](Recording& r) { load(r).tool = "stik"; }},
+      {in_load + "force_n", [&](Recording& r) { load(r).force_n.reset(); }},
+      {in_load + "force_n", [&](Recording& r) { load(r).force_n->x() = nan; }},
+      {in_load + "travel_m", [&](Recording& r) { load(r).travel_m = infinity; }},
+      {in_load + "force_std_n", [&](Recording& r) { load(r).force_std_n = -1e-3; }},
+      {in_load + "contact_m", [&](Recording& r) { load(r).contact_m.y() = nan; }},
+      {in_load + "direction", [&](Recording& r) { load(r).direction.setZero(); }},
+      {observed(0, "depth_m"), [&](Recording& r) { std::get<DepthFrame>(seen(r, 0)).depth_m.resize(4, 3); }},
+      {observed(0, "mask"), [&](Recording& r) { std::get<DepthFrame>(seen(r, 0)).mask = MaskImage::Zero(2, 2); }},
+      {observed(0, "camera"), [&](Recording& r) { std::get<DepthFrame>(seen(r, 0)).camera.fx_px = 0; }},
+      {observed(0, "T_base_camera"), [&](Recording& r) { std::get<DepthFrame>(seen(r, 0)).T_base_camera.translation().x() = nan; }},
+      {observed(1, "points_m"), [&](Recording& r) { std::get<PointCloud>(seen(r, 1)).points_m(1, 1) = nan; }},
+      {observed(1, "sigma_m"), [&](Recording& r) { std::get<PointCloud>(seen(r, 1)).sigma_m(0) = nan; }},
+      {observed(2, "sigma_m"), [&](Recording& r) { std::get<Markers>(seen(r, 2)).sigma_m = 0; }},
+      {observed(3, "travel_m"), [&](Recording& r) { std::get<ToolTravel>(seen(r, 3)).travel_m = nan; }},
+      {observed(3, "sigma_m"), [&](Recording& r) { std::get<ToolTravel>(seen(r, 3)).sigma_m = nan; }},
+      {observed(3, "tool"), [&](Recording& r) { std::get<ToolTravel>(seen(r, 3)).tool = "finger"; }},
+      {observed(4, "force_sigma_n"), [&](Recording& r) { std::get<Wrench>(seen(r, 4)).force_sigma_n = -1; }},
+      {observed(4, "torque_nm"), [&](Recording& r) { std::get<Wrench>(seen(r, 4)).torque_nm.z() = infinity; }},
+  };
+  for (const auto& [where, spoil] : cases) {
+    Recording recording = right();
+    spoil(recording);
+    const std::vector<WrongValue> wrong = wrong_values(recording);
+    ASSERT_EQ(wrong.size(), 1u) << where;
+    EXPECT_EQ(wrong[0].where, where);
+    EXPECT_FALSE(wrong[0].what.empty());
+    try {
+      demand_right_values(wrong);
+      ADD_FAILURE();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.where(), where);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate
