@@ -57,7 +57,9 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
   Optimum best;
   best.unknowns = start;
   keep_own_poisson_inside(unknowns, best.unknowns);  // a caller's guess may lie outside
-  best.unknowns(log_young) = std::clamp(best.unknowns(log_young), unknowns[log_young].lower, unknowns[log_young].upper);
+  constexpr double far_beyond = 5;  // the search comes back from there; an E of infinity is no body
+  best.unknowns(log_young) =
+      std::clamp(best.unknowns(log_young), unknowns[log_young].lower - far_beyond, unknowns[log_young].upper + far_beyond);
   best.evaluation = objective.evaluate(best.unknowns, loss, progress);
   if (!best.evaluation.usable) {
     best.termination = best.evaluation.reason == "cancelled" ? Termination::cancelled : Termination::failed;
