@@ -179,17 +179,6 @@ void fill_with_tetrahedra(Recording& recording, reconstruction::Completion compl
   recording.rest.observed_triangles.reset();  // they name vertices of the surface, not nodes of the volume
 }
 
-/// What nothing deforms says nothing of its stiffness: a fit would hand back where it started.
-void demand_loads(const Recording& recording) {
-  if (recording.rest.state == RestState::stress_free && recording.environment.gravity_m_s2.norm() > 0) return;
-  for (const Push& push : recording.pushes)
-    for (const Step& step : push.steps)
-      for (const Load& load : step.loads)
-        if ((load.force_n && load.force_n->norm() > 0) || load.travel_m.value_or(0) != 0) return;
-  throw Error("no step has a force_n or travel_m other than zero, so nothing deforms the object: give what the robot pressed "
-              "with, or the weight that acts on a stress-free shape (gravity_m_s2, density_kg_m3)", "pushes.steps.loads");
-}
-
 std::map<std::string, std::string> provenance(const Recording& recording, const IdentifyOptions& options) {
   std::map<std::string, std::string> said{{"version", version},
                                           {"recording", recording.name},

@@ -177,4 +177,14 @@ void demand_right_values(const std::vector<WrongValue>& wrong) {
   throw Error(wrong.front().what + more, wrong.front().where);
 }
 
+void demand_loads(const Recording& recording) {
+  if (recording.rest.state == RestState::stress_free && recording.environment.gravity_m_s2.norm() > 0) return;
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps)
+      for (const Load& load : step.loads)
+        if ((load.force_n && load.force_n->norm() > 0) || load.travel_m.value_or(0) != 0) return;
+  throw Error("no step has a force_n or travel_m other than zero, so nothing deforms the object: give what the robot pressed "
+              "with, or the weight that acts on a stress-free shape (gravity_m_s2, density_kg_m3)", "pushes.steps.loads");
+}
+
 }  // namespace palpate

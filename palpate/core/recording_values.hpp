@@ -26,4 +26,8 @@ std::vector<WrongValue> wrong_values(const Step& step, const std::vector<Tool>& 
 /// @throws Error for the first of them, if any.
 void demand_right_values(const std::vector<WrongValue>& wrong);
 
+/// What nothing deforms says nothing of its stiffness: a fit would hand back where it started.
+/// @throws Error where no step presses and no weight acts.
+void demand_loads(const Recording& recording);
+
 }  // namespace palpate
