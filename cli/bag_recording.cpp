@@ -29,16 +29,33 @@ fs::path mapping_of(const fs::path& bag) {
 namespace {
 
 /// A mistyped sensor would only show when its noise is first asked for, far from the file.
-void check_noise(const io::BagMapping& mapping) {
+void check_noise(const std::string& model, const std::string& where) {
   std::vector<std::string> names{"constant"};
   for (const sensing::DepthNoiseModel& one : sensing::depth_noise_models()) names.emplace_back(one.name);
-  for (const io::MappedCamera& camera : mapping.cameras) {
-    const std::string& model = camera.like.noise.model;
-    if (std::find(names.begin(), names.end(), model) != names.end()) continue;
-    const auto meant = did_you_mean(model, names);
-    throw Error(fmt::format("no noise model is called '{}';{} they are {}", model.substr(0, 60),
-                            meant ? fmt::format(" did you mean '{}'?", *meant) : "", fmt::join(names, ", ")),
-                camera.noise_where);
+  if (std::find(names.begin(), names.end(), model) != names.end()) return;
+  const auto meant = did_you_mean(model, names);
+  throw Error(fmt::format("no noise model is called '{}';{} they are {}", model.substr(0, 60),
+                          meant ? fmt::format(" did you mean '{}'?", *meant) : "", fmt::join(names, ", ")),
+              where);
+}
+
+void check_noise(const Recording& recording, const fs::path& path) {
+  std::error_code code;
+  const fs::path file = fs::is_directory(path, code) ? path / "recording.yaml" : path;
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps)
+      for (const Observation& one : step.observations)
+        if (const auto* frame = std::get_if<DepthFrame>(&one)) check_noise(frame->noise.model, file.string() + ": cameras: noise.model");
+}
+
+/// What a bag lost (it was cut off, say) may be why nothing can be made of it.
+acquisition::FromStreams recording_of(const io::MessageSource& bag, io::BagMapping& mapping) {
+  try {
+    const SensorStreams streams = io::read_streams(bag, mapping);
+    return acquisition::recording_from(mapping.plan, streams);
+  } catch (const Error& error) {
+    if (bag.warnings.empty() || error.message().find(bag.warnings.front()) != std::string::npos) throw;
+    throw Error(fmt::format("{}. Of the bag: {}", error.message(), bag.warnings.front()), error.where());
   }
 }
 
@@ -57,7 +74,9 @@ LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
   must_exist(path, "a recording is a folder with recording.yaml in it, or a bag (docs/recording-format.md)");
   if (!io::is_bag(path)) {
     if (!given.empty()) throw Error("is a recording; only a bag needs a mapping", path.string());
-    return {io::read_recording_unchecked(path), {}, {}};
+    Recording recording = io::read_recording_unchecked(path);
+    check_noise(recording, path);
+    return {std::move(recording), {}, {}};
   }
   const fs::path file = given.empty() ? mapping_of(path) : given;
   if (file.empty()) {
@@ -65,10 +84,9 @@ LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
     throw Error("is a bag: say what its topics mean with --mapping FILE; `palpate info` suggests one", path.string());
   }
   io::BagMapping mapping = io::read_mapping(file);
-  check_noise(mapping);
+  for (const io::MappedCamera& camera : mapping.cameras) check_noise(camera.like.noise.model, camera.noise_where);
   const io::MessageSource bag = io::read_bag(path);
-  const SensorStreams streams = io::read_streams(bag, mapping);
-  acquisition::FromStreams made = acquisition::recording_from(mapping.plan, streams);
+  acquisition::FromStreams made = recording_of(bag, mapping);
   std::error_code code;
   if (fs::is_regular_file(path, code))
     made.recording.input_hashes[path.filename().string()] = io::sha256_hex(io::read_file(path));

@@ -53,7 +53,9 @@ int run(const Options& given, Session& session) {
   asked.radius_m = given.radius_m;
   asked.tool = given.tool;
   if (!given.out.empty()) must_take_files(given.out);
+  session.progress()("press", 0);
   const PredictedPush push = predict_push(learned, asked, session.thread_count());
+  session.progress()("press", 1);
   const auto& [tool, load, elasticity, found, warnings] = push;
   if (!found.converged) {
     session.warn("no equilibrium was found: " + found.reason);

@@ -70,7 +70,11 @@ fem::Boundary boundary_of(const Recording& object, const Tool& tool, const Load&
 
 double mesh_size_m(const TetMesh& mesh) { return (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm(); }
 
-std::string words(const Vec3& at) { return fmt::format("{:.4g} {:.4g} {:.4g}", at.x(), at.y(), at.z()); }
+std::string words(const Vec3& at) {
+  constexpr double rounding_m = 1e-9;
+  const Vec3 shown = at.unaryExpr([](double one) { return std::abs(one) < rounding_m ? 0.0 : one; });
+  return fmt::format("{:.4g} {:.4g} {:.4g}", shown.x(), shown.y(), shown.z());
+}
 
 /// A place beside the surface would be pressed by the part of the patch that reaches it: it is moved there, or refused.
 void put_on_surface(const TetMesh& mesh, const AskedPush& asked, PredictedPush& push) {
@@ -90,6 +94,36 @@ void put_on_surface(const TetMesh& mesh, const AskedPush& asked, PredictedPush& 
                 asked.option + "direction " + words(load.direction));
 }
 
+void must_be_positive(double value, const std::string& where) {
+  if (!(value > 0) || !std::isfinite(value)) throw Error(fmt::format("must be a number above 0, is {:g}", value), where);
+}
+
+double disc_area_m2(double radius_m) { return EIGEN_PI * radius_m * radius_m; }
+
+/// The fit judges its law as far as its pushes went. A harder one is the law's word alone.
+std::optional<std::string> beyond_what_was_seen(const Identification& answer, const Tool& tool, double force_n) {
+  double most_n = 0, most_pa = 0;
+  for (const StepFit& step : answer.steps) {
+    const double pressed_n = step.force_n.norm();
+    most_n = std::max(most_n, pressed_n);
+    if (step.tool_radius_m > 0) most_pa = std::max(most_pa, pressed_n / disc_area_m2(step.tool_radius_m));
+  }
+  constexpr double clearly = 1.5;
+  const bool round = tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc;
+  if (round && tool.radius_m > 0 && most_pa > 0) {
+    const double asked_pa = std::abs(force_n) / disc_area_m2(tool.radius_m);
+    if (asked_pa > clearly * most_pa)
+      return fmt::format("this presses {:.2g} times as hard as any push that the object was learned from ({} on the patch, those up to {}): "
+                         "the band knows of E and nu only, not of whether the law still holds there",
+                         asked_pa / most_pa, report::quantity(asked_pa, "Pa"), report::quantity(most_pa, "Pa"));
+  } else if (most_n > 0 && std::abs(force_n) > clearly * most_n) {
+    return fmt::format("this is {:.2g} times the force of any push that the object was learned from ({}): the band knows of E and nu only, "
+                       "not of whether the law still holds there",
+                       std::abs(force_n) / most_n, report::quantity(most_n, "N"));
+  }
+  return std::nullopt;
+}
+
 /// A solver looks long for an equilibrium that no material has.
 void must_be_bearable(const AskedPush& push, const Tool& tool, const TetMesh& mesh, double young_modulus_pa) {
   const double size_m = mesh_size_m(mesh);
@@ -97,7 +131,7 @@ void must_be_bearable(const AskedPush& push, const Tool& tool, const TetMesh& me
     throw Error(fmt::format("is further than the object is large ({}); it is in metres", report::quantity(size_m, "m")),
                 fmt::format("{}travel {:g}", push.option, *push.travel_m));
   const bool round = tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc;
-  const double area_m2 = round && tool.radius_m > 0 ? EIGEN_PI * tool.radius_m * tool.radius_m : size_m * size_m;
+  const double area_m2 = round && tool.radius_m > 0 ? disc_area_m2(tool.radius_m) : size_m * size_m;
   constexpr double most_over_young = 10;
   if (push.force_n && *push.force_n > most_over_young * young_modulus_pa * area_m2)
     throw Error(fmt::format("is {:.2g} times what E ({}) bears on the pressed patch; no such object stands that. It is in newtons",
@@ -127,17 +161,24 @@ PredictedPush predict_push(const LearnedObject& learned, const AskedPush& asked,
   push.travel_m = asked.travel_m;
   if (push.force_n.has_value() == push.travel_m.has_value())
     throw Error(fmt::format("give either this or {}travel", asked.option), asked.option + "force");
+  if (push.force_n) must_be_positive(*push.force_n, asked.option + "force");
+  if (push.travel_m) must_be_positive(*push.travel_m, asked.option + "travel");
   fem::Boundary boundary = boundary_of(learned.object, out.tool, load, push.background);
   out.elasticity = elasticity_of(learned);
   must_be_bearable(asked, out.tool, mesh, out.elasticity.highest_young_modulus_pa());
   fem::StaticsOptions options;
   options.threads = threads;
+  // Loads that an object stands take a handful of steps; it folds under those that take more, and nobody waits for minutes.
+  options.max_load_steps = 20;
   if (mesh.tetrahedra.cols() == 10 && out.elasticity.highest_poisson_ratio() > 0.45) options.dilatation = fem::Dilatation::averaged;
   out.found = prediction::predict(mesh, out.elasticity, std::move(boundary), push, options);
   if (!out.found.converged) return out;
   if (!out.found.reason.empty()) out.warnings.push_back(out.found.reason);
-  if (!(std::abs(out.found.travel_m.value) > 1e-9 * mesh_size_m(mesh)))
+  // By the stiffness: a tiny force moves everything by little.
+  constexpr double held_over_object = 1e6;
+  if (!(std::abs(out.found.stiffness_n_m) < held_over_object * out.elasticity.highest_young_modulus_pa() * mesh_size_m(mesh)))
     throw Error("a support holds the object at this place: nothing moves there", asked.option + "contact " + words(load.contact_m));
+  if (const auto said = beyond_what_was_seen(learned.answer, out.tool, out.found.force_n.value)) out.warnings.push_back(*said);
   if (out.elasticity.covariance.norm() == 0) out.warnings.push_back("the result holds no covariance: the bands have no width");
   return out;
 }

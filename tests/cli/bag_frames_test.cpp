@@ -133,5 +133,17 @@ TEST(BagsOfALab, ComeOutAlikeAgain) {
   for (const auto& [name, bytes] : first) EXPECT_TRUE(bytes == again.at(name)) << name;
 }
 
+/// Where nothing can be made of what is left of a bag, its end is the reason and not what seems to be missing.
+TEST(BagsOfALab, ThatAreCutOffSaySoWithTheirMapping) {
+  if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  const TemporaryFolder folder("bag_cut");
+  record(folder, "--seed 5 --young-modulus 20000 --force-limit 2 --unloading-steps 0 --contact 0.6 0 0.15");
+  const auto file = folder.path() / "bag" / "bag_0.mcap";
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  const std::string command = std::string("'") + PALPATE_CLI + "' info '" + (folder.path() / "bag").string() + "' 2> '" + folder.path().string() + "/err'";
+  EXPECT_NE(std::system(command.c_str()), 0);
+  EXPECT_NE(folder.get("err").find("the file is cut off at byte"), std::string::npos) << folder.get("err");
+}
+
 }  // namespace
 }  // namespace palpate::io

@@ -86,6 +86,23 @@ TEST_F(LearnedBlock, IsPressedOnItsSurfaceAndIntoIt) {
   }
 }
 
+/// Learned with up to 0.12 N on a disc of 12 mm, 265 Pa.
+TEST_F(LearnedBlock, PressedHarderThanItWasLearnedIsSaid) {
+  const std::string there = "--contact 0.03 0.02 0.03 --force ", said = "times as hard as any push that the object was learned from";
+  const Outcome as_learned = predict(there + "0.03"), harder = predict(there + "0.1");
+  EXPECT_EQ(as_learned.exit_code, 0) << as_learned.text;
+  EXPECT_THAT(as_learned.text, testing::Not(HasSubstr(said)));
+  EXPECT_EQ(harder.exit_code, 0) << harder.text;
+  EXPECT_THAT(harder.text, testing::AllOf(HasSubstr("3.3 " + said), HasSubstr("884 Pa"), HasSubstr("265 Pa")));
+}
+
+/// A force of a nanonewton moves it by little, which is no support.
+TEST_F(LearnedBlock, YieldsToTheSmallestForce) {
+  const Outcome outcome = predict("--contact 0.03 0.02 0.03 --force 1e-9 --json");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+  EXPECT_THAT(outcome.text, HasSubstr("\"stiffness_n_m\""));
+}
+
 /// The shape was measured with its weight on: a simulator that pulls at it again would let it sag twice.
 TEST_F(LearnedBlock, ThatHasSaggedAlreadyIsExportedWithoutGravity) {
   const std::string to = "export " + (files_ / "result").string() + " --to calculix -o ";

@@ -435,6 +435,19 @@ TEST_F(Record, WhatIsMistypedIsToldInWords) {
   refused({"record", "--demo", "--contact-threshold", "1", "-o", path("recording")}, "--contact-threshold");
 }
 
+TEST_F(Record, AMistypedSensorIsToldWithItsFile) {
+  ASSERT_EQ(palpate(with_contact(spring, {"--unloading-steps", "0"})), 0) << said;
+  const std::string file = path("recording") + "/recording.yaml";
+  std::string bytes = io::read_file(file);
+  const auto at = bytes.find("noise: {model: ");
+  ASSERT_NE(at, std::string::npos) << bytes.substr(0, 2000);
+  bytes.replace(at, bytes.find_first_of(",}", at) - at, "noise: {model: realsens_d435");
+  if (const auto sigma = bytes.find(", sigma_m: ", at); sigma < bytes.find('}', at)) bytes.erase(sigma, bytes.find_first_of(",}", sigma + 1) - sigma);
+  io::write_file(file, bytes);
+  EXPECT_EQ(palpate({"info", path("recording")}), input);
+  EXPECT_THAT(said, HasSubstr("recording.yaml: cameras: noise.model: no noise model is called 'realsens_d435'; did you mean 'realsense_d435'?"));
+}
+
 TEST_F(Record, ThresholdsOfThePushAreTheUsers) {
   ASSERT_EQ(palpate(with_contact(spring, {"--unloading-steps", "0", "--contact-std", "0.002", "--increment", "0.001"})), 0) << said;
   const Recording recording = made();

@@ -282,6 +282,10 @@ class Refused(unittest.TestCase):
             palpate.predict(found, contact_m=[0.03, 0.025, 0.3], radius_m=0.01, force_n=0.5)
         self.assertIn("contact", raised.exception.where)
         self.assertNotIn("--", raised.exception.where)
+        for wrong in ({"force_n": -0.5}, {"force_n": float("nan")}, {"travel_m": 0.0}):
+            with self.assertRaisesRegex(palpate.Error, "must be a number above 0") as raised:
+                palpate.predict(found, contact_m=[0.03, 0.025, 0.08], radius_m=0.01, **wrong)
+            self.assertEqual(raised.exception.where, next(iter(wrong)).split("_")[0])
 
 
 class LongWork(unittest.TestCase):
