@@ -15,6 +15,8 @@
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/sensing/depth_noise.hpp"
+#include "palpate/sensing/images_at_rest.hpp"
+#include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate::cli {
 
@@ -93,6 +95,36 @@ LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
   return {std::move(made.recording), std::move(made.clocks), std::move(made.notes)};
 }
 
+namespace {
+
+/// Images in which a part of the robot stays for want of a joint.
+std::optional<std::string> unmasked(const Recording& recording) {
+  if (!recording.robot || !sensing::has_shapes(*recording.robot)) return std::nullopt;
+  const bool is_asked = std::any_of(recording.pushes.begin(), recording.pushes.end(), [](const Push& push) {
+    return std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) {
+      return !step.joints_rad.empty() && std::any_of(step.observations.begin(), step.observations.end(), [](const Observation& one) {
+        const auto* frame = std::get_if<DepthFrame>(&one);
+        return frame != nullptr && !frame->robot_is_masked;
+      });
+    });
+  });
+  if (!is_asked) return std::nullopt;
+  const sensing::RobotMask mask(*recording.robot);
+  for (const Index link : mask.shaped_links())
+    if (const auto joint = mask.kinematics().missing_joint(link, recording.joint_names))
+      return fmt::format("robot '{}': its joint '{}' is not among joint_names, so that the link '{}' and what else hangs on it is not masked "
+                         "in depth images",
+                         recording.robot->name, *joint, mask.kinematics().robot().links[std::size_t(link)].name);
+  return std::nullopt;
+}
+
+}  // namespace
+
+void warn_of_oddities(Recording& recording) {
+  for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
+  if (auto lack = unmasked(recording)) recording.warnings.push_back(std::move(*lack));
+}
+
 void check_loaded(Recording& recording, const std::string& lister) {
   const auto problems = io::check_recording(recording);
   if (!problems.empty()) {
@@ -100,7 +132,7 @@ void check_loaded(Recording& recording, const std::string& lister) {
         problems.size() > 1 ? fmt::format(" ({} more: {} lists them)", problems.size() - 1, lister) : std::string();
     throw Error(problems.front().what + more, problems.front().where);
   }
-  for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
+  warn_of_oddities(recording);
 }
 
 Recording load_recording_unchecked(Session& session, const fs::path& path, const fs::path& mapping,

@@ -22,6 +22,9 @@ struct LoadedRecording {
 LoadedRecording load_recording(const std::filesystem::path& path, const std::filesystem::path& mapping);
 
 /// Adds to its warnings what is odd. @throws Error for the first of what check_recording finds
+/// What can be, but seldom is meant, as warnings of the recording: odd numbers, a robot's part that cannot be masked.
+void warn_of_oddities(Recording& recording);
+
 /// @param lister  that lists all of it, for the message
 void check_loaded(Recording& recording, const std::string& lister = "`palpate info`");
 

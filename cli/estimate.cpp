@@ -102,6 +102,7 @@ void tell(Session& session, const HeldOut& held_out) {
                              ? fmt::format("; {} in the fit that has seen it", report::quantity(held_out.fitted_rms_m, "m"))
                              : std::string());
   if (std::isfinite(held_out.force_error)) words += fmt::format(" force within {:.2g} %,", 100 * held_out.force_error);
+  if (words.empty()) return;
   words.back() = ' ';
   session.say(fmt::format("held out           {}:{}", held_out.what, words.substr(0, words.size() - 1)));
 }
@@ -114,9 +115,12 @@ void tell(Session& session, const std::vector<LawFit>& laws) {
       session.say(fmt::format("  {:<16} {}", fit.law, fit.message));
       continue;
     }
-    session.say(fmt::format("  {:<16} E {}, nu {:.3f}; force within {:.2g} %, surface {} rms, chi2 of these loads {:.0f}, of the fit {:.0f}", fit.law,
-                            report::quantity(fit.young_modulus_pa, "Pa"), fit.poisson_ratio, 100 * fit.held_out.force_error,
-                            report::quantity(fit.held_out.surface_rms_m, "m"), fit.held_out_chi2, fit.chi2));
+    const HeldOut& higher = fit.held_out;
+    session.say(fmt::format("  {:<16} E {}, nu {:.3f};{}{} chi2 of these loads {:.0f}, of the fit {:.0f}", fit.law,
+                            report::quantity(fit.young_modulus_pa, "Pa"), fit.poisson_ratio,
+                            std::isfinite(higher.force_error) ? fmt::format(" force within {:.2g} %,", 100 * higher.force_error) : "",
+                            std::isfinite(higher.surface_rms_m) ? fmt::format(" surface {} rms,", report::quantity(higher.surface_rms_m, "m")) : "",
+                            fit.held_out_chi2, fit.chi2));
   }
 }
 
@@ -130,13 +134,18 @@ void tell(Session& session, const Options& given, const Identification& answer) 
       session.say(fmt::format("{:<18} {}   (this method gives no interval)", label, report::quantity(parameter.value, parameter.unit)));
       continue;
     }
+    if (parameter.lower_95 == parameter.upper_95) {
+      session.say(fmt::format("{:<18} {}   (given)", label, report::quantity(parameter.value, parameter.unit)));
+      continue;
+    }
     const double resolution = (parameter.upper_95 - parameter.lower_95) / 30;
     session.say(fmt::format("{:<18} {}   95 % interval {}{}", label, report::quantity(parameter.value, parameter.unit, resolution),
                             report::interval(parameter.lower_95, parameter.upper_95, parameter.unit),
                             parameter.determined ? "" : "   (hardly determined by these data)"));
   }
-  session.say(fmt::format("fit                residuals {} rms over {} values; chi2 per degree of freedom {:.3g}, 1 where noise is as stated",
-                          report::quantity(answer.fit.rms_m, "m"), answer.fit.points_used, answer.fit.chi2_per_dof));
+  const std::string lengths = std::isfinite(answer.fit.rms_m) ? fmt::format("residuals {} rms over ", report::quantity(answer.fit.rms_m, "m")) : "";
+  session.say(fmt::format("fit                {}{} values; chi2 per degree of freedom {:.3g}, 1 where noise is as stated", lengths,
+                          answer.fit.points_used, answer.fit.chi2_per_dof));
   const auto mesh = answer.provenance.find("mesh"), error = answer.provenance.find("mesh's error in E");
   if (mesh != answer.provenance.end() && error != answer.provenance.end()) {
     const bool known = error->second != "not estimated";

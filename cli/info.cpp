@@ -280,7 +280,7 @@ int look(Session& session, const Arguments& given) {
   }
   std::vector<acquisition::ClockOffset> clocks;
   Recording recording = load_recording_unchecked(session, given.recording, given.mapping, &clocks);
-  for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
+  warn_of_oddities(recording);
   std::vector<io::Problem> problems = io::check_recording(recording);
   if (const auto wrong = wrong_material(recording.model.material)) problems.push_back({"model.material", *wrong});
   all.update(described(recording, problems));

@@ -84,7 +84,7 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
           auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
           if (robot && !frame->robot_is_masked && !step.joints_rad.empty()) {
-            masked = sensing::with_mask(masked, robot->mask(*frame, recording.joint_names, step.joints_rad));
+            masked = sensing::with_mask(masked, robot->mask_known(*frame, recording.joint_names, step.joints_rad));
           }
           if (masked_m != nullptr && masked_m->back().rows() == 0) {
             masked_m->back() = sensing::masked_points(masked, low_m, high_m, masked_a_step);

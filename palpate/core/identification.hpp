@@ -44,7 +44,7 @@ struct Slip {
 enum class Termination { converged, max_iterations, cancelled, no_progress, failed };
 
 struct FitSummary {
-  double rms_m = 0;
+  double rms_m = 0;  ///< of the residuals that are lengths; NaN where nothing but forces was compared
   double chi2_per_dof = 0;
   std::size_t points_used = 0;
   std::size_t pushes = 0;
@@ -63,7 +63,7 @@ struct HeldOut {
   bool available = false;
   std::string what;          ///< "each push in turn" or "the highest load"
   double force_error = 0;    ///< relative, of the predicted force (NaN = not predicted)
-  double surface_rms_m = 0;  ///< to the predicted surface
+  double surface_rms_m = 0;  ///< to the predicted surface; NaN, as the next three, where no surface was seen
   double baseline_no_deformation_rms_m = 0;
   double baseline_last_step_rms_m = 0;  ///< to that of the step before
   double fitted_rms_m = unknown;        ///< to that of the fit that has seen them: hardly more than noise where the model fits

@@ -18,6 +18,8 @@ class ValueChecker {
     spread("force_cross_talk_std", recording.force_cross_talk_std);
     spread("time_offset_std_s", recording.time_offset_std_s);
     spread("density_kg_m3", recording.density_kg_m3);
+    if (recording.density_kg_m3 > 30000 || (recording.density_kg_m3 > 0 && recording.density_kg_m3 < 5))
+      add("density_kg_m3", "is outside 5 to 30000 kg/m3; is it in g/cm3? Multiply by 1000");
     spread("density_std_kg_m3", recording.density_std_kg_m3);
     finite("environment.gravity_m_s2", recording.environment.gravity_m_s2);
     check(recording.rest);
@@ -102,6 +104,8 @@ class ValueChecker {
   void check(const Load& load, const std::string& at) {
     known(at + "tool", load.tool);
     if (!load.force_n && !load.travel_m) add(at + "force_n", "is not given, and travel_m neither; one of the two acts on the object");
+    if (load.force_n && load.travel_m)
+      add(at + "travel_m", "and force_n are both given; one is imposed, and what the other was is an observation (a ToolTravel or a Wrench)");
     if (load.force_n) finite(at + "force_n", *load.force_n);
     if (load.travel_m) finite(at + "travel_m", *load.travel_m);
     spread(at + "force_std_n", load.force_std_n);
@@ -127,13 +131,25 @@ class ValueChecker {
       add(at + "mask", "is " + size_of(frame.mask) + " pixels, the image " + size_of(frame.depth_m));
   }
   void check(const PointCloud& cloud, const std::string& at) {
+    const Eigen::Index points = cloud.points_m.rows();
+    if (points == 0) add(at + "points_m", "is empty; leave out a cloud that shows nothing");
+    if (cloud.normals.rows() != 0 && cloud.normals.rows() != points)
+      add(at + "normals", "has " + std::to_string(cloud.normals.rows()) + " rows for " + std::to_string(points) + " points");
+    if (points > 0 && cloud.sigma_m.size() != 1 && cloud.sigma_m.size() != points)
+      add(at + "sigma_m", "has " + std::to_string(cloud.sigma_m.size()) + " values; give one, or one a point (" + std::to_string(points) + ")");
     finite(at + "points_m", cloud.points_m);
     spread(at + "pose_std_m", cloud.pose_std_m);
     spread(at + "pose_std_rad", cloud.pose_std_rad);
     if (cloud.sigma_m.size() > 0 && !((cloud.sigma_m.array() > 0) && cloud.sigma_m.array().isFinite()).all())
       sigma(at + "sigma_m", 0);
   }
-  void check(const Markers& markers, const std::string& at) { sigma(at + "sigma_m", markers.sigma_m); }
+  void check(const Markers& markers, const std::string& at) {
+    sigma(at + "sigma_m", markers.sigma_m);
+    const auto names = static_cast<Eigen::Index>(markers.names.size());
+    if (markers.rest_m.rows() != names || markers.observed_m.rows() != names)
+      add(at + "observed_m", "has " + std::to_string(markers.observed_m.rows()) + " rows and rest_m " + std::to_string(markers.rest_m.rows()) + " for " +
+                                 std::to_string(names) + " names; each marker has one row in both");
+  }
   void check(const ToolTravel& travel, const std::string& at) {
     if (!travel.tool.empty()) known(at + "tool", travel.tool);
     finite(at + "travel_m", travel.travel_m);

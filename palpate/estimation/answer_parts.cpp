@@ -120,7 +120,7 @@ FitSummary summary_of(const Unknowns& unknowns, const Optimum& optimum, const Re
   }
   FitSummary out;
   out.points_used = residuals.rows + residuals.missed - residuals.outliers;
-  out.rms_m = residuals.lengths > 0 ? std::sqrt(residuals.sum_squared_m2 / static_cast<double>(residuals.lengths)) : 0;
+  out.rms_m = residuals.lengths > 0 ? std::sqrt(residuals.sum_squared_m2 / static_cast<double>(residuals.lengths)) : HeldOut::unknown;
   const double tested = static_cast<double>(residuals.rows + residuals.missed) - static_cast<double>(residuals.outliers + flat);
   out.chi2_per_dof = (residuals.chi2 + pulls) / std::max(1.0, tested);
   return out;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "palpate/core/error.hpp"
@@ -25,20 +26,32 @@ constexpr double order_of_filling = 3;
 
 struct RoundContact {
   fem::ContactPatch patch;
-  Vec3 force = Vec3::Zero();
+  Vec3 direction = Vec3::Zero();  ///< of the force, or of a motion that is imposed
 };
 
+/// Of a place smaller than an edge: that of the nearest one.
 double longest_edge_near(const TetMesh& mesh, const Vec3& centre_m, double radius_m) {
-  double longest = 0;
+  double longest = 0, nearest_m = std::numeric_limits<double>::infinity(), length_m = 0;
   for (Index t = 0; t < mesh.tetrahedra.rows(); ++t) {
     for (int a = 0; a < 4; ++a) {
       for (int b = a + 1; b < 4; ++b) {
         const Vec3 from = mesh.nodes_m.row(mesh.tetrahedra(t, a)), to = mesh.nodes_m.row(mesh.tetrahedra(t, b));
-        if ((0.5 * (from + to) - centre_m).norm() < radius_m) longest = std::max(longest, (to - from).norm());
+        const double away_m = (0.5 * (from + to) - centre_m).norm();
+        if (away_m < radius_m) longest = std::max(longest, (to - from).norm());
+        if (away_m < nearest_m) nearest_m = away_m, length_m = (to - from).norm();
       }
     }
   }
-  return longest;
+  return longest > 0 ? longest : length_m;
+}
+
+bool is_bar(const Tool& tool) { return tool.shape == ToolShape::capsule || tool.shape == ToolShape::edge; }
+
+/// A round tool that is moved touches as much as its dent is wide (Hertz 1882), which is less than its radius.
+double touched_radius_m(const Tool& tool, const Load& load) {
+  const bool flat = tool.shape == ToolShape::disc;
+  if (!load.travel_m || flat) return tool.radius_m;
+  return std::min(tool.radius_m, std::sqrt(tool.radius_m * std::abs(*load.travel_m)));
 }
 
 /// Places of tools with a radius, and the first force there.
@@ -48,15 +61,18 @@ std::vector<RoundContact> round_contacts(const Recording& recording) {
     for (const auto& step : push.steps) {
       for (const auto& load : step.loads) {
         for (const auto& tool : recording.tools) {
-          if (tool.name != load.tool || !(tool.radius_m > 0) || !load.force_n || load.force_n->norm() == 0) continue;
-          const bool known = std::any_of(contacts.begin(), contacts.end(), [&](const RoundContact& each) {
+          const bool pressed = load.force_n && load.force_n->norm() > 0, moved = load.travel_m && *load.travel_m != 0;
+          if (tool.name != load.tool || !(tool.radius_m > 0) || !(pressed || moved)) continue;
+          const double radius_m = touched_radius_m(tool, load);
+          const auto known = std::find_if(contacts.begin(), contacts.end(), [&](const RoundContact& each) {
             return (each.patch.centre_m - load.contact_m).norm() < 1e-6;
           });
-          if (known) continue;
-          const bool bar = tool.shape == ToolShape::capsule || tool.shape == ToolShape::edge;
-          contacts.push_back(
-              {{load.contact_m, tool.radius_m, bar ? Vec3(0.5 * tool.length_m * tool.axis) : Vec3(Vec3::Zero()), tool.pressure},
-               *load.force_n});
+          if (known != contacts.end()) {
+            if (moved) known->patch.radius_m = std::max(known->patch.radius_m, radius_m);
+            continue;
+          }
+          contacts.push_back({{load.contact_m, radius_m, is_bar(tool) ? Vec3(0.5 * tool.length_m * tool.axis) : Vec3(Vec3::Zero()), tool.pressure},
+                              moved ? load.direction : *load.force_n});
         }
       }
     }
@@ -137,7 +153,7 @@ std::optional<FinerModel> finer_under_tools(const Recording& recording, const Si
   if (contacts.empty()) return std::nullopt;
   Recording finer = recording;
   const Index node_limit = most_growth * static_cast<Index>(recording.rest.volume->nodes_m.rows());
-  for (const auto& [patch, force] : contacts) {
+  for (const auto& [patch, direction] : contacts) {
     const double edge_m = longest_edge_near(*recording.rest.volume, patch.centre_m, 1.2 * patch.radius_m);
     take(finer, fem::refine_near(*finer.rest.volume, patch.centre_m, patch.radius_m, 0.5 * edge_m, 1.0, node_limit));
   }
@@ -155,7 +171,7 @@ std::optional<FinerModel> refined_within(const Recording& recording, const Simul
   options.poisson_ratio = recording.model.poisson_fixed.value_or(0.3);
   Recording finer = recording;
   bool changed = false;
-  for (const auto& [patch, force] : round_contacts(recording)) {
+  for (const auto& [patch, direction] : round_contacts(recording)) {
     const auto boundary_on = [&, &where = patch](const TetMesh& mesh, const fem::RefinedMesh& linear) {
       fem::Boundary boundary;
       boundary.forces = fem::spread_over_patch(mesh, where);
@@ -166,7 +182,7 @@ std::optional<FinerModel> refined_within(const Recording& recording, const Simul
       boundary.constraints = hold(mesh, supports, {}).constraints;
       return boundary;
     };
-    const fem::Discretisation chosen = fem::discretise(*finer.rest.volume, patch, boundary_on, force.normalized(), options);
+    const fem::Discretisation chosen = fem::discretise(*finer.rest.volume, patch, boundary_on, direction.normalized(), options);
     if (chosen.base_young_error <= options.tolerance) continue;
     take(finer, chosen.linear);
     changed = true;

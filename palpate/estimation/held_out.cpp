@@ -39,7 +39,7 @@ struct Distance {
   double sum_m2 = 0;
   std::size_t count = 0;
   double mean_m2() const { return count > 0 ? sum_m2 / static_cast<double>(count) : 0; }
-  double rms_m() const { return std::sqrt(mean_m2()); }
+  double rms_m() const { return count > 0 ? std::sqrt(mean_m2()) : HeldOut::unknown; }
 };
 
 void add_distance(PartialFits& fits, std::size_t s, const StepPrediction& predicted, const VectorX& unknowns, Distance& out) {

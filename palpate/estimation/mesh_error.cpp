@@ -60,7 +60,8 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
   for (std::size_t s = 0; s < coarse.size(); ++s) {
     if (all.steps[s] == 0) continue;
     const Points change_m = fine[s].surface_m - coarse[s].surface_m;
-    if (change_m.isZero(0) && fine[s].travel_m == coarse[s].travel_m) {
+    // Of an imposed motion: what it asks for. A force that is given is the same on both.
+    if (change_m.isZero(0) && fine[s].travel_m == coarse[s].travel_m && fine[s].force_n == coarse[s].force_n) {
       changed[s] = objective.last_rows()[s];
       continue;
     }
@@ -68,6 +69,7 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
     moved.surface_m += change_m;
     if (moved.field != nullptr) moved.material_m += change_m;
     moved.travel_m += fine[s].travel_m - coarse[s].travel_m;
+    for (std::size_t l = 0; l < moved.force_n.size(); ++l) moved.force_n[l] += fine[s].force_n[l] - coarse[s].force_n[l];
     changed[s] = objective.rows_of(s, moved, optimum.unknowns, loss);
   }
   const Evaluation before = objective.assemble(objective.last_rows(), optimum.unknowns, all);

@@ -11,8 +11,9 @@
 namespace palpate::fem {
 namespace {
 
+/// Of a patch smaller than the elements: that of the nearest one.
 double longest_edge_near(const TetMesh& mesh, const ContactPatch& patch) {
-  double longest = 0;
+  double longest = 0, nearest_m = std::numeric_limits<double>::infinity(), of_nearest = 0;
   for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
     double distance = std::numeric_limits<double>::infinity(), edge = 0;
     for (int a = 0; a < 4; ++a) {
@@ -21,8 +22,9 @@ double longest_edge_near(const TetMesh& mesh, const ContactPatch& patch) {
       for (int b = 0; b < a; ++b) edge = std::max(edge, (x - mesh.nodes_m.row(mesh.tetrahedra(e, b)).transpose()).norm());
     }
     if (distance <= patch.radius_m) longest = std::max(longest, edge);
+    if (distance < nearest_m) nearest_m = distance, of_nearest = edge;
   }
-  return longest;
+  return longest > 0 ? longest : of_nearest;
 }
 
 // The error left after two changes, where it falls as C h^p: (h0^p - h1^p) / (h1^p - h2^p) is the changes' ratio. Orders

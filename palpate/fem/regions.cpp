@@ -81,6 +81,7 @@ std::vector<int> regions_of(const TetMesh& mesh, const std::vector<Region>& regi
           if ((at.array() >= one.box_min_m.array()).all() && (at.array() <= one.box_max_m.array()).all()) mine = number;
           break;
         case RegionSelection::points: {
+          if (one.points_m.rows() == 0) throw Error("has no points; give some of the object's, or leave the region out", "regions." + one.name);
           const double distance = (one.points_m.rowwise() - at.transpose()).rowwise().squaredNorm().minCoeff();
           if (distance < nearest) around = number;
           nearest = std::min(nearest, distance);

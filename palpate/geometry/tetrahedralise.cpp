@@ -109,8 +109,17 @@ double finest_near(const TetrahedraliseOptions& o, const Vec3& p) {
 }
 
 /// Empty where the lattice catches nothing of the solid, or takes too many tetrahedra to follow it: `unaffordable` then.
-std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, const TetrahedraliseOptions& o, double cell,
+/// A lattice is laid over the whole box: one stray triangle far from the object would fill the memory with empty cubes.
+bool mostly_empty(const Solid& solid, double volume_m3, double cell_m) {
+  constexpr double many = 3e6, a_full_one = 20;
+  const double cubes = ((solid.max_m() - solid.min_m()) / cell_m).array().max(1).prod();
+  return cubes > std::max(many, a_full_one * volume_m3 / std::pow(cell_m, 3));
+}
+
+std::optional<Draft> draft(const Solid& solid, const SurfaceSamples& samples, const TetrahedraliseOptions& o, double volume_m3, double cell,
                            bool& unaffordable) {
+  unaffordable = mostly_empty(solid, volume_m3, cell);
+  if (unaffordable) return std::nullopt;
   Lattice lattice(solid, cell);
   const std::size_t affordable = o.edge_m > 0 ? 20000000 : 100000 + 30 * std::size_t(o.tetrahedra);
   unaffordable = !lattice.refine_to_surface(samples, o.detail * cell, cell / o.finest, affordable);
@@ -271,7 +280,7 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
   for (int attempt = 0; attempt < attempts; ++attempt) {
     if (progress && !progress("lattice", double(attempt) / attempts)) out.cancelled = true;
     bool unaffordable = false;
-    auto fresh = draft(solid, samples, o, cell, unaffordable);
+    auto fresh = draft(solid, samples, o, volume, cell, unaffordable);
     if (o.edge_m > 0) {
       best = std::move(fresh);
       break;

@@ -131,7 +131,9 @@ class Checker {
   void check_support(const Support& support) {
     if (!has_mesh_) return;
     const bool half_space = support.kind == SupportKind::table || support.kind == SupportKind::wall;
-    if (support.select == NodeSelection::plane && !half_space) {
+    // A program gives the kind, which says by what the nodes are chosen; only a clamp must say it besides.
+    const bool is_clamp = support.kind == SupportKind::clamp;
+    if (support.kind == SupportKind::plane || (is_clamp && support.select == NodeSelection::plane)) {
       const VectorX distance = ((nodes_.rowwise() - support.plane.point_m.transpose()) * support.plane.normal).cwiseAbs();
       if (distance.minCoeff() > support.tolerance_m) {
         add(support.source,
@@ -143,7 +145,7 @@ class Checker {
                                         "metres?",
                                         length(support.tolerance_m), support.name));
       }
-    } else if (support.select == NodeSelection::box) {
+    } else if (support.kind == SupportKind::box || (is_clamp && support.select == NodeSelection::box)) {
       Eigen::Index inside = 0;
       for (Eigen::Index i = 0; i < nodes_.rows(); ++i) {
         const auto x = nodes_.row(i).transpose().array();
@@ -267,7 +269,7 @@ class Checker {
   }
 
   void check_observation(const PointCloud& cloud, const Step& step) {
-    if (!has_mesh_) return;
+    if (!has_mesh_ || cloud.points_m.rows() == 0) return;
     const double diagonal = box_.diagonal(), own = Box(cloud.points_m).diagonal();
     // The nearest point decides how far a cloud is: it may show the table around the object as well.
     const double distance = (cloud.points_m.rowwise() - box_.centre().transpose()).rowwise().norm().minCoeff();
@@ -289,7 +291,8 @@ class Checker {
 
   void check_observation(const Markers& markers, const Step& step) {
     if (!has_mesh_) return;
-    for (Eigen::Index i = 0; i < markers.rest_m.rows(); ++i) {
+    const auto named = static_cast<Eigen::Index>(markers.names.size());
+    for (Eigen::Index i = 0; i < std::min({named, markers.rest_m.rows(), markers.observed_m.rows()}); ++i) {
       for (const auto& [place, what] : {std::pair{markers.rest_m.row(i), "rest"}, {markers.observed_m.row(i), "observed"}}) {
         const double distance = (Vec3(place) - box_.centre()).norm();
         if (!(distance > 3 * box_.diagonal())) continue;  // hidden markers are NaN

@@ -193,7 +193,10 @@ class OddNumbers {
     const double g = recording_.environment.gravity_m_s2.norm();
     if (g > 0 && (g < 9.5 || g > 10.1))
       say(fmt::format("gravity_m_s2 is {:.4g} m/s2 long; on earth it is 9.81", g), recording_.source);
-    for (const Tool& tool : recording_.tools) look_at(tool);
+    for (const Tool& tool : recording_.tools) {
+      look_at(tool);
+      if (tool.shape == ToolShape::sphere && tool.radius_m > 0 && tool.radius_std_m == 0) look_at_ball(tool);
+    }
     const double usual_n = usual_force();
     for (const Push& push : recording_.pushes) {
       look_at_signs(push);
@@ -305,6 +308,32 @@ class OddNumbers {
     if (pulls != nullptr && presses > 0)
       say(fmt::format("force_n pulls, against 'direction', where other steps of push '{}' press; is its sign right?", push.name),
           pulls->source);
+  }
+
+  /// A measured force acts on a patch of the tool's radius; a ball's patch grows with its depth (Hertz 1882).
+  void look_at_ball(const Tool& ball) {
+    double deepest_m = 0;
+    bool is_pressed = false;
+    for (const Push& push : recording_.pushes)
+      for (const Step& step : push.steps) {
+        is_pressed = is_pressed || std::any_of(step.loads.begin(), step.loads.end(), [&](const Load& load) {
+                       return load.tool == ball.name && load.force_n && load.force_n->norm() > 0;
+                     });
+        for (const Observation& one : step.observations) {
+          const auto* travel = std::get_if<ToolTravel>(&one);
+          if (travel != nullptr && (travel->tool.empty() || travel->tool == ball.name)) deepest_m = std::max(deepest_m, travel->travel_m);
+        }
+      }
+    const double touched_m = std::sqrt(ball.radius_m * deepest_m);
+    constexpr double nearly_all = 0.8;
+    if (!is_pressed || touched_m > nearly_all * ball.radius_m) return;
+    const std::string seen =
+        deepest_m > 0 ? fmt::format("at its deepest, {:.3g} m, it touches about {:.2g} m", deepest_m, touched_m) : "it touches less where it is shallow";
+    say(fmt::format("a measured force of '{}' is taken to press all of its radius ({:.3g} m), but a ball touches about the root of radius times depth: "
+                    "{}. E comes out too low then; impose its motion (travel_m) and observe the force, or give the patch's radius as a disc's, or "
+                    "radius_std_m",
+                    ball.name, ball.radius_m, seen),
+        recording_.source);
   }
 
   void look_at(const Load& load, double usual_n, const Step& step) {

@@ -30,8 +30,8 @@ void read_density(YamlKeys& keys, Recording& recording) {
   } else {
     recording.density_kg_m3 = field->positive();
   }
-  if (recording.density_kg_m3 < 1 || recording.density_kg_m3 > 30000) {
-    field->fail("is outside 1 to 30000 kg/m3; is it in g/cm3? Multiply by 1000");
+  if (recording.density_kg_m3 < 5 || recording.density_kg_m3 > 30000) {
+    field->fail("is outside 5 to 30000 kg/m3; is it in g/cm3? Multiply by 1000");
   }
 }
 

@@ -64,7 +64,10 @@ Axes::Axes(Canvas& canvas, double width, double height, const std::string& x_lab
     canvas_.line(grid, rule, 0.6);
     canvas_.text({x_of(tick), bottom + 11}, tick_text(tick, xs.size() > 1 ? xs[1] - xs[0] : 1), 8, Align::centre, soft);
   }
-  canvas_.text({(left + right) / 2, height - 8}, x_label, 9, Align::centre, ink);
+  // Under the frame, but whole: a long one begins further left.
+  constexpr double letter = 5.2;
+  const double half = std::min(0.5 * letter * static_cast<double>(x_label.size()), width / 2);
+  canvas_.text({std::clamp((left + right) / 2, half, width - half), height - 8}, x_label, 9, Align::centre, ink);
   if (!y_label.empty()) {
     const std::vector<double> ys = round_ticks(y_, static_cast<int>((bottom - top) / 32));
     for (const double tick : ys) {

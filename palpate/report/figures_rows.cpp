@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <tuple>
 
 #include "palpate/report/axes.hpp"
@@ -14,7 +15,33 @@ namespace {
 
 using nlohmann::json;
 
-std::string shortened(const std::string& text) { return text.size() > 24 ? text.substr(0, 23) + "..." : text; }
+/// Width of what begins at a byte, over the size of the letters; continuation bytes of UTF-8 have none.
+double em(char letter) {
+  constexpr std::string_view narrow = "iljtfrI1.,:;'|!()[] ", wide = "mwMWQOG@%";
+  if ((static_cast<unsigned char>(letter) & 0xC0) == 0x80) return 0;
+  return narrow.find(letter) != narrow.npos ? 0.38 : wide.find(letter) != wide.npos ? 0.85 : 0.62;
+}
+
+double em(std::string_view text) {
+  double sum = 0;
+  for (const char letter : text) sum += em(letter);
+  return sum;
+}
+
+/// As much of the beginning as there is room for, by whole letters; nothing is left out of what fits.
+std::string shortened(std::string_view text, double room_em = 13.2) {
+  if (em(text) <= room_em) return std::string(text);
+  // Of "input, region" the region tells the rows apart.
+  const std::size_t comma = text.rfind(", ");
+  if (comma != text.npos && em(text.substr(comma)) < 0.6 * room_em)
+    return shortened(text.substr(0, comma), room_em - em(text.substr(comma))) + std::string(text.substr(comma));
+  constexpr std::string_view dots = "...";
+  std::size_t end = 0;
+  double sum = em(dots);
+  while (end < text.size() && sum + em(text[end]) <= room_em) sum += em(text[end++]);
+  // A letter whose first byte has no room takes its other bytes with it: they stand behind `end`.
+  return std::string(text.substr(0, end)) + std::string(dots);
+}
 
 Sheet young_of_parts(Canvas* canvas, const json& list, std::size_t colour) {
   if (list.size() < 2) return {0, 0};
@@ -29,7 +56,7 @@ Sheet young_of_parts(Canvas* canvas, const json& list, std::size_t colour) {
   double y = axes.top + 7;
   for (const json& p : list) {
     if (!p["value"].is_number()) continue;
-    canvas->text({104, y + 3}, shortened(p["region"]), 8, Align::right, soft);
+    canvas->text({104, y + 3}, shortened(p["region"].get<std::string>()), 8, Align::right, soft);
     const std::array<Spot, 2> bar = {Spot{axes.x_of(number(p["lower_95"]) * factor), y},
                                      {axes.x_of(number(p["upper_95"]) * factor), y}};
     canvas->line(bar, category(colour, 0.5), 1.8);

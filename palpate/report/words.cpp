@@ -60,6 +60,8 @@ std::string answer(const Identification& identification) {
     if (!text.empty()) text += ' ';
     if (!std::isfinite(parameter.lower_95) || !std::isfinite(parameter.upper_95)) {
       text += fmt::format("{} is {} (without an interval).", title, quantity(parameter.value, parameter.unit));
+    } else if (parameter.lower_95 == parameter.upper_95) {
+      text += fmt::format("{} was given as {}.", title, quantity(parameter.value, parameter.unit));
     } else if (parameter.determined) {
       const double resolution = (parameter.upper_95 - parameter.lower_95) / 30;
       text +=

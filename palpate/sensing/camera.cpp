@@ -183,7 +183,7 @@ std::optional<Vec3> unproject(const Camera& camera, const Vec2& pixel) {
     p = undistort_brown(camera.distortion_coefficients, bent);
   else if (camera.distortion == DistortionModel::fisheye)
     p = undistort_fisheye(camera.distortion_coefficients, bent);
-  if (!p) return std::nullopt;
+  if (!p || beyond_fold(camera, *p)) return std::nullopt;
   return Vec3(p->x(), p->y(), 1.0);
 }
 

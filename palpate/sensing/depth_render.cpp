@@ -13,8 +13,6 @@
 namespace palpate::sensing {
 namespace {
 
-constexpr double near_m = 1e-3;
-
 // A vertex on the image: pixel and inverse depth, which is what varies linearly over a triangle's image.
 struct Corner {
   double u, v, inverse_depth;
@@ -129,6 +127,7 @@ DepthImage render_depth(const std::vector<PosedMesh>& bodies, const Camera& came
   constexpr int most_halvings = 12;
   for (const PosedMesh& body : bodies) {
     const Pose T_camera_mesh = T_base_camera.inverse() * body.T_base_mesh;
+    const double near_m = body.near_m;
     const Points& vertices = body.mesh->vertices_m;
     points.resize(std::size_t(vertices.rows()));
     corners.resize(points.size());

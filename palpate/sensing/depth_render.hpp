@@ -12,6 +12,7 @@ namespace palpate::sensing {
 struct PosedMesh {
   const TriMesh* mesh = nullptr;
   Pose T_base_mesh = Pose::Identity();
+  double near_m = 1e-3;  ///< depth from which on it shows
 };
 
 /// Depth along the optical axis at every pixel centre, 0 where nothing is seen; both sides of a triangle show. Triangles

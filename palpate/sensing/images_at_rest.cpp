@@ -23,14 +23,14 @@ std::vector<DepthFrame> images_at_rest(const Recording& recording) {
     if (push.steps.empty()) continue;
     const Step& step = push.steps.front();
     const bool loaded = std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) {
-      return !load.force_n || load.force_n->norm() > 0 || load.travel_m.value_or(0) != 0;
+      return (load.force_n && load.force_n->norm() > 0) || load.travel_m.value_or(0) != 0 || (!load.force_n && !load.travel_m);
     });
     if (loaded || step.unloading) continue;
     for (const auto& observation : step.observations) {
       const auto* frame = std::get_if<DepthFrame>(&observation);
       if (frame == nullptr) continue;
       frames.push_back(robot && !frame->robot_is_masked && !step.joints_rad.empty()
-                           ? with_mask(*frame, robot->mask(*frame, recording.joint_names, step.joints_rad))
+                           ? with_mask(*frame, robot->mask_known(*frame, recording.joint_names, step.joints_rad))
                            : *frame);
     }
   }

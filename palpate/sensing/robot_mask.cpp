@@ -46,6 +46,12 @@ TriMesh turned_mesh(const std::vector<Vec2>& profile, int sectors) {
   return mesh;
 }
 
+bool is_around(const TriMesh& mesh, const Vec3& point_m) {
+  if (mesh.vertices_m.rows() == 0) return false;
+  const Vec3 low = mesh.vertices_m.colwise().minCoeff(), high = mesh.vertices_m.colwise().maxCoeff();
+  return (point_m.array() >= low.array()).all() && (point_m.array() <= high.array()).all();
+}
+
 }  // namespace
 
 TriMesh shape_mesh(const RobotShape& shape) {
@@ -160,6 +166,9 @@ MaskImage RobotMask::mask_posed(const DepthFrame& frame, const std::vector<Pose>
   for (const std::size_t k : shapes) {
     std_m = std::max(std_m, kinematics_.position_std_m(link_poses, links_[k], farthest_m_[k], options_.joint_std_rad));
     bodies.push_back({&meshes_[k], T_base_root * link_poses[std::size_t(links_[k])]});
+    // The camera's own housing is around it, and would hide everything.
+    constexpr double housing_m = 0.05;
+    if (is_around(meshes_[k], bodies.back().T_base_mesh.inverse() * Vec3(frame.T_base_camera.translation()))) bodies.back().near_m = housing_m;
   }
   const double pose_margin = options_.pose_sigmas * std::hypot(std_m, options_.base_std_m, frame.pose_std_m);
   RenderMaskOptions margins = options_.margins;

@@ -53,7 +53,7 @@ function answer(report: Report): HTMLElement {
       { class: p.determined ? "card" : "card open", "data-name": p.name, "data-region": p.region },
       el("h2", {}, p.title),
       el("p", { class: "value" }, datum(p.value, p.text, "value"), p.determined ? null : el("span", { class: "flag" }, "not determined")),
-      known(p.lower_95) ? el("p", { class: "interval" }, "95 %: ", datum(p.lower_95, p.interval_text, "interval")) : el("p", { class: "interval" }, report.running ? "no interval yet" : "no interval"),
+      known(p.lower_95) && p.lower_95 === p.upper_95 ? el("p", { class: "interval" }, "given") : known(p.lower_95) ? el("p", { class: "interval" }, "95 %: ", datum(p.lower_95, p.interval_text, "interval")) : el("p", { class: "interval" }, report.running ? "no interval yet" : "no interval"),
     );
     const shape = sparkline(report, p);
     if (shape) card.append(shape);
@@ -77,8 +77,8 @@ function facts(report: Report): HTMLElement {
   const f = report.fit;
   const list = el("dl", { class: "facts" });
   const add = (name: string, ...text: (string | HTMLElement)[]): void => void list.append(el("div", {}, el("dt", {}, name), el("dd", {}, ...text)));
-  if (!report.running || f.rms_m) add("residual", datum(f.rms_m, `${quantity(f.rms_m, "m")} rms`, "rms_m"));
-  if (!report.running || f.rms_m) add("\u03c7\u00b2 per degree of freedom", datum(f.chi2_per_dof, known(f.chi2_per_dof) ? digits(f.chi2_per_dof, 3) : "unknown", "chi2_per_dof"));
+  if (known(f.rms_m) && (!report.running || f.rms_m)) add("residual", datum(f.rms_m, `${quantity(f.rms_m, "m")} rms`, "rms_m"));
+  if (!report.running || f.points_used) add("\u03c7\u00b2 per degree of freedom", datum(f.chi2_per_dof, known(f.chi2_per_dof) ? digits(f.chi2_per_dof, 3) : "unknown", "chi2_per_dof"));
   if (!report.running || f.points_used) add("data", `${plural(f.points_used, "point")}, ${plural(f.steps, "step")}, ${plural(f.pushes, "push")}`);
   add("material law", report.material.replaceAll("_", " ") || "unknown");
   add("method", report.method === "paper" ? "the paper's (IROS 2010)" : report.method);
