@@ -78,6 +78,13 @@ io::ExportModel export_model(const LearnedObject& learned, double density_kg_m3,
   io::ExportModel model;
   const prediction::Elasticity elasticity = elasticity_of(learned);
   model.mesh = *learned.object.rest.volume;
+  model.law = elasticity.material;
+  model.law_parameters = elasticity.extra;
+  if (elasticity.extra.size() == 0) {  // those that were not fitted stand at where they begin
+    const auto parameters = fem::material_law(elasticity.material).extra_parameters();
+    model.law_parameters.resize(static_cast<Index>(parameters.size()));
+    for (std::size_t i = 0; i < parameters.size(); ++i) model.law_parameters(static_cast<Index>(i)) = parameters[i].initial;
+  }
   model.young_modulus_pa = elasticity.young_modulus_pa;
   model.poisson_ratio = elasticity.poisson_ratio;
   for (std::size_t r = 0; r < elasticity.regions.size(); ++r) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// FEBio 4 (febio_spec 4.0). `isotropic elastic` is St. Venant-Kirchhoff: E and nu are those of small strains.
+// FEBio 4 (febio_spec 4.0). Its `neo-Hookean` has the stress (mu (b - I) + lambda ln J I) / J, our neo_hookean; `isotropic
+// elastic` is St. Venant-Kirchhoff. E and nu are those of small strains.
 #include <fmt/format.h>
 
 #include "palpate/io/export_formats.hpp"
@@ -29,9 +30,10 @@ ExportFiles export_febio(const ExportModel& model) {
   for (std::size_t r = 0; r < parts.size(); ++r) {
     if (!model.regions.empty()) text += "    <!-- region " + std::to_string(r + 1) + ": " + without_dashes(parts[r].name) + " -->\n";
     text += fmt::format(
-        "    <material id=\"{}\" name=\"{}\" type=\"isotropic elastic\">\n      <density>{:.15g}</density>\n"
+        "    <material id=\"{}\" name=\"{}\" type=\"{}\">\n      <density>{:.15g}</density>\n"
         "      <E>{:.15g}</E>\n      <v>{:.15g}</v>\n    </material>\n",
-        r + 1, numbered("learned", r), model.density_kg_m3 > 0 ? model.density_kg_m3 : 1.0, parts[r].young_modulus_pa, parts[r].poisson_ratio);
+        r + 1, numbered("learned", r), model.law == "stvk" ? "isotropic elastic" : "neo-Hookean",
+        model.density_kg_m3 > 0 ? model.density_kg_m3 : 1.0, parts[r].young_modulus_pa, parts[r].poisson_ratio);
   }
   text += "  </Material>\n  <Mesh>\n    <Nodes name=\"all\">\n";
   for (Eigen::Index i = 0; i < mesh.nodes_m.rows(); ++i)

@@ -13,22 +13,61 @@
 namespace palpate::io {
 
 std::span<const Exporter> exporters() {
-  static const std::array<Exporter, 8> table = {{
-      {"calculix", "object.inp", "CalculiX: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, true, export_calculix},
-      {"abaqus", "object.inp", "Abaqus: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, true, export_abaqus},
-      {"febio", "object.feb", "FEBio 4: tet4 or tet10, isotropic elastic; nothing to correct", true, false, true, export_febio},
-      {"sofa", "object.scn", "SOFA: TetrahedronFEMForceField, method large (corotational); nothing to correct", false, true, true,
-       export_sofa},
-      {"mujoco", "object.xml",
-       "MuJoCo 3.13 or later: flex; E and nu are changed so that its energy, which uses 2 lambda, becomes ours", false, true,
-       false, export_mujoco},
-      {"drake", "object.sdf", "Drake: SDF with deformable_properties, linear_corotated (its neohookean would act softer)",
-       false, true, false, export_drake},
-      {"bullet", "object.py",
-       "PyBullet: loadSoftBody with its Neo-Hookean law; its constants are changed so that small strains agree", false, true,
-       false, export_bullet},
-      {"usd", "object.usda", "USD: volume deformable body and material of UsdPhysics", false, true, false, export_usd},
-  }};
+  static const std::vector<Exporter> table = {
+      {.name = "calculix",
+       .main_file = "object.inp",
+       .about = "CalculiX: C3D4 or C3D10, *HYPERELASTIC, NEO HOOKE (its volume change costs K/2 (J - 1)^2); *ELASTIC of what was "
+                "learned as linear or stvk",
+       .laws = {"neo_hookean_isochoric", "linear", "stvk"},
+       .quadratic = true,
+       .by_region = true,
+       .write = export_calculix},
+      {.name = "abaqus",
+       .main_file = "object.inp",
+       .about = "Abaqus: C3D4 or C3D10, *HYPERELASTIC, NEO HOOKE (its volume change costs K/2 (J - 1)^2); *ELASTIC of what was "
+                "learned as linear, *HYPERFOAM of foam",
+       .laws = {"neo_hookean_isochoric", "linear", "foam"},
+       .quadratic = true,
+       .by_region = true,
+       .write = export_abaqus},
+      {.name = "febio",
+       .main_file = "object.feb",
+       .about = "FEBio 4: tet4 or tet10, neo-Hookean; isotropic elastic of what was learned as stvk",
+       .laws = {"neo_hookean", "stvk"},
+       .quadratic = true,
+       .by_region = true,
+       .write = export_febio},
+      {.name = "sofa",
+       .main_file = "object.scn",
+       .about = "SOFA: TetrahedronFEMForceField, method large (corotational); E and nu as they are",
+       .laws = {"corotational"},
+       .needs_density = true,
+       .by_region = true,
+       .write = export_sofa},
+      {.name = "mujoco",
+       .main_file = "object.xml",
+       .about = "MuJoCo 3.13 or later: flex (stvk); E and nu are changed so that its energy, which uses 2 lambda, becomes ours",
+       .laws = {"stvk"},
+       .needs_density = true,
+       .write = export_mujoco},
+      {.name = "drake",
+       .main_file = "object.sdf",
+       .about = "Drake: SDF with deformable_properties, linear_corotated (its neohookean would act softer)",
+       .laws = {"corotational"},
+       .needs_density = true,
+       .write = export_drake},
+      {.name = "bullet",
+       .main_file = "object.py",
+       .about = "PyBullet: loadSoftBody with its Neo-Hookean law (neo_hookean_stable); its constants are changed so that small strains agree",
+       .laws = {"neo_hookean_stable"},
+       .needs_density = true,
+       .write = export_bullet},
+      {.name = "usd",
+       .main_file = "object.usda",
+       .about = "USD: volume deformable body and material of UsdPhysics; the law is the reader's",
+       .needs_density = true,
+       .write = export_usd},
+  };
   return table;
 }
 
@@ -42,6 +81,12 @@ const Exporter& exporter_named(const std::string& name) {
   throw Error("is no simulator that is known" + (near ? "; did you mean '" + *near + "'?" : std::string()) +
                   "; known are " + fmt::format("{}", fmt::join(known, ", ")),
               name);
+}
+
+std::string written_law(const Exporter& exporter, const std::string& learned) {
+  if (exporter.laws.empty()) return {};
+  const auto same = std::find(exporter.laws.begin(), exporter.laws.end(), learned);
+  return same == exporter.laws.end() ? exporter.laws.front() : *same;
 }
 
 ExportModel with_linear_elements(const ExportModel& model) {
@@ -124,7 +169,10 @@ ExportFiles export_files(const Exporter& exporter, const ExportModel& model) {
   if (std::any_of(model.fixed.begin(), model.fixed.end(), outside) ||
       std::any_of(model.forces_n.begin(), model.forces_n.end(), [&](const auto& one) { return outside(one.first); }))
     throw Error("names nodes that are not there", "export: fixed, forces_n");
-  return exporter.write(exporter.quadratic ? model : with_linear_elements(model));
+  ExportModel written = exporter.quadratic ? model : with_linear_elements(model);
+  written.law = written_law(exporter, model.law);
+  if (written.law == "foam" && model.law_parameters.size() != 1) throw Error("foam needs its alpha", "export: law_parameters");
+  return exporter.write(written);
 }
 
 LameConstants lame_constants(double young, double nu) {

@@ -22,6 +22,8 @@ struct ExportRegion {
 /// What a simulator needs of an object. E and nu are those of small strains.
 struct ExportModel {
   std::string name = "object";
+  std::string law = "linear";  ///< that it was learned with; what a writer is given: that it is to write (written_law)
+  VectorX law_parameters;      ///< the law's further ones (alpha of foam)
   TetMesh mesh;  ///< linear or quadratic
   double young_modulus_pa = 0, poisson_ratio = 0;  ///< in regions: the first one's
   std::vector<ExportRegion> regions;               ///< empty: one
@@ -39,6 +41,9 @@ struct Exporter {
   std::string name;            ///< "calculix"
   std::string main_file;       ///< what to open, e.g. "object.inp"
   std::string about;           ///< what is written, and what was done so that E and nu mean there what they mean here
+  /// Laws of palpate's that its file holds as they are; an object that was learned with another gets the first. Empty: the
+  /// file names none, and whoever reads it chooses.
+  std::vector<std::string> laws = {};
   bool quadratic = false;      ///< takes ten-node tetrahedra; others get the corners
   bool needs_density = false;  ///< simulates motion
   bool by_region = false;      ///< takes regions of different moduli
@@ -48,6 +53,9 @@ struct Exporter {
 std::span<const Exporter> exporters();
 /// @throws Error that lists the table's names.
 const Exporter& exporter_named(const std::string& name);
+
+/// The law that the simulator is given of an object that was learned with `learned`; empty: the reader's choice.
+std::string written_law(const Exporter& exporter, const std::string& learned);
 
 /// Checks the model, gives the exporter what it takes and returns its files.
 /// @throws Error for E <= 0, nu outside [0, 0.5), a missing density where one is needed, no tetrahedra, indices out of

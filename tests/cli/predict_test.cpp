@@ -116,6 +116,18 @@ TEST_F(LearnedBlock, ThatHasSaggedAlreadyIsExportedWithoutGravity) {
   EXPECT_THAT(io::read_file(files_ / "asked's" / "object.inp"), HasSubstr("GRAV"));
 }
 
+/// SOFA's law is not the learned one, and both are solved to say what that does; CalculiX has it.
+TEST_F(LearnedBlock, IsExportedWithTheLawThatItWasLearnedWithOrItIsSaid) {
+  const std::string result = "export " + (files_ / "result").string() + " --json -o " + (files_ / "out").string() + " --to ";
+  const Outcome sofa = run(result + "sofa"), calculix = run(result + "calculix");
+  EXPECT_EQ(sofa.exit_code, 0) << sofa.text;
+  EXPECT_THAT(sofa.text, testing::AllOf(HasSubstr("the law there is corotational, and linear was learned"), HasSubstr("hardest push"),
+                                        HasSubstr("\"law\": \"corotational\""), HasSubstr("\"material\": \"linear\"")));
+  const nlohmann::json json = nlohmann::json::parse(sofa.text.substr(sofa.text.find("{\n")));
+  EXPECT_NEAR(json["hardest_push"]["travel_m"].get<double>() / json["hardest_push"]["learned_travel_m"].get<double>(), 1, 0.05);
+  EXPECT_THAT(calculix.text, testing::AllOf(HasSubstr("\"law\": \"linear\""), testing::Not(HasSubstr("the law there"))));
+}
+
 TEST_F(LearnedBlock, WhoseLawNobodyKnowsIsNotExported) {
   const auto file = files_ / "result" / "result.json";
   std::string bytes = io::read_file(file);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
@@ -15,6 +16,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/fem/boundary.hpp"
+#include "palpate/fem/materials.hpp"
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 #include "palpate/io/exporters.hpp"
@@ -69,9 +71,9 @@ VectorX solved(const ExportModel& model) {
     options.region_stiffness = Eigen::Vector2d(1, model.regions[1].young_modulus_pa / model.young_modulus_pa);
     options.region_poisson = Eigen::Vector2d(std::nan(""), model.regions[1].poisson_ratio);
   }
-  const fem::Statics statics(model.mesh, "linear", boundary, options);
-  const auto at = statics.solve(model.young_modulus_pa, model.poisson_ratio, VectorX::Ones(1), VectorX(0));
-  EXPECT_TRUE(at.converged);
+  const fem::Statics statics(model.mesh, model.law, boundary, options);
+  const auto at = statics.solve(model.young_modulus_pa, model.poisson_ratio, VectorX::Ones(1), VectorX(0), nullptr, model.law_parameters);
+  EXPECT_TRUE(at.converged) << at.reason;
   return at.displacement_m;
 }
 
@@ -131,6 +133,34 @@ TEST_P(EveryExporter, ChangesWithEAndNu) {
   const std::string as_is = all_text(export_files(GetParam(), bar()));
   EXPECT_NE(all_text(export_files(GetParam(), stiffer)), as_is);
   EXPECT_NE(all_text(export_files(GetParam(), other_nu)), as_is);
+}
+
+/// As learned with a law; alpha is foam's.
+ExportModel of_law(ExportModel model, const std::string& law) {
+  model.law = law;
+  if (law == "foam") model.law_parameters = VectorX::Constant(1, 6.0);
+  return model;
+}
+
+/// Whoever learned a law must be able to know whether the file holds it.
+TEST_P(EveryExporter, WritesTheLawThatItSaysItDoes) {
+  std::map<std::string, std::string> seen;
+  for (const std::string& law : GetParam().laws) {
+    EXPECT_NO_THROW(fem::material_law(law)) << law;
+    EXPECT_EQ(written_law(GetParam(), law), law);
+    const auto [same, fresh] = seen.emplace(all_text(export_files(GetParam(), of_law(bar(), law))), law);
+    EXPECT_TRUE(fresh) << law << " is written as " << same->second;
+  }
+  if (GetParam().laws.empty()) {
+    EXPECT_EQ(written_law(GetParam(), "neo_hookean"), "");
+    return;
+  }
+  for (const fem::MaterialLaw* law : fem::material_table()) {
+    const std::string name(law->name()), there = written_law(GetParam(), name);
+    const bool has = std::find(GetParam().laws.begin(), GetParam().laws.end(), name) != GetParam().laws.end();
+    EXPECT_EQ(there, has ? name : GetParam().laws.front());
+    EXPECT_EQ(all_text(export_files(GetParam(), of_law(bar(), name))), all_text(export_files(GetParam(), of_law(bar(), there))));
+  }
 }
 
 TEST_P(EveryExporter, TakesRegionsOrSaysWhoDoes) {
@@ -236,6 +266,42 @@ TEST(Exporters, CalculixSolvesItsFileToTheSameDisplacements) {
     EXPECT_EQ(compared, std::size_t(model.mesh.nodes_m.rows()));
     EXPECT_LT(largest, 2e-6 * ours.cwiseAbs().maxCoeff()) << "7 digits are printed";
   }
+}
+
+/// More than a tenth of the bar's length aside: laws part by much more than the digits that are printed.
+TEST(Exporters, CalculixBearsLargeLoadsWithEveryLawAsWeDo) {
+  if (std::system("command -v ccx > /dev/null 2>&1") != 0) GTEST_SKIP() << "no ccx";
+  std::map<std::string, double> aside_m;
+  for (const char* learned : {"neo_hookean_isochoric", "stvk", "foam"}) {
+    ExportModel model = in_halves(of_law(bar(true), learned));
+    for (auto& [node, force] : model.forces_n) force *= 4;
+    const TemporaryFolder folder("ccx_law");
+    for (const auto& [name, bytes] : export_files(exporter_named("calculix"), model)) folder.put(name, bytes);
+    ASSERT_EQ(std::system(("cd '" + folder.path().string() + "' && OMP_NUM_THREADS=1 ccx object > out 2>&1").c_str()), 0) << learned << folder.get("out");
+    model = of_law(model, written_law(exporter_named("calculix"), learned));
+    if (model.law != "foam") model.law_parameters.resize(0);
+    const VectorX ours = solved(model);
+    VectorX theirs = VectorX::Constant(ours.size(), std::nan(""));  // of all increments the last stays
+    std::istringstream lines(folder.get("object.dat"));
+    for (std::string line; std::getline(lines, line);) {
+      long node = 0;
+      double u[3];
+      if (std::sscanf(line.c_str(), "%ld %lf %lf %lf", &node, &u[0], &u[1], &u[2]) != 4) continue;
+      for (int d = 0; d < 3; ++d) theirs(3 * (node - 1) + d) = u[d];
+    }
+    aside_m[learned] = ours.cwiseAbs().maxCoeff();
+    EXPECT_GT(aside_m[learned], 0.008) << learned;
+    EXPECT_LT((theirs - ours).cwiseAbs().maxCoeff(), 5e-6 * aside_m[learned]) << learned;
+  }
+  EXPECT_EQ(aside_m["foam"], aside_m["neo_hookean_isochoric"]) << "ccx has no foam that works";
+  EXPECT_GT(std::abs(aside_m["foam"] / aside_m["stvk"] - 1), 0.005);
+}
+
+TEST(Exporters, FebioHasTheNeoHookeanLawItself) {
+  const auto text = [](const std::string& law) { return export_files(exporter_named("febio"), of_law(bar(), law)).at("object.feb"); };
+  EXPECT_THAT(text("neo_hookean"), HasSubstr("type=\"neo-Hookean\""));
+  EXPECT_THAT(text("stvk"), HasSubstr("type=\"isotropic elastic\""));
+  EXPECT_THAT(text("neo_hookean"), HasSubstr("<E>50000</E>\n      <v>0.3</v>"));
 }
 
 /// MuJoCo itself lets the exported bar sag under its weight until it rests; small enough that strains are small.
