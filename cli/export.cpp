@@ -28,6 +28,7 @@ struct Options {
   double density_kg_m3 = 0;
   std::vector<double> gravity;
   bool verify = false;
+  std::string elements = "split";
 };
 
 /// A load that bends and shears whatever is there: a thousandth of E times the object's size squared, on every free node.
@@ -54,7 +55,7 @@ std::string quoted(const std::string& text) {
 double difference_to_calculix(io::ExportModel model, const std::string& law, const fs::path& folder, int threads) {
   if (std::system("command -v ccx > /dev/null 2>&1") != 0)
     throw Error("ccx is not installed (Debian: calculix-ccx)", "--verify");
-  if (model.fixed.empty()) throw Error("nothing holds the object, so that a static solver has no answer", "--verify");
+  if (rigid_motions_left(model) > 0) throw Error("nothing holds the object, so that a static solver has no answer", "--verify");
   add_test_load(model);
   fs::create_directories(folder);
   for (const auto& [name, bytes] : io::export_files(io::exporter_named("calculix"), model))
@@ -86,6 +87,7 @@ int run(const Options& given, Session& session) {
   ExportChoice choice;
   choice.density_kg_m3 = given.density_kg_m3;
   if (given.gravity.size() == 3) choice.gravity_m_s2 = Vec3(given.gravity[0], given.gravity[1], given.gravity[2]);
+  choice.elements = given.elements == "corners" ? io::LinearElements::corners : io::LinearElements::split;
   const ExportedObject exported = exported_object(learned, exporter, choice, session.thread_count());
   const io::ExportModel& model = exported.model;
   fs::create_directories(given.out);
@@ -97,7 +99,7 @@ int run(const Options& given, Session& session) {
   session.say(fmt::format("{}: {}", exporter.name, exporter.about));
   for (const std::string& note : exported.notes) session.say(note);
   for (const std::string& warning : exported.warnings) session.warn(warning);
-  const bool coarser = model.mesh.tetrahedra.cols() == 10 && !exporter.quadratic;
+  const bool linear = model.mesh.tetrahedra.cols() == 10 && !exporter.quadratic;
   session.say(fmt::format("open {}", (given.out / exporter.main_file).string()));
   nlohmann::json json = {{"to", exporter.name},
                          {"files", names},
@@ -108,8 +110,12 @@ int run(const Options& given, Session& session) {
                          {"poisson_ratio", model.poisson_ratio},
                          {"density_kg_m3", model.density_kg_m3},
                          {"regions", model.regions.size()},
-                         {"fixed_nodes", model.fixed.size()},
-                         {"elements", coarser ? "corners" : "as_fitted"}};
+                         {"fixed_nodes", exported.holds ? exported.written.fixed.size() : 0},
+                         {"sliding_nodes", exporter.slides ? exported.written.sliding.size() : 0},
+                         {"carries_gravity", exporter.carries_gravity},
+                         {"elements", linear ? given.elements : "as_fitted"},
+                         {"stiffer_by", nullptr}};
+  if (exported.stiffer) json["stiffer_by"] = *exported.stiffer;
   if (!exported.law.empty()) json["law"] = exported.law;
   if (exported.laws) {
     const LawComparison& at = *exported.laws;
@@ -144,6 +150,10 @@ Run verbs::export_(CLI::App& app) {
   app.add_option("--density", given->density_kg_m3, "kg/m3, for simulators of motion (that of the recording)")
       ->check(positive_number());
   app.add_option("--gravity", given->gravity, "X Y Z in m/s2 (that of the recording; none where the shape was measured with its weight on)")->expected(3)->type_name("");
+  app.add_option("--elements", given->elements, "of simulators that take no quadratic tetrahedra: split (each in eight, near to what was fitted) or corners (an eighth of them, stiffer)")
+      ->check(CLI::IsMember({"split", "corners"}))
+      ->type_name("")
+      ->capture_default_str();
   app.add_flag("--verify", given->verify, "calculix: let ccx solve the exported model under a test load and compare");
   return [given](Session& session) { return run(*given, session); };
 }

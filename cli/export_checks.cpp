@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/export_checks.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "palpate/core/error.hpp"
@@ -47,6 +49,12 @@ fem::Boundary pushed(const LearnedObject& learned, const TetMesh& mesh, const St
 fem::Boundary export_boundary(const io::ExportModel& model) {
   fem::Boundary boundary;
   for (const Index node : model.fixed) boundary.constraints.push_back({node, Mat3::Identity(), 3});
+  for (auto it = model.sliding.begin(); it != model.sliding.end();) {  // ascending: a node's axes are neighbours
+    const Index node = it->first;
+    fem::Constraint held{node, Mat3::Identity(), 0};
+    for (; it != model.sliding.end() && it->first == node; ++it) held.axes.col(held.count++) = Vec3::Unit(it->second);
+    boundary.constraints.push_back(held);
+  }
   const Eigen::Index size = 3 * model.mesh.nodes_m.rows();
   boundary.forces.resize(size, 1);
   for (const auto& [node, force] : model.forces_n)
@@ -95,6 +103,60 @@ std::optional<LawComparison> compare_laws(const LearnedObject& learned, const io
   } catch (const Error&) {
     return std::nullopt;  // a remark is no reason to write nothing
   }
+}
+
+std::optional<double> stiffer_elements(const LearnedObject& learned, const io::ExportModel& model, const io::Exporter& exporter,
+                                       io::LinearElements elements, int threads) {
+  const StepFit* push = hardest_push(learned.answer);
+  const fem::StaticsOptions fitted = as_fitted(model, threads);
+  const bool same_mesh = exporter.quadratic || model.mesh.tetrahedra.cols() == 4;
+  if (same_mesh && fitted.dilatation == fem::Dilatation::pointwise) return std::nullopt;
+  if (push == nullptr || model.mesh.nodes_m.rows() > most_nodes) return std::nullopt;
+  try {
+    fem::Boundary boundary = pushed(learned, model.mesh, *push);
+    const VectorX load = boundary.forces.col(0);
+    const OwnAnswer as_fitted_moves = solved_here(model, "linear", boundary, fitted);
+    const io::ExportModel written = same_mesh ? model : io::with_linear_elements(model, elements);
+    if (written.mesh.nodes_m.rows() < model.mesh.nodes_m.rows()) {  // corners: others are no longer there
+      const std::vector<Index> place = io::corner_places(model.mesh);
+      std::vector<fem::Constraint> kept;
+      for (fem::Constraint one : boundary.constraints) {
+        one.node = place[static_cast<std::size_t>(one.node)];
+        if (one.node >= 0) kept.push_back(one);
+      }
+      boundary.constraints = std::move(kept);
+      boundary.motions.resize(3 * written.mesh.nodes_m.rows(), 0);
+    }
+    // The patch of these elements: forces of quadratic ones sit at midpoints, and would dent linear ones.
+    boundary.forces = (fem::spread_over_patch(written.mesh, push->contact_m, push->tool_radius_m) * push->force_n).sparseView();
+    const VectorX there = boundary.forces.col(0);
+    fem::StaticsOptions plain;
+    plain.threads = threads;
+    const OwnAnswer moves = solved_here(written, "linear", boundary, plain);
+    if (!moves.converged || !as_fitted_moves.converged) return std::nullopt;
+    return load.dot(as_fitted_moves.displacement_m) / there.dot(moves.displacement_m) - 1;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+int rigid_motions_left(const io::ExportModel& model) {
+  const Points& nodes = model.mesh.nodes_m;
+  const Vec3 middle = nodes.colwise().mean();
+  const double size_m = (nodes.colwise().maxCoeff() - nodes.colwise().minCoeff()).norm();
+  Eigen::Matrix<double, 6, 6> held = Eigen::Matrix<double, 6, 6>::Zero();
+  const auto hold = [&](Index node, int axis) {
+    Eigen::Matrix<double, 6, 1> row;
+    row << Vec3::Unit(axis), Vec3((nodes.row(node).transpose() - middle).cross(Vec3::Unit(axis)) / size_m);
+    held += row * row.transpose();
+  };
+  for (const Index node : model.fixed)
+    for (int axis = 0; axis < 3; ++axis) hold(node, axis);
+  for (const auto& [node, axis] : model.sliding) hold(node, axis);
+  const double count = std::max(1.0, double(3 * model.fixed.size() + model.sliding.size()));
+  const VectorX values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(held).eigenvalues();
+  constexpr double rounding = 1e-10;
+  return static_cast<int>((values.array() < rounding * count).count());
 }
 
 }  // namespace palpate::cli

@@ -37,4 +37,12 @@ struct LawComparison {
 /// equilibrium. Supports are those that were fitted with, held in both directions.
 std::optional<LawComparison> compare_laws(const LearnedObject& learned, const io::ExportModel& model, const std::string& other, int threads);
 
+/// How much stiffer the elements that are written are than those that were fitted, under the patch of that push (0.05: 5 %), both
+/// linear; nothing as above.
+std::optional<double> stiffer_elements(const LearnedObject& learned, const io::ExportModel& model, const io::Exporter& exporter,
+                                       io::LinearElements elements, int threads);
+
+/// Rigid motions that nothing in the model holds.
+int rigid_motions_left(const io::ExportModel& model);
+
 }  // namespace palpate::cli

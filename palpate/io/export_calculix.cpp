@@ -49,6 +49,13 @@ std::string deck(const ExportModel& model, const std::string& tight, const std::
   if (!model.fixed.empty()) {
     text += "*NSET, NSET=FIXED\n" + joined_indices(model.fixed, ",\n", 1) + "\n*BOUNDARY\nFIXED, 1, 3\n";
   }
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<Index> nodes;
+    for (const auto& [node, along] : model.sliding)
+      if (along == axis) nodes.push_back(node);
+    if (!nodes.empty())
+      text += fmt::format("*NSET, NSET=SLIDES{0}\n{1}\n*BOUNDARY\nSLIDES{0}, {0}, {0}\n", axis + 1, joined_indices(nodes, ",\n", 1));
+  }
   // Large loads are not borne at once: five increments, and more where the solver needs them.
   text += model.law == "linear" ? "*STEP\n*STATIC\n" : "*STEP, NLGEOM, INC=200\n*STATIC\n0.2, 1.\n" + tight;
   const double g = model.gravity_m_s2.norm();

@@ -32,7 +32,9 @@ ExportFiles export_usd(const ExportModel& model) {
       "        float physics:youngsModulus = {:.9g}\n        float physics:poissonsRatio = {:.9g}\n        float "
       "physics:density = {:.9g}\n    }}\n}}\n",
       points, tets, faces, model.young_modulus_pa, model.poisson_ratio, model.density_kg_m3);
-  return {{"object.usda", text}};
+  ExportFiles files = {{"object.usda", text}};
+  if (!model.fixed.empty()) files["held_nodes.txt"] = held_nodes_file(model);
+  return files;
 }
 
 }  // namespace palpate::io
