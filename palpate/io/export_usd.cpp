@@ -23,7 +23,7 @@ ExportFiles export_usd(const ExportModel& model) {
       "#usda 1.0\n(\n    defaultPrim = \"Object\"\n    metersPerUnit = 1\n    kilogramsPerUnit = 1\n    upAxis = "
       "\"Z\"\n)\n\n"
       "def Xform \"Object\"\n{{\n    def TetMesh \"Mesh\" (\n        prepend apiSchemas = "
-      "[\"PhysicsVolumeDeformableSimAPI\", \"PhysicsDeformableBodyAPI\", \"MaterialBindingAPI\"]\n    )\n    {{\n"
+      "[\"PhysicsVolumeDeformableSimAPI\", \"PhysicsDeformableBodyAPI\", \"PhysicsCollisionAPI\", \"MaterialBindingAPI\"]\n    )\n    {{\n"
       "        point3f[] points = [{}]\n        int4[] tetVertexIndices = [{}]\n        int3[] surfaceFaceVertexIndices = "
       "[{}]\n"
       "        rel material:binding:physics = </Object/Material>\n    }}\n\n"

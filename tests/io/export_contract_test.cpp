@@ -389,6 +389,11 @@ TEST(Exporters, CalculixBearsLargeLoadsWithEveryLawAsWeDo) {
   EXPECT_GT(std::abs(aside_m["foam"] / aside_m["stvk"] - 1), 0.005);
 }
 
+/// Without it the body is none that anything can touch.
+TEST(Exporters, UsdsMeshCollides) {
+  EXPECT_THAT(export_files(exporter_named("usd"), bar()).at("object.usda"), HasSubstr("\"PhysicsDeformableBodyAPI\", \"PhysicsCollisionAPI\""));
+}
+
 TEST(Exporters, FebioHasTheNeoHookeanLawItself) {
   const auto text = [](const std::string& law) { return export_files(exporter_named("febio"), of_law(bar(), law)).at("object.feb"); };
   EXPECT_THAT(text("neo_hookean"), HasSubstr("type=\"neo-Hookean\""));
