@@ -2,9 +2,11 @@
 #include "cli/learned_object.hpp"
 
 #include <set>
+#include <utility>
 
 #include "cli/paths.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/estimation/held_body.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/materials.hpp"
 #include "palpate/fem/regions.hpp"
@@ -19,14 +21,22 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// That supports hold altogether (bonded ones).
-std::vector<Index> held_nodes(const Recording& object) {
+/// Nodes that supports hold altogether (bonded ones), and along one axis alone.
+void hold(const Recording& object, io::ExportModel& model) {
   std::set<Index> nodes;
+  std::set<std::pair<Index, int>> sliding;
   for (const Support& support : object.supports) {
-    if (support.contact != ContactLaw::bonded) continue;
-    for (const Index node : fem::support_nodes(*object.rest.volume, support)) nodes.insert(node);
+    if (support.contact != ContactLaw::bonded && !slides_along(support)) continue;
+    for (const Index node : fem::support_nodes(*object.rest.volume, support)) {
+      if (support.contact == ContactLaw::bonded)
+        nodes.insert(node);
+      else
+        sliding.emplace(node, *slides_along(support));
+    }
   }
-  return {nodes.begin(), nodes.end()};
+  model.fixed = {nodes.begin(), nodes.end()};
+  for (const auto& one : sliding)
+    if (!nodes.contains(one.first)) model.sliding.push_back(one);
 }
 
 }  // namespace
@@ -72,12 +82,27 @@ prediction::Elasticity elasticity_of(const LearnedObject& learned) {
   return elasticity;
 }
 
+std::optional<int> slides_along(const Support& support) {
+  if (support.contact != ContactLaw::frictionless || estimation::lifts_off(support)) return std::nullopt;
+  constexpr double rounding = 1e-9;
+  int axis = 0;
+  const double along = support.plane.normal.normalized().cwiseAbs().maxCoeff(&axis);
+  return along > 1 - rounding ? std::optional<int>(axis) : std::nullopt;
+}
+
 io::ExportModel export_model(const LearnedObject& learned, double density_kg_m3, const std::optional<Vec3>& gravity_m_s2) {
   if (gravity_m_s2 && !(gravity_m_s2->norm() <= 100))
     throw Error("must be three numbers in m/s2, 0 0 -9.81 on earth, and at most 100 together", "gravity");
   io::ExportModel model;
   const prediction::Elasticity elasticity = elasticity_of(learned);
   model.mesh = *learned.object.rest.volume;
+  model.law = elasticity.material;
+  model.law_parameters = elasticity.extra;
+  if (elasticity.extra.size() == 0) {  // those that were not fitted stand at where they begin
+    const auto parameters = fem::material_law(elasticity.material).extra_parameters();
+    model.law_parameters.resize(static_cast<Index>(parameters.size()));
+    for (std::size_t i = 0; i < parameters.size(); ++i) model.law_parameters(static_cast<Index>(i)) = parameters[i].initial;
+  }
   model.young_modulus_pa = elasticity.young_modulus_pa;
   model.poisson_ratio = elasticity.poisson_ratio;
   for (std::size_t r = 0; r < elasticity.regions.size(); ++r) {
@@ -92,7 +117,7 @@ io::ExportModel export_model(const LearnedObject& learned, double density_kg_m3,
     model.gravity_m_s2 = *gravity_m_s2;
   else if (sags)
     model.gravity_m_s2 = learned.object.environment.gravity_m_s2;
-  model.fixed = held_nodes(learned.object);
+  hold(learned.object, model);
   return model;
 }
 

@@ -30,6 +30,9 @@ LearnedObject load_learned_object(const std::filesystem::path& out);
 /// @throws Error where the result tells other regions apart than the model
 prediction::Elasticity elasticity_of(const LearnedObject& learned);
 
+/// The axis (0, 1, 2) along which a frictionless support holds its nodes, which slide across it; nothing for other supports.
+std::optional<int> slides_along(const Support& support);
+
 /// As other simulators are to have it.
 /// @param density_kg_m3  0: the recording's
 /// @param gravity_m_s2   nothing: the recording's, where the object was measured without its weight

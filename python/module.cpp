@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "cli/bag_recording.hpp"
+#include "cli/exported_object.hpp"
 #include "cli/learned_object.hpp"
 #include "cli/paths.hpp"
 #include "cli/predicted_push.hpp"
@@ -135,13 +136,17 @@ py::object export_to(const py::object& found, const std::string& to, const py::o
   const fs::path out = path_of(folder);
   cli::must_take_files(out);
   const auto gravity = from_python<std::optional<Vec3>>(gravity_m_s2, Place("gravity_m_s2"));
-  const io::ExportFiles files = io::export_files(exporter, cli::export_model(learned_of(found), density_kg_m3, gravity));
+  const cli::LearnedObject learned = learned_of(found);
+  const cli::ExportedObject exported =
+      without_lock(py::none(), [&](const OnProgress&) { return cli::exported_object(learned, exporter, {density_kg_m3, gravity}, threads_of(0)); });
   fs::create_directories(out);
   std::vector<std::string> names{exporter.main_file};
-  for (const auto& [name, bytes] : files) {
+  for (const auto& [name, bytes] : exported.files) {
     io::write_file(out / name, bytes);
     if (name != exporter.main_file) names.push_back(name);
   }
+  const py::object warn = py::module_::import("warnings").attr("warn");
+  for (const std::string& text : exported.warnings) warn(text, py::arg("stacklevel") = 2);  // where export was called
   return to_python(names);
 }
 

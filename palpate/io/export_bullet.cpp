@@ -24,6 +24,8 @@ ExportFiles export_bullet(const ExportModel& model) {
       "collisionMargin=0.001,\n    )\n",
       model.young_modulus_pa, model.poisson_ratio, model.density_kg_m3 * volume, lame.mu_pa * 4 / 3,
       lame.lambda_pa + 5 * lame.mu_pa / 6);
+  const Vec3& g = model.gravity_m_s2;
+  text += fmt::format("    p.setGravity({:.15g}, {:.15g}, {:.15g})\n", g.x(), g.y(), g.z());
   text += "    for node in [" + joined_indices(model.fixed, ", ", 0) +
           "]:\n        p.createSoftBodyAnchor(body, node, -1, -1)\n    return body\n";
   return {{"object.py", text}, {"object.vtk", ascii_vtk(model)}};

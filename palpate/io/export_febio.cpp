@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// FEBio 4 (febio_spec 4.0). `isotropic elastic` is St. Venant-Kirchhoff: E and nu are those of small strains.
+// FEBio 4 (febio_spec 4.0). Its `neo-Hookean` has the stress (mu (b - I) + lambda ln J I) / J, our neo_hookean; `isotropic
+// elastic` is St. Venant-Kirchhoff. E and nu are those of small strains.
 #include <fmt/format.h>
+
+#include <array>
 
 #include "palpate/io/export_formats.hpp"
 
@@ -29,9 +32,10 @@ ExportFiles export_febio(const ExportModel& model) {
   for (std::size_t r = 0; r < parts.size(); ++r) {
     if (!model.regions.empty()) text += "    <!-- region " + std::to_string(r + 1) + ": " + without_dashes(parts[r].name) + " -->\n";
     text += fmt::format(
-        "    <material id=\"{}\" name=\"{}\" type=\"isotropic elastic\">\n      <density>{:.15g}</density>\n"
+        "    <material id=\"{}\" name=\"{}\" type=\"{}\">\n      <density>{:.15g}</density>\n"
         "      <E>{:.15g}</E>\n      <v>{:.15g}</v>\n    </material>\n",
-        r + 1, numbered("learned", r), model.density_kg_m3 > 0 ? model.density_kg_m3 : 1.0, parts[r].young_modulus_pa, parts[r].poisson_ratio);
+        r + 1, numbered("learned", r), model.law == "stvk" ? "isotropic elastic" : "neo-Hookean",
+        model.density_kg_m3 > 0 ? model.density_kg_m3 : 1.0, parts[r].young_modulus_pa, parts[r].poisson_ratio);
   }
   text += "  </Material>\n  <Mesh>\n    <Nodes name=\"all\">\n";
   for (Eigen::Index i = 0; i < mesh.nodes_m.rows(); ++i)
@@ -50,16 +54,25 @@ ExportFiles export_febio(const ExportModel& model) {
     text += "    </Elements>\n";
   }
   if (!model.fixed.empty()) text += "    <NodeSet name=\"fixed\">" + joined_indices(model.fixed, ",", 1) + "</NodeSet>\n";
+  std::array<std::vector<Index>, 3> slides;
+  for (const auto& [node, axis] : model.sliding) slides[static_cast<std::size_t>(axis)].push_back(node);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (!slides[axis].empty()) text += fmt::format("    <NodeSet name=\"slides{}\">{}</NodeSet>\n", axis + 1, joined_indices(slides[axis], ",", 1));
   for (std::size_t i = 0; i < model.forces_n.size(); ++i)
     text += fmt::format("    <NodeSet name=\"load{}\">{}</NodeSet>\n", i + 1, model.forces_n[i].first + 1);
   text += "  </Mesh>\n  <MeshDomains>\n";
   for (std::size_t r = 0; r < parts.size(); ++r)
     text += fmt::format("    <SolidDomain name=\"{}\" mat=\"{}\"/>\n", numbered("object", r), numbered("learned", r));
   text += "  </MeshDomains>\n";
-  if (!model.fixed.empty())
-    text +=
-        "  <Boundary>\n    <bc name=\"held\" node_set=\"fixed\" type=\"zero displacement\">\n      <x_dof>1</x_dof>\n"
-        "      <y_dof>1</y_dof>\n      <z_dof>1</z_dof>\n    </bc>\n  </Boundary>\n";
+  if (!model.fixed.empty() || !model.sliding.empty()) text += "  <Boundary>\n";
+  const auto held = [&](const std::string& nodes, int x, int y, int z) {
+    text += fmt::format("    <bc name=\"held {0}\" node_set=\"{0}\" type=\"zero displacement\">\n      <x_dof>{1}</x_dof>\n"
+                        "      <y_dof>{2}</y_dof>\n      <z_dof>{3}</z_dof>\n    </bc>\n", nodes, x, y, z);
+  };
+  if (!model.fixed.empty()) held("fixed", 1, 1, 1);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (!slides[axis].empty()) held(fmt::format("slides{}", axis + 1), axis == 0, axis == 1, axis == 2);
+  if (!model.fixed.empty() || !model.sliding.empty()) text += "  </Boundary>\n";
   const bool falls = model.gravity_m_s2.norm() > 0 && model.density_kg_m3 > 0;
   if (falls || !model.forces_n.empty()) {
     text += "  <Loads>\n";

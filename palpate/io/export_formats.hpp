@@ -24,6 +24,8 @@ LameConstants lame_constants(double young_modulus_pa, double poisson_ratio);
 std::string joined_indices(const std::vector<Index>& indices, const char* separator, Index first);
 /// The mesh as legacy VTK, ASCII.
 std::string ascii_vtk(const ExportModel& model);
+/// The held nodes, one a line, for simulators whose file cannot hold them.
+std::string held_nodes_file(const ExportModel& model);
 /// Of a region, ascending.
 std::vector<Index> elements_of(const ExportModel& model, std::size_t region);
 /// The boundary as outward triangles.

@@ -23,7 +23,7 @@ ExportFiles export_usd(const ExportModel& model) {
       "#usda 1.0\n(\n    defaultPrim = \"Object\"\n    metersPerUnit = 1\n    kilogramsPerUnit = 1\n    upAxis = "
       "\"Z\"\n)\n\n"
       "def Xform \"Object\"\n{{\n    def TetMesh \"Mesh\" (\n        prepend apiSchemas = "
-      "[\"PhysicsVolumeDeformableSimAPI\", \"PhysicsDeformableBodyAPI\", \"MaterialBindingAPI\"]\n    )\n    {{\n"
+      "[\"PhysicsVolumeDeformableSimAPI\", \"PhysicsDeformableBodyAPI\", \"PhysicsCollisionAPI\", \"MaterialBindingAPI\"]\n    )\n    {{\n"
       "        point3f[] points = [{}]\n        int4[] tetVertexIndices = [{}]\n        int3[] surfaceFaceVertexIndices = "
       "[{}]\n"
       "        rel material:binding:physics = </Object/Material>\n    }}\n\n"
@@ -32,7 +32,9 @@ ExportFiles export_usd(const ExportModel& model) {
       "        float physics:youngsModulus = {:.9g}\n        float physics:poissonsRatio = {:.9g}\n        float "
       "physics:density = {:.9g}\n    }}\n}}\n",
       points, tets, faces, model.young_modulus_pa, model.poisson_ratio, model.density_kg_m3);
-  return {{"object.usda", text}};
+  ExportFiles files = {{"object.usda", text}};
+  if (!model.fixed.empty()) files["held_nodes.txt"] = held_nodes_file(model);
+  return files;
 }
 
 }  // namespace palpate::io

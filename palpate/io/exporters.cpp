@@ -13,22 +13,74 @@
 namespace palpate::io {
 
 std::span<const Exporter> exporters() {
-  static const std::array<Exporter, 8> table = {{
-      {"calculix", "object.inp", "CalculiX: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, true, export_calculix},
-      {"abaqus", "object.inp", "Abaqus: C3D4 or C3D10, *ELASTIC; nothing to correct", true, false, true, export_abaqus},
-      {"febio", "object.feb", "FEBio 4: tet4 or tet10, isotropic elastic; nothing to correct", true, false, true, export_febio},
-      {"sofa", "object.scn", "SOFA: TetrahedronFEMForceField, method large (corotational); nothing to correct", false, true, true,
-       export_sofa},
-      {"mujoco", "object.xml",
-       "MuJoCo 3.13 or later: flex; E and nu are changed so that its energy, which uses 2 lambda, becomes ours", false, true,
-       false, export_mujoco},
-      {"drake", "object.sdf", "Drake: SDF with deformable_properties, linear_corotated (its neohookean would act softer)",
-       false, true, false, export_drake},
-      {"bullet", "object.py",
-       "PyBullet: loadSoftBody with its Neo-Hookean law; its constants are changed so that small strains agree", false, true,
-       false, export_bullet},
-      {"usd", "object.usda", "USD: volume deformable body and material of UsdPhysics", false, true, false, export_usd},
-  }};
+  static const std::vector<Exporter> table = {
+      {.name = "calculix",
+       .main_file = "object.inp",
+       .about = "CalculiX: C3D4 or C3D10, *HYPERELASTIC, NEO HOOKE (its volume change costs K/2 (J - 1)^2); *ELASTIC of what was "
+                "learned as linear or stvk",
+       .laws = {"neo_hookean_isochoric", "linear", "stvk"},
+       .quadratic = true,
+       .by_region = true,
+       .carries_gravity = true,
+       .slides = true,
+       .write = export_calculix},
+      {.name = "abaqus",
+       .main_file = "object.inp",
+       .about = "Abaqus: C3D4 or C3D10, *HYPERELASTIC, NEO HOOKE (its volume change costs K/2 (J - 1)^2); *ELASTIC of what was "
+                "learned as linear, *HYPERFOAM of foam",
+       .laws = {"neo_hookean_isochoric", "linear", "foam"},
+       .quadratic = true,
+       .by_region = true,
+       .carries_gravity = true,
+       .slides = true,
+       .write = export_abaqus},
+      {.name = "febio",
+       .main_file = "object.feb",
+       .about = "FEBio 4: tet4 or tet10, neo-Hookean; isotropic elastic of what was learned as stvk",
+       .laws = {"neo_hookean", "stvk"},
+       .quadratic = true,
+       .by_region = true,
+       .carries_gravity = true,
+       .slides = true,
+       .write = export_febio},
+      {.name = "sofa",
+       .main_file = "object.scn",
+       .about = "SOFA: TetrahedronFEMForceField, method large (corotational); E and nu as they are",
+       .laws = {"corotational"},
+       .needs_density = true,
+       .by_region = true,
+       .carries_gravity = true,
+       .write = export_sofa},
+      {.name = "mujoco",
+       .main_file = "object.xml",
+       .about = "MuJoCo 3.13 or later: flex (stvk); E and nu are changed so that its energy, which uses 2 lambda, becomes ours",
+       .laws = {"stvk"},
+       .needs_density = true,
+       .carries_gravity = true,
+       .write = export_mujoco},
+      {.name = "drake",
+       .main_file = "object.sdf",
+       .about = "Drake: SDF with deformable_properties, linear_corotated (its neohookean would act softer)",
+       .laws = {"corotational"},
+       .needs_density = true,
+       .gravity_set_by = "plant.mutable_gravity_field().set_gravity_vector()",
+       .holds = Holds::half_space,
+       .write = export_drake},
+      {.name = "bullet",
+       .main_file = "object.py",
+       .about = "PyBullet: loadSoftBody with its Neo-Hookean law (neo_hookean_stable); its constants are changed so that small strains agree",
+       .laws = {"neo_hookean_stable"},
+       .needs_density = true,
+       .carries_gravity = true,
+       .write = export_bullet},
+      {.name = "usd",
+       .main_file = "object.usda",
+       .about = "USD: volume deformable body and material of UsdPhysics; the law is the reader's",
+       .needs_density = true,
+       .gravity_set_by = "the stage's PhysicsScene",
+       .holds = Holds::nothing,
+       .write = export_usd},
+  };
   return table;
 }
 
@@ -44,48 +96,10 @@ const Exporter& exporter_named(const std::string& name) {
               name);
 }
 
-ExportModel with_linear_elements(const ExportModel& model) {
-  if (model.mesh.tetrahedra.cols() == 4) return model;
-  ExportModel linear = model;
-  const Index nodes = static_cast<Index>(model.mesh.nodes_m.rows());
-  std::vector<Index> place(static_cast<std::size_t>(nodes), -1);
-  constexpr int edges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
-  std::vector<std::pair<Index, Index>> ends(static_cast<std::size_t>(nodes), {-1, -1});
-  Index count = 0;
-  linear.mesh.tetrahedra.resize(model.mesh.tetrahedra.rows(), 4);
-  for (Eigen::Index t = 0; t < model.mesh.tetrahedra.rows(); ++t) {
-    for (int k = 0; k < 4; ++k) place[static_cast<std::size_t>(model.mesh.tetrahedra(t, k))] = 0;
-    for (int e = 0; e < 6; ++e)
-      ends[static_cast<std::size_t>(model.mesh.tetrahedra(t, 4 + e))] = {model.mesh.tetrahedra(t, edges[e][0]),
-                                                                         model.mesh.tetrahedra(t, edges[e][1])};
-  }
-  for (Index& one : place)
-    if (one == 0) one = count++;
-  linear.mesh.nodes_m.resize(count, 3);
-  for (Index i = 0; i < nodes; ++i)
-    if (place[static_cast<std::size_t>(i)] >= 0)
-      linear.mesh.nodes_m.row(place[static_cast<std::size_t>(i)]) = model.mesh.nodes_m.row(i);
-  for (Eigen::Index t = 0; t < model.mesh.tetrahedra.rows(); ++t)
-    for (int k = 0; k < 4; ++k) linear.mesh.tetrahedra(t, k) = place[static_cast<std::size_t>(model.mesh.tetrahedra(t, k))];
-  linear.fixed.clear();
-  for (const Index node : model.fixed)
-    if (place[static_cast<std::size_t>(node)] >= 0) linear.fixed.push_back(place[static_cast<std::size_t>(node)]);
-  std::map<Index, Vec3> forces;
-  const auto add = [&](Index node, const Vec3& force) {
-    auto [it, fresh] = forces.emplace(place[static_cast<std::size_t>(node)], force);
-    if (!fresh) it->second += force;
-  };
-  for (const auto& [node, force] : model.forces_n) {
-    const auto& [a, b] = ends[static_cast<std::size_t>(node)];
-    if (place[static_cast<std::size_t>(node)] >= 0) {
-      add(node, force);
-    } else if (a >= 0) {
-      add(a, 0.5 * force);
-      add(b, 0.5 * force);
-    }
-  }
-  linear.forces_n.assign(forces.begin(), forces.end());
-  return linear;
+std::string written_law(const Exporter& exporter, const std::string& learned) {
+  if (exporter.laws.empty()) return {};
+  const auto same = std::find(exporter.laws.begin(), exporter.laws.end(), learned);
+  return same == exporter.laws.end() ? exporter.laws.front() : *same;
 }
 
 namespace {
@@ -110,7 +124,7 @@ void check_regions(const Exporter& exporter, const ExportModel& model) {
 
 }  // namespace
 
-ExportFiles export_files(const Exporter& exporter, const ExportModel& model) {
+ExportModel written_model(const Exporter& exporter, const ExportModel& model, LinearElements elements) {
   const auto nodes = model.mesh.nodes_m.rows();
   if (model.mesh.tetrahedra.rows() == 0) throw Error("has no tetrahedra", "export: mesh");
   if (model.mesh.tetrahedra.minCoeff() < 0 || model.mesh.tetrahedra.maxCoeff() >= nodes)
@@ -120,11 +134,21 @@ ExportFiles export_files(const Exporter& exporter, const ExportModel& model) {
   if (!model.regions.empty()) check_regions(exporter, model);
   if (exporter.needs_density && !(model.density_kg_m3 > 0))
     throw Error(exporter.name + " simulates motion: give the object's density, kg/m3", "export: density_kg_m3");
+  if (exporter.carries_gravity && model.gravity_m_s2.norm() > 0 && !(model.density_kg_m3 > 0))
+    throw Error("gravity needs the object's density, kg/m3", "export: density_kg_m3");
   const auto outside = [&](Index node) { return node < 0 || node >= nodes; };
   if (std::any_of(model.fixed.begin(), model.fixed.end(), outside) ||
+      std::any_of(model.sliding.begin(), model.sliding.end(), [&](const auto& one) { return outside(one.first) || one.second < 0 || one.second > 2; }) ||
       std::any_of(model.forces_n.begin(), model.forces_n.end(), [&](const auto& one) { return outside(one.first); }))
-    throw Error("names nodes that are not there", "export: fixed, forces_n");
-  return exporter.write(exporter.quadratic ? model : with_linear_elements(model));
+    throw Error("names nodes that are not there", "export: fixed, sliding, forces_n");
+  ExportModel written = exporter.quadratic ? model : with_linear_elements(model, elements);
+  written.law = written_law(exporter, model.law);
+  if (written.law == "foam" && model.law_parameters.size() != 1) throw Error("foam needs its alpha", "export: law_parameters");
+  return written;
+}
+
+ExportFiles export_files(const Exporter& exporter, const ExportModel& model, LinearElements elements) {
+  return exporter.write(written_model(exporter, model, elements));
 }
 
 LameConstants lame_constants(double young, double nu) {
@@ -135,6 +159,10 @@ std::string joined_indices(const std::vector<Index>& indices, const char* separa
   std::string text;
   for (const Index index : indices) text += (text.empty() ? "" : separator) + std::to_string(index + first);
   return text;
+}
+
+std::string held_nodes_file(const ExportModel& model) {
+  return "# nodes that supports hold, counted from 0: hold them in the simulator\n" + joined_indices(model.fixed, "\n", 0) + "\n";
 }
 
 std::vector<Index> elements_of(const ExportModel& model, std::size_t region) {

@@ -174,7 +174,9 @@ def predict(found: Identified, *, contact_m=None, direction=(0, 0, -1), force_n=
 
 
 def export(found: Identified, to: str, folder: str | PathLike[str], *, density_kg_m3=0.0, gravity_m_s2=None) -> list[str]:
-    """The learned object for a simulator, one of exporters(). Returns the names of the files, the one to open first."""
+    """The learned object for a simulator, one of exporters(). Returns the names of the files, the one to open first.
+
+    What the files do not hold as it was learned (the law, supports, gravity) is said by `warnings.warn`."""
     return _palpate.export(found, to, folder, density_kg_m3, gravity_m_s2)
 
 

@@ -116,6 +116,63 @@ TEST_F(LearnedBlock, ThatHasSaggedAlreadyIsExportedWithoutGravity) {
   EXPECT_THAT(io::read_file(files_ / "asked's" / "object.inp"), HasSubstr("GRAV"));
 }
 
+/// SOFA's law is not the learned one, and both are solved to say what that does; CalculiX has it.
+TEST_F(LearnedBlock, IsExportedWithTheLawThatItWasLearnedWithOrItIsSaid) {
+  const std::string result = "export " + (files_ / "result").string() + " --json -o " + (files_ / "out").string() + " --to ";
+  const Outcome sofa = run(result + "sofa"), calculix = run(result + "calculix");
+  EXPECT_EQ(sofa.exit_code, 0) << sofa.text;
+  EXPECT_THAT(sofa.text, testing::AllOf(HasSubstr("the law there is corotational, and linear was learned"), HasSubstr("hardest push"),
+                                        HasSubstr("\"law\": \"corotational\""), HasSubstr("\"material\": \"linear\"")));
+  const nlohmann::json json = nlohmann::json::parse(sofa.text.substr(sofa.text.find("{\n")));
+  EXPECT_NEAR(json["hardest_push"]["travel_m"].get<double>() / json["hardest_push"]["learned_travel_m"].get<double>(), 1, 0.05);
+  EXPECT_THAT(calculix.text, testing::AllOf(HasSubstr("\"law\": \"linear\""), testing::Not(HasSubstr("the law there"))));
+}
+
+/// Drake's world pulls with 9.81 m/s2 unless it is told, and its files have no place for a node.
+TEST_F(LearnedBlock, IsExportedWithWhatItsFilesLackSaid) {
+  const std::string out = " --json -o " + (files_ / "out").string(), result = "export " + (files_ / "result").string();
+  const Outcome drake = run(result + " --to drake" + out), asked = run(result + " --to drake --gravity 0 0 -9.81" + out), usd = run(result + " --to usd" + out);
+  EXPECT_THAT(drake.text, testing::AllOf(HasSubstr("set_gravity_vector() to 0 0 0 m/s2, since"), testing::Not(HasSubstr("gravity is left out"))));
+  EXPECT_THAT(asked.text, testing::AllOf(HasSubstr("to 0 0 -9.81 m/s2"), HasSubstr("sags once more")));
+  EXPECT_THAT(drake.text, testing::AllOf(testing::Not(HasSubstr("held_nodes")), testing::Not(HasSubstr("\"fixed_nodes\": 0"))));
+  EXPECT_THAT(usd.text, testing::AllOf(HasSubstr("nodes that supports hold are free in object.usda"), HasSubstr("\"fixed_nodes\": 0")));
+  EXPECT_TRUE(std::filesystem::exists(files_ / "out" / "held_nodes.txt"));
+
+  std::string recording = io::read_file(files_ / "result" / "model" / "recording.yaml");
+  const auto at = recording.find("density_kg_m3:");
+  ASSERT_NE(at, std::string::npos) << recording;
+  recording.insert(at, "# ");
+  for (const auto& [there, weightless] : {std::pair<std::string, std::string>("gravity_m_s2: [0, 0, -9.81]", "gravity_m_s2: [0, 0, 0]"),
+                                          {"state: under_gravity", "state: stress_free"}}) {
+    ASSERT_NE(recording.find(there), std::string::npos) << recording;
+    recording.replace(recording.find(there), there.size(), weightless);
+  }
+  io::write_file(files_ / "result" / "model" / "recording.yaml", recording);
+  const Outcome light = run(result + " --to calculix --gravity 0 0 -9.81" + out);
+  EXPECT_EQ(light.exit_code, 3) << light.text;
+  EXPECT_THAT(light.text, testing::AllOf(HasSubstr("gravity needs the object's density"), HasSubstr("--density")));
+}
+
+/// What holds an object in its recording need not be in a file; nor does a static solver answer where nothing holds it.
+TEST_F(LearnedBlock, IsExportedWithTheSupportsThatAreLeftOutSaid) {
+  const auto file = files_ / "result" / "model" / "recording.yaml";
+  const std::string recording = io::read_file(file), result = "export " + (files_ / "result").string() + " -o " + (files_ / "out").string() + " --to ";
+  const auto from = recording.find("supports:"), to = recording.find("\n", recording.find("\n", from) + 1);
+  ASSERT_NE(from, std::string::npos);
+  const auto with = [&](const std::string& kind, const std::string& contact) {
+    std::string other = recording;
+    other.replace(from, to - from, "supports:\n  - {kind: " + kind + ", name: \"foot\", point_m: [0, 0, 0], normal: [0, 0, 1], tolerance_m: 0.0001, contact: " + contact + "}");
+    io::write_file(file, other);
+  };
+  with("plane", "frictionless");
+  const Outcome slides = run(result + "calculix"), sofa = run(result + "sofa");
+  EXPECT_THAT(slides.text, testing::AllOf(HasSubstr("holds 3 of the 6 rigid motions"), testing::Not(HasSubstr("is not written"))));
+  EXPECT_THAT(io::read_file(files_ / "out" / "object.inp"), HasSubstr("SLIDES3, 3, 3"));
+  EXPECT_THAT(sofa.text, HasSubstr("support 'foot' is not written: what it holds slides"));
+  with("table", "frictionless");
+  EXPECT_THAT(run(result + "calculix").text, testing::AllOf(HasSubstr("support 'foot' is not written: it only pushes"), HasSubstr("holds 6 of the 6")));
+}
+
 TEST_F(LearnedBlock, WhoseLawNobodyKnowsIsNotExported) {
   const auto file = files_ / "result" / "result.json";
   std::string bytes = io::read_file(file);

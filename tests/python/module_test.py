@@ -116,6 +116,8 @@ class Identified(unittest.TestCase):
             for name in palpate.exporters():
                 files = palpate.export(found, name, f"{folder}/{name}", density_kg_m3=30)
                 self.assertTrue(os.path.getsize(f"{folder}/{name}/{files[0]}") > 0, name)
+            with self.assertWarnsRegex(UserWarning, "the law there is stvk, and"):
+                palpate.export(found, "mujoco", f"{folder}/again", density_kg_m3=30)
         pressed = palpate.predict(found, contact_m=[0.03, 0.025, 0.08], radius_m=0.01, force_n=0.5)
         self.assertTrue(pressed.converged)
         self.assertEqual(pressed.displacement_m.shape, found.volume.nodes_m.shape)
