@@ -86,6 +86,15 @@ TEST_F(LearnedBlock, IsPressedOnItsSurfaceAndIntoIt) {
   }
 }
 
+/// Of a push that the fit has seen it says what the fit says, to the way in which the volume change is integrated.
+TEST_F(LearnedBlock, IsPressedAsItWasFitted) {
+  const nlohmann::json step = nlohmann::json::parse(io::read_file(files_ / "result" / "result.json")).at("steps").back();
+  const Outcome outcome = run("predict " + (files_ / "result").string() + " --contact 0.045 0.02 0.03 --force 0.12 --json --quiet");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.text;
+  const double travel_m = nlohmann::json::parse(outcome.text).at("travel_m").at("value");
+  EXPECT_NEAR(travel_m / step.at("travel_predicted_m").get<double>(), 1, 1e-5);
+}
+
 /// Learned with up to 0.12 N on a disc of 12 mm, 265 Pa.
 TEST_F(LearnedBlock, PressedHarderThanItWasLearnedIsSaid) {
   const std::string there = "--contact 0.03 0.02 0.03 --force ", said = "times as hard as any push that the object was learned from";
@@ -101,6 +110,7 @@ TEST_F(LearnedBlock, YieldsToTheSmallestForce) {
   const Outcome outcome = predict("--contact 0.03 0.02 0.03 --force 1e-9 --json");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
   EXPECT_THAT(outcome.text, HasSubstr("\"stiffness_n_m\""));
+  EXPECT_THAT(predict("--contact 0.03 0.02 0.03 --force 1e-9").text, HasSubstr("1.00e-09 N"));
 }
 
 /// The shape was measured with its weight on: a simulator that pulls at it again would let it sag twice.
