@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 
@@ -32,8 +33,8 @@ struct Outcome {
 
 class AsLearned : public testing::Test {
  protected:
-  Outcome run(const std::string& arguments) const {
-    FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " 2>&1").c_str(), "r");
+  Outcome run(const std::string& arguments, const char* said = "2>&1") const {
+    FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " " + said).c_str(), "r");
     Outcome out;
     std::array<char, 4096> buffer;
     while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) out.text.append(buffer.data(), count);
@@ -50,13 +51,14 @@ class AsLearned : public testing::Test {
     recording.model.material = "linear";
     recording.model.poisson_fixed = poisson;
     for (std::size_t s = 0; s < recording.pushes[0].steps.size(); ++s) recording.pushes[0].steps[s].time_s = static_cast<double>(s);
+    std::filesystem::remove_all(files_ / "recording");
     io::write_recording(recording, files_ / "recording");
     const Outcome learned = run("estimate " + (files_ / "recording").string() + " -o " + result() + " --quiet");
     ASSERT_EQ(learned.exit_code, 0) << learned.text;
   }
   std::string result() const { return (files_ / "result").string(); }
   Outcome predict(const std::string& arguments) const {
-    Outcome out = run("predict " + result() + " --json --quiet " + arguments);
+    Outcome out = run("predict " + result() + " --json --quiet " + arguments, "2>/dev/null");
     EXPECT_EQ(out.exit_code, 0) << out.text;
     return out;
   }
@@ -127,7 +129,7 @@ TEST_F(AsLearned, ABallThatWasDrivenPressesAsHertzSays) {
     EXPECT_NEAR(by_travel.json.at("force_n").at("std").get<double>() / last_step().at("force_predicted_std_n").get<double>(), 1, 0.02);
     const Outcome by_force = predict(fmt::format("--contact 0.04 0.04 0.05 --force {}", by_travel.value("force_n")));
     EXPECT_NEAR(by_force.value("travel_m"), 0.002, 2e-6);
-    EXPECT_NEAR(by_force.value("stiffness_n_m") / by_travel.value("stiffness_n_m"), 1, 1e-3);
+    EXPECT_NEAR(by_force.json.at("stiffness_n_m").get<double>() / by_travel.json.at("stiffness_n_m").get<double>(), 1, 1e-3);
   }
   // Who states a patch has its force spread over it.
   EXPECT_GT(predict("--contact 0.04 0.04 0.05 --travel 0.002 --radius 0.015").value("force_n"), 2 * measured_n);
@@ -163,12 +165,12 @@ class PressedByADisc : public AsLearned {
     for (std::size_t s = 0; s < 2; ++s) recording.pushes[0].steps[s].observations = {ToolTravel{"", travels_m[s], 1e-5}};
     return recording;
   }
-  void agrees_with_fit(const std::string& contact) const {
+  void agrees_with_fit(const std::string& contact, double within = 1e-4) const {
     const double fitted_m = last_step().at("travel_predicted_m");
     const Outcome by_force = predict(contact + " --force 0.1");
-    EXPECT_NEAR(by_force.value("travel_m") / fitted_m, 1, 1e-4);
+    EXPECT_NEAR(by_force.value("travel_m") / fitted_m, 1, within);
     EXPECT_NEAR(by_force.json.at("travel_m").at("std").get<double>() / last_step().at("travel_predicted_std_m").get<double>(), 1, 0.02);
-    EXPECT_NEAR(predict(contact + fmt::format(" --travel {}", fitted_m)).value("force_n"), 0.1, 1e-4);
+    EXPECT_NEAR(predict(contact + fmt::format(" --travel {}", fitted_m)).value("force_n"), 0.1, 0.1 * within);
   }
 };
 
@@ -193,7 +195,7 @@ TEST_F(PressedByADisc, OnASupportThatGivesWay) {
   Support support = base(SupportKind::plane, ContactLaw::bonded);
   support.compliance_m_per_n = 0.002;
   learn(pressed(support, 0.025));
-  agrees_with_fit("--contact 0.03 0.025 0.03");
+  agrees_with_fit("--contact 0.03 0.025 0.03", 4e-3);  // the fit also turns the object under the push
   // In the middle all of the object comes down by F times that.
   const Outcome middle = predict("--contact 0.03 0.02 0.03 --force 0.1");
   std::string yaml = io::read_file(files_ / "result" / "model" / "recording.yaml");
