@@ -2,6 +2,7 @@
 // `palpate predict OUT --contact X Y Z --force F`: what the learned object does under a new push, with bands.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -63,10 +64,11 @@ int run(const Options& given, Session& session) {
     return exit_numbers;
   }
   for (const std::string& warning : warnings) session.warn(warning);
+  constexpr double no_band = 1e-6;  // of the value: what rounding leaves of one
   const auto tell = [&](const char* what, const prediction::Band& band, const char* unit) {
     session.say(
         fmt::format("{:<20} {}{}", what, report::quantity(band.value, unit),
-                    band.std > 0 ? "   95 % band " + report::interval(band.lower_95, band.upper_95, unit) : "   (given)"));
+                    band.std > no_band * std::abs(band.value) ? "   95 % band " + report::interval(band.lower_95, band.upper_95, unit) : "   (given)"));
   };
   tell("force", found.force_n, "N");
   tell("travel", found.travel_m, "m");
@@ -111,15 +113,15 @@ int run(const Options& given, Session& session) {
 Run verbs::predict(CLI::App& app) {
   auto given = std::make_shared<Options>();
   app.add_option("result", given->result, "folder that `palpate estimate` wrote")->required();
-  app.add_option("--contact", given->contact, "where the push acts, X Y Z in metres, base frame")
+  app.add_option("--contact", given->contact, "where the push acts, X Y Z in metres, base frame (not of a platen)")
       ->check(finite_number())
       ->expected(3)
       ->type_name("");
-  app.add_option("--direction", given->direction, "of the push, into the object (0 0 -1)")->check(finite_number())->expected(3)->type_name("");
+  app.add_option("--direction", given->direction, "of the push, into the object (0 0 -1; a platen goes along its normal)")->check(finite_number())->expected(3)->type_name("");
   app.add_option("--force", given->force_n, "along the direction, N")->check(positive_number());
-  app.add_option("--travel", given->travel_m, "of the pressed patch along the direction, m, instead of a force")->check(positive_number());
-  app.add_option("--tool", given->tool, "tool of the recording (its only one)");
-  app.add_option("--radius", given->radius_m, "radius of the pressed patch, m (that of the tool)")
+  app.add_option("--travel", given->travel_m, "of the pressed patch or the rigid tool along the direction, m, instead of a force")->check(positive_number());
+  app.add_option("--tool", given->tool, "tool of the recording (its only one); one whose motion was imposed moves as a rigid body");
+  app.add_option("--radius", given->radius_m, "radius of a patch that is pressed evenly, m; with --tool: that tool's own (that of the tool)")
       ->check(positive_number());
   app.add_option("-o,--out", given->out,
                  "folder for prediction.json and prediction.vtu (displacement and stress with bands)");

@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cli/pressed_scene.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/estimation/held_body.hpp"
-#include "palpate/estimation/load_columns.hpp"
-#include "palpate/fem/boundary.hpp"
+#include "palpate/estimation/fit.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/report/words.hpp"
@@ -34,38 +33,6 @@ Tool tool_of(const AskedPush& asked, const Recording& object) {
   }
   if (asked.radius_m > 0) tool.radius_m = asked.radius_m;
   return tool;
-}
-
-fem::Boundary boundary_of(const Recording& object, const Tool& tool, const Load& load, VectorX& background) {
-  const TetMesh& mesh = *object.rest.volume;
-  fem::Boundary boundary;
-  const auto patch = estimation::load_columns(mesh, tool, load);
-  // Of a shape that was seen while it sagged, the weight is in the shape.
-  const bool heavy = object.rest.state == RestState::stress_free && object.environment.gravity_m_s2.norm() > 0;
-  std::vector<Eigen::Triplet<double>> entries;
-  const auto put = [&](const Eigen::SparseMatrix<double>& columns, int first) {
-    for (int c = 0; c < 3; ++c)
-      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, c); it; ++it)
-        entries.emplace_back(int(it.row()), first + c, it.value());
-  };
-  put(patch, 0);
-  if (heavy) {
-    if (!(object.density_kg_m3 > 0))
-      throw Error("gravity acts, so the density is needed", "model/recording.yaml: density_kg_m3");
-    put(fem::body_force(mesh), 3);
-    background = object.density_kg_m3 * object.environment.gravity_m_s2;
-  }
-  boundary.forces.resize(3 * mesh.nodes_m.rows(), heavy ? 6 : 3);
-  boundary.forces.setFromTriplets(entries.begin(), entries.end());
-  boundary.inertia_relief = object.free;
-  if (object.free) {
-    boundary.motions.resize(3 * mesh.nodes_m.rows(), 0);
-  } else {
-    estimation::HeldBody held = estimation::hold(mesh, object.supports, {});
-    boundary.constraints = std::move(held.constraints);
-    boundary.motions = std::move(held.motions);
-  }
-  return boundary;
 }
 
 double mesh_size_m(const TetMesh& mesh) { return (mesh.nodes_m.colwise().maxCoeff() - mesh.nodes_m.colwise().minCoeff()).norm(); }
@@ -139,6 +106,18 @@ void must_be_bearable(const AskedPush& push, const Tool& tool, const TetMesh& me
                 fmt::format("{}force {:g}", push.option, *push.force_n));
 }
 
+/// As the fit had them: what nu was expected there decides how the volume change is integrated.
+fem::StaticsOptions statics_options(const LearnedObject& learned, int threads) {
+  estimation::SimulatedObject object;
+  object.mesh = *learned.object.rest.volume;
+  estimation::FitOptions fit;
+  fit.threads = threads;
+  fem::StaticsOptions options = estimation::statics_options(learned.object, object, fit);
+  // Loads that an object stands take a handful of steps; it folds under those that take more, and nobody waits for minutes.
+  options.max_load_steps = 20;
+  return options;
+}
+
 }  // namespace
 
 PredictedPush predict_push(const LearnedObject& learned, const AskedPush& asked, int threads) {
@@ -147,13 +126,17 @@ PredictedPush predict_push(const LearnedObject& learned, const AskedPush& asked,
   out.tool = tool_of(asked, learned.object);
   Load& load = out.load;
   load.tool = out.tool.name;
-  const bool somewhere = out.tool.shape != ToolShape::vertices;
+  // A patch that is stated is pressed evenly, whatever the object was learned with.
+  const bool patch_is_stated = asked.tool.empty() && asked.radius_m > 0;
+  const bool rigid = !patch_is_stated && moves_rigidly(learned.answer, out.tool);
+  const bool platen = out.tool.shape == ToolShape::platen;
+  const bool somewhere = out.tool.shape != ToolShape::vertices && !platen;
   if (asked.contact_m)
     load.contact_m = *asked.contact_m;
   else if (somewhere)
     throw Error("say where it acts, X Y Z in metres", asked.option + "contact");
   if (!(asked.direction.norm() > 0)) throw Error("must not be zero", asked.option + "direction");
-  load.direction = asked.direction.normalized();
+  load.direction = platen ? Vec3(out.tool.plane.normal.normalized()) : Vec3(asked.direction.normalized());
   if (somewhere) put_on_surface(mesh, asked, out);
   prediction::NewPush push;
   push.direction = load.direction;
@@ -163,15 +146,12 @@ PredictedPush predict_push(const LearnedObject& learned, const AskedPush& asked,
     throw Error(fmt::format("give either this or {}travel", asked.option), asked.option + "force");
   if (push.force_n) must_be_positive(*push.force_n, asked.option + "force");
   if (push.travel_m) must_be_positive(*push.travel_m, asked.option + "travel");
-  fem::Boundary boundary = boundary_of(learned.object, out.tool, load, push.background);
+  PressedScene scene = pressed_scene(learned, out.tool, load, rigid);
+  must_be_held(scene, mesh, load, asked.option + "direction " + words(load.direction));
+  push.background = scene.background;
   out.elasticity = elasticity_of(learned);
   must_be_bearable(asked, out.tool, mesh, out.elasticity.highest_young_modulus_pa());
-  fem::StaticsOptions options;
-  options.threads = threads;
-  // Loads that an object stands take a handful of steps; it folds under those that take more, and nobody waits for minutes.
-  options.max_load_steps = 20;
-  if (mesh.tetrahedra.cols() == 10 && out.elasticity.highest_poisson_ratio() > 0.45) options.dilatation = fem::Dilatation::averaged;
-  out.found = prediction::predict(mesh, out.elasticity, std::move(boundary), push, options);
+  out.found = prediction::predict(mesh, out.elasticity, scene.boundary, push, statics_options(learned, threads), scene.around);
   if (!out.found.converged) return out;
   if (!out.found.reason.empty()) out.warnings.push_back(out.found.reason);
   // By the stiffness: a tiny force moves everything by little.
@@ -179,6 +159,10 @@ PredictedPush predict_push(const LearnedObject& learned, const AskedPush& asked,
   if (!(std::abs(out.found.stiffness_n_m) < held_over_object * out.elasticity.highest_young_modulus_pa() * mesh_size_m(mesh)))
     throw Error("a support holds the object at this place: nothing moves there", asked.option + "contact " + words(load.contact_m));
   if (const auto said = beyond_what_was_seen(learned.answer, out.tool, out.found.force_n.value)) out.warnings.push_back(*said);
+  constexpr double noticeable = 0.02;
+  if (const double aside_n = unheld_n(scene, mesh, load, out.found.pressed_n); rigid && aside_n > noticeable * out.found.pressed_n.norm())
+    out.warnings.push_back(fmt::format("{} of the tool's force act along motions that nothing holds: the object would slide away, which is not simulated",
+                                       report::quantity(aside_n, "N")));
   if (out.elasticity.covariance.norm() == 0) out.warnings.push_back("the result holds no covariance: the bands have no width");
   return out;
 }

@@ -157,6 +157,7 @@ struct Noun<StepFit> {
   static void fields(auto&& field) {
     field("push", &StepFit::push, "");
     field("step", &StepFit::step, "");
+    field("tool", &StepFit::tool, "of the first load, whose force and travel these are");
     field("surface_m", &StepFit::surface_m, "deformed vertices of Identification.surface");
     field("observed_m", &StepFit::observed_m, "base frame, at the fitted pose");
     field("residual_m", &StepFit::residual_m, "an observed point, signed");
@@ -167,7 +168,7 @@ struct Noun<StepFit> {
     field("travel_predicted_m", &StepFit::travel_predicted_m, "");
     field("travel_predicted_std_m", &StepFit::travel_predicted_std_m, "");
     field("force_measured_n", &StepFit::force_measured_n, "along the push");
-    field("force_predicted_n", &StepFit::force_predicted_n, "");
+    field("force_predicted_n", &StepFit::force_predicted_n, "nan: it was imposed");
     field("force_predicted_std_n", &StepFit::force_predicted_std_n, "");
     field("von_mises_pa", &StepFit::von_mises_pa, "a vertex of surface_m; empty: not computed");
     field("masked_m", &StepFit::masked_m, "what else the camera saw near the object; never fitted");

@@ -112,6 +112,7 @@ struct BudgetEntry {
 struct StepFit {
   std::string push;
   int step = 0;
+  std::string tool;    ///< of the first load, whose force and travel these are; empty: no load, or a result of an earlier version
   Points surface_m;    ///< deformed vertices of Identification::surface (base frame)
   Points observed_m;   ///< observed points (base frame, at the fitted pose)
   VectorX residual_m;  ///< per observed point, signed
@@ -120,7 +121,7 @@ struct StepFit {
   double tool_radius_m = 0;  ///< of the touched patch; 0 = not a round one (edge, platen)
   double travel_m = unknown, travel_predicted_m = unknown;         ///< into the object; NaN = not measured, not predicted
   double travel_predicted_std_m = unknown;
-  double force_measured_n = unknown, force_predicted_n = unknown;  ///< along the push; NaN as above
+  double force_measured_n = unknown, force_predicted_n = unknown;  ///< along the push; NaN: not measured, the force was imposed
   double force_predicted_std_n = unknown;
   VectorX von_mises_pa;  ///< per vertex of surface_m; empty = not computed
   Points masked_m;       ///< what else the depth camera saw near the object (robot, table, depth edges), thinned; never fitted

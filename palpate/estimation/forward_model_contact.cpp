@@ -8,14 +8,8 @@
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/estimation/load_columns.hpp"
-#include "palpate/estimation/rigid_tool.hpp"
 
 namespace palpate::estimation {
-
-bool touches_rigidly(const Tool& tool) {
-  if (tool.shape == ToolShape::platen) return tool.contact == ContactLaw::friction;
-  return tool.shape != ToolShape::vertices;
-}
 
 namespace {
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "palpate/estimation/forward_model.hpp"
+#include "palpate/estimation/rigid_tool.hpp"
 
 namespace palpate::estimation {
 
@@ -24,9 +25,6 @@ bool has_radius(const Tool& tool, const Load& load);
 
 /// True for a tool that touches at Load::contact_m, which may then be elsewhere than thought.
 bool has_place(const Recording& recording, const Load& load);
-
-/// Tools of a recording that touch as rigid bodies: their motion is imposed, and it is not that of nodes.
-bool touches_rigidly(const Tool& tool);
 
 /// True where something that the object touches has friction, so that a step depends on the steps before.
 bool depends_on_path(const Recording& recording);

@@ -50,6 +50,11 @@ class GapAlong {
 
 }  // namespace
 
+bool touches_rigidly(const Tool& tool) {
+  if (tool.shape == ToolShape::platen) return tool.contact == ContactLaw::friction;
+  return tool.shape != ToolShape::vertices;
+}
+
 Vec3 push_direction(const Tool& tool, const Load& load) {
   return (tool.shape == ToolShape::platen ? tool.plane.normal : load.direction).normalized();
 }

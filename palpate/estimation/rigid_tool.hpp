@@ -7,6 +7,9 @@
 
 namespace palpate::estimation {
 
+/// Tools of a recording that touch as rigid bodies: their motion is imposed, and it is not that of nodes.
+bool touches_rigidly(const Tool& tool);
+
 /// Along which a tool's imposed motion goes: a platen's normal, else the load's direction.
 Vec3 push_direction(const Tool& tool, const Load& load);
 

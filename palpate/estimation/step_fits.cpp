@@ -56,6 +56,7 @@ std::vector<StepFit> step_fits(const Objective& objective) {
     if (!loads.empty() && fit.used) {
       const Load& load = loads.front();
       const Vec3 direction = load.direction.normalized();
+      fit.tool = load.tool;
       add_contact(model, load, fit);
       fit.force_n = load.force_n.value_or(predicted.force_n.front());
       fit.travel_predicted_m = predicted.travel_m(0);

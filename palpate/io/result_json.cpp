@@ -210,6 +210,7 @@ BudgetEntry budget_from(const json& object) {
 json from(const StepFit& one) {
   return {{"push", one.push},
           {"step", one.step},
+          {"tool", one.tool},
           {"used", one.used},
           {"force_n", list(one.force_n)},
           {"contact_m", list(one.contact_m)},
@@ -225,6 +226,7 @@ StepFit step_from(const json& object) {
   StepFit step;
   step.push = object.at("push");
   step.step = object.at("step");
+  step.tool = object.value("tool", "");
   step.used = object.at("used");
   step.force_n = vec3_from(object.at("force_n"));
   step.contact_m = vec3_from(object.at("contact_m"));

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
-#include "palpate/fem/response.hpp"
 #include "palpate/fem/von_mises.hpp"
+#include "palpate/prediction/pressed_body.hpp"
 
 namespace palpate::prediction {
 namespace {
@@ -25,164 +25,101 @@ Band positive_band(double value, double std) {
 /// Standard deviation of a quantity with these derivatives to the moduli.
 double std_of(const VectorX& d, const MatrixX& covariance) { return std::sqrt(std::max(0.0, d.dot(covariance * d))); }
 
-/// The patch's mean motion along the push, work-conjugate to its force.
-double travel_of(const fem::ResponseState& state, const Vec3& direction) { return direction.dot(state.conjugate_m.head<3>()); }
-VectorX d_travel_of(const fem::ResponseState& state, const Vec3& direction) {
-  return state.d_conjugate.topRows<3>().transpose() * direction;
+/// What is asked of the push: that its force or its travel is so much.
+class Target {
+ public:
+  explicit Target(const NewPush& push) : of_force_(push.force_n.has_value()), value_(of_force_ ? *push.force_n : *push.travel_m) {}
+  const Reading& of(const PressedState& at) const { return of_force_ ? at.force_n : at.travel_m; }
+  bool of_force() const { return of_force_; }
+  double value() const { return value_; }
+
+ private:
+  bool of_force_;
+  double value_;
+};
+
+/// Newton's method on what drives the push, with the exact slope of each state.
+/// @return why nothing was found; empty: `at` is the state, driven by `control`
+std::string find(const PressedBody& body, const Target& target, PressedState& at) {
+  constexpr int most_corrections = 30;
+  const bool given = body.drives(target.of_force());
+  // What touches is known to less, and the further the tool goes the stiffer it gets: it goes on by a few times at most.
+  const double close = body.touches() ? 1e-6 * target.value() : 1e-9 * (target.of_force() ? target.value() : std::max(1e-6, target.value()));
+  constexpr double furthest = 4;
+  double control = given ? target.value() : body.first_guess(target.of_force(), target.value(), at), stood = 0;
+  for (int k = 0; k < most_corrections; ++k) {
+    PressedState next = body.solve(control, at);
+    if (!next.converged) {
+      if (given || k + 1 == most_corrections) return next.reason;
+      control = 0.5 * (control + stood);  // half the way from the last that stood
+      continue;
+    }
+    at = std::move(next);
+    stood = control;
+    if (given) return {};
+    const Reading& reached = target.of(at);
+    const double short_of = target.value() - reached.value, slope = reached.by_control();
+    if (std::abs(short_of) < close) return {};
+    if (body.touches()) {
+      const double asked = slope > 0 ? control + short_of / slope : furthest * control;
+      control = std::clamp(asked, control / furthest, control * furthest);
+    } else {
+      control += short_of / slope;
+    }
+  }
+  return target.of_force() ? "no travel was found at which the tool presses so hard" : "no force was found that moves the patch so far";
 }
 
 }  // namespace
 
-double Elasticity::young_modulus_of(Index of) const { return region_stiffness(of) * young_modulus_pa; }
-
-double Elasticity::poisson_ratio_of(Index of) const {
-  return of > 0 && region_poisson.size() > 0 ? region_poisson(of) : poisson_ratio;
-}
-
-double Elasticity::highest_young_modulus_pa() const {
-  return young_modulus_pa * (region_stiffness.size() > 0 ? std::max(1.0, region_stiffness.maxCoeff()) : 1.0);
-}
-
-double Elasticity::highest_poisson_ratio() const {
-  return region_poisson.size() > 1 ? std::max(poisson_ratio, region_poisson.tail(region_poisson.size() - 1).maxCoeff()) : poisson_ratio;
-}
-
-Elasticity elasticity_of(const Identification& answer) {
-  Elasticity elasticity;
-  elasticity.material = answer.material;
-  std::vector<Index> young, poisson;  // places among the parameters
-  std::vector<double> extra;
-  const auto value = [&](Index at) { return answer.parameters[static_cast<std::size_t>(at)].value; };
-  for (std::size_t i = 0; i < answer.parameters.size(); ++i) {
-    const Parameter& one = answer.parameters[i];
-    if (one.name == "young_modulus")
-      young.push_back(static_cast<Index>(i));
-    else if (one.name == "poisson_ratio")
-      poisson.push_back(static_cast<Index>(i));
-    else if (one.region.empty())
-      extra.push_back(one.value);
-  }
-  if (young.empty() || poisson.empty() || (poisson.size() > 1 && poisson.size() != young.size()))
-    throw Error("holds no Young's modulus and Poisson ratio of the whole object, or of all its regions", "result: parameters");
-  const Index regions = static_cast<Index>(young.size());
-  elasticity.young_modulus_pa = value(young[0]);
-  elasticity.poisson_ratio = value(poisson[0]);
-  if (regions > 1) {
-    elasticity.region_stiffness.resize(regions);
-    for (Index r = 0; r < regions; ++r) {
-      const Index at = young[static_cast<std::size_t>(r)];
-      elasticity.regions.push_back(answer.parameters[static_cast<std::size_t>(at)].region);
-      elasticity.region_stiffness(r) = value(at) / elasticity.young_modulus_pa;
-    }
-  }
-  if (poisson.size() > 1) {
-    elasticity.region_poisson = VectorX::Constant(regions, std::numeric_limits<double>::quiet_NaN());
-    for (Index r = 1; r < regions; ++r) elasticity.region_poisson(r) = value(poisson[static_cast<std::size_t>(r)]);
-  }
-  elasticity.extra = Eigen::Map<const VectorX>(extra.data(), Index(extra.size()));
-  // Of log E of each region, as an answer has it, to ratios.
-  std::vector<Index> places{young[0], poisson[0]};
-  places.insert(places.end(), young.begin() + 1, young.end());
-  places.insert(places.end(), poisson.begin() + 1, poisson.end());
-  const Index size = static_cast<Index>(places.size());
-  elasticity.covariance = MatrixX::Zero(size, size);
-  if (*std::max_element(places.begin(), places.end()) >= answer.covariance.rows()) return elasticity;
-  MatrixX over_first = MatrixX::Identity(size, size);
-  over_first.block(2, 0, regions - 1, 1).setConstant(-1);
-  elasticity.covariance = over_first * MatrixX(answer.covariance(places, places)) * over_first.transpose();
-  if (!elasticity.covariance.allFinite()) elasticity.covariance.setZero();
-  return elasticity;
-}
-
 Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Boundary boundary, const NewPush& push,
-                   fem::StaticsOptions options) {
+                   fem::StaticsOptions options, Surroundings around) {
   if (push.force_n.has_value() == push.travel_m.has_value())
     throw Error("give either the force or the travel of the push", "push");
   if (std::abs(push.direction.norm() - 1) > 1e-6) throw Error("must have unit length", "push.direction");
-  if (boundary.forces.cols() < 3) throw Error("needs three columns for the patch", "boundary.forces");
-  const Eigen::Index columns = boundary.forces.cols(), motions = boundary.motions.cols();
-  if (push.background.size() != 0 && push.background.size() != columns - 3)
-    throw Error("has another size than the boundary's other columns", "push.background");
   if (elasticity.region_stiffness.size() > 0 && static_cast<Index>(elasticity.region.size()) != static_cast<Index>(mesh.tetrahedra.rows()))
     throw Error("needs one region an element", "elasticity.region");
-  fem::Response::Options response_options;
-  response_options.statics = std::move(options);
-  if (elasticity.region_stiffness.size() > 0) response_options.statics.region = elasticity.region;
-  response_options.statics.region_stiffness = elasticity.region_stiffness;
-  response_options.statics.region_poisson = elasticity.region_poisson;
-  const fem::Response response(mesh, elasticity.material, std::move(boundary),
-                               Eigen::SparseMatrix<double>(0, 3 * mesh.nodes_m.rows()), response_options);
-  const double e = elasticity.young_modulus_pa, nu = elasticity.poisson_ratio;
+  const Index moduli = static_cast<Index>(elasticity.covariance.rows());
+  const PressedBody body(mesh, elasticity, std::move(boundary), push, std::move(options), std::move(around));
+  const Target target(push);
 
   Prediction out;
-  fem::ResponseQuery query{e, nu, VectorX::Zero(columns), VectorX::Zero(motions)};
-  query.extra = elasticity.extra;
-  if (push.background.size() > 0) query.force.tail(columns - 3) = push.background;
-  // Derivatives: the moduli, the push's force.
-  fem::LoadDirections pushing{MatrixX::Zero(columns, 1), MatrixX::Zero(motions, 1)};
-  pushing.force.col(0).head(3) = push.direction;
-  query.along = pushing;
-  const Index moduli = static_cast<Index>(elasticity.covariance.rows()), by_force = moduli;
-  const auto fail = [&](const fem::ResponseState& at) {
-    out.reason = at.reason;
-    return out;
-  };
   // The state from which the push starts: under the background alone.
-  const fem::ResponseState before = response.solve(query);
-  if (!before.converged) return fail(before);
-  if (before.parameters != moduli) throw Error("has not one row and column for each of the moduli", "elasticity.covariance");
-  const double start_m = travel_of(before, push.direction);
+  const PressedState before = body.before();
+  out.reason = before.reason;
+  if (!before.converged) return out;
+  PressedState at = before;
+  out.reason = find(body, target, at);
+  if (!out.reason.empty()) return out;
 
-  // Travel imposed: Newton on the force, with the exact compliance of each state.
-  double force_n = push.force_n.value_or(0);
-  if (push.travel_m) force_n = *push.travel_m / d_travel_of(before, push.direction)(by_force);
-  fem::ResponseState at = before;
-  double stood_n = 0, compliance_m_n = 0;  // stood_n: the force of `at`
-  constexpr int most_corrections = 30;
-  for (int k = 0; k < most_corrections; ++k) {
-    query.force.head(3) = force_n * push.direction;
-    fem::ResponseStart start;
-    start.displacement_m = &at.solution->displacement_m;
-    const fem::ResponseState next = response.solve(query, start);
-    if (!next.converged) {
-      if (!push.travel_m || k + 1 == most_corrections) return fail(next);
-      force_n = 0.5 * (force_n + stood_n);  // half the way from the last that stood
-      continue;
-    }
-    at = next;
-    stood_n = force_n;
-    compliance_m_n = d_travel_of(at, push.direction)(by_force);
-    if (!push.travel_m) break;
-    const double short_m = *push.travel_m - (travel_of(at, push.direction) - start_m);
-    if (std::abs(short_m) < 1e-9 * std::max(1e-6, std::abs(*push.travel_m))) break;
-    if (k + 1 == most_corrections) {
-      out.reason = "no force was found that moves the patch so far";
-      return out;
-    }
-    force_n += short_m / compliance_m_n;
-  }
-
-  // Derivatives to the moduli of the displacement since the start; with the travel imposed, the force gives way so that it stays.
-  const double travel_m = travel_of(at, push.direction) - start_m;
-  MatrixX whole = at.solution->derivative.leftCols(moduli);  // of the displacement from rest: what stress depends on
-  MatrixX d = whole - before.solution->derivative.leftCols(moduli);
-  VectorX d_travel = (d_travel_of(at, push.direction) - d_travel_of(before, push.direction)).head(moduli);
-  VectorX d_force = VectorX::Zero(moduli);
-  if (push.travel_m) {
-    d_force = -d_travel / compliance_m_n;
-    const MatrixX gives_way = at.solution->derivative.col(by_force) * d_force.transpose();
-    d += gives_way;
-    whole += gives_way;
-    d_travel.setZero();
-  }
+  // Derivatives to the moduli; what was asked for stays, so what drives the push gives way.
+  VectorX gives_way = VectorX::Zero(moduli);
+  if (!body.drives(target.of_force())) gives_way = -target.of(at).by_moduli() / target.of(at).by_control();
+  const auto with_control = [&](const MatrixX& d) { return MatrixX(d.leftCols(moduli) + d.col(moduli) * gives_way.transpose()); };
+  const auto of_reading = [&](const Reading& one) -> VectorX {
+    if (&one == &target.of(at)) return VectorX::Zero(moduli);
+    return one.by_moduli() + one.by_control() * gives_way;
+  };
+  const MatrixX whole = with_control(at.d_displacement);  // of the displacement from rest: what stress depends on
+  const RigidWay& whole_way = body.gives_way();
+  MatrixX d = whole - before.d_displacement.leftCols(moduli);
   const MatrixX& covariance = elasticity.covariance;
   out.converged = true;
   out.reason = at.reason;
   out.inverted_elements = at.inverted_elements;
-  out.force_n = positive_band(force_n, std_of(d_force, covariance));
-  out.travel_m = positive_band(travel_m, std_of(d_travel, covariance));
-  const VectorX& displaced_m = at.solution->displacement_m;
-  out.displacement_m = displaced_m - before.solution->displacement_m;
+  out.force_n = positive_band(at.force_n.value, std_of(of_reading(at.force_n), covariance));
+  out.travel_m = positive_band(at.travel_m.value, std_of(of_reading(at.travel_m), covariance));
+  out.pressed_n = at.pressed_n;
+  const VectorX& displaced_m = at.displacement_m;
+  out.displacement_m = displaced_m - before.displacement_m;
+  if (whole_way.moves()) {
+    const MatrixX d_pressed = with_control(at.d_pressed);
+    for (Index i = 0; i < mesh.nodes_m.rows(); ++i) {
+      const Mat3 way = whole_way.at(mesh.nodes_m.row(i));
+      out.displacement_m.segment<3>(3 * i) += way * at.pressed_n;
+      d.middleRows<3>(3 * i) += way * d_pressed;
+    }
+  }
   out.displacement_std_m.resize(out.displacement_m.size());
   for (Eigen::Index i = 0; i < out.displacement_m.size(); ++i) out.displacement_std_m(i) = std_of(d.row(i).transpose(), covariance);
 
@@ -223,7 +160,7 @@ Prediction predict(const TetMesh& mesh, const Elasticity& elasticity, fem::Bound
     const Vec3 way = largest > 0 ? Vec3(u / largest) : Vec3(Vec3::Zero());
     out.largest_displacement_m = positive_band(largest, std_of(d.middleRows<3>(i).transpose() * way, covariance));
   }
-  out.stiffness_n_m = 1 / compliance_m_n;
+  out.stiffness_n_m = at.force_n.by_control() / at.travel_m.by_control();
   return out;
 }
 

@@ -166,8 +166,8 @@ def predict(found: Identified, *, contact_m=None, direction=(0, 0, -1), force_n=
     contact_m:         on the surface at rest, base frame (3 numbers)
     direction:         of the push, into the object
     force_n, travel_m: one of them, along the direction
-    radius_m:          of the pressed patch (the tool's)
-    tool:              a name of found.object.tools (its only one)
+    radius_m:          of a patch that is pressed evenly; with tool: that tool's own (the tool's)
+    tool:              a name of found.object.tools (its only one); one whose motion was imposed moves as a rigid body
     """
     return _palpate.predict(found, dict(contact_m=contact_m, direction=direction, force_n=force_n, travel_m=travel_m, radius_m=radius_m,
                                         tool=tool, threads=threads))

@@ -86,6 +86,22 @@ TEST_F(LearnedBlock, IsPressedOnItsSurfaceAndIntoIt) {
   }
 }
 
+/// How the volume change is integrated depends on what was expected of nu, as in the fit, and not on what was found: there would be a jump.
+TEST_F(LearnedBlock, AnswersSmoothlyInThePoissonRatio) {
+  const auto file = files_ / "result" / "result.json";
+  nlohmann::json result = nlohmann::json::parse(io::read_file(file));
+  double travel_m[2] = {};
+  for (const int above : {0, 1}) {
+    for (auto& parameter : result.at("parameters"))
+      if (parameter.at("name") == "poisson_ratio") parameter["value"] = above != 0 ? 0.4501 : 0.4499;
+    io::write_file(file, result.dump());
+    const Outcome outcome = run("predict " + (files_ / "result").string() + " --contact 0.045 0.02 0.03 --force 0.12 --json --quiet");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.text;
+    travel_m[above] = nlohmann::json::parse(outcome.text).at("travel_m").at("value");
+  }
+  EXPECT_NEAR(travel_m[1] / travel_m[0], 1, 5e-4);
+}
+
 /// Learned with up to 0.12 N on a disc of 12 mm, 265 Pa.
 TEST_F(LearnedBlock, PressedHarderThanItWasLearnedIsSaid) {
   const std::string there = "--contact 0.03 0.02 0.03 --force ", said = "times as hard as any push that the object was learned from";
@@ -101,6 +117,7 @@ TEST_F(LearnedBlock, YieldsToTheSmallestForce) {
   const Outcome outcome = predict("--contact 0.03 0.02 0.03 --force 1e-9 --json");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
   EXPECT_THAT(outcome.text, HasSubstr("\"stiffness_n_m\""));
+  EXPECT_THAT(predict("--contact 0.03 0.02 0.03 --force 1e-9").text, HasSubstr("1.00e-09 N"));
 }
 
 /// The shape was measured with its weight on: a simulator that pulls at it again would let it sag twice.

@@ -40,6 +40,20 @@ TEST(Words, QuantitiesCarryUnitsAndSensibleDigits) {
   EXPECT_EQ(report::quantity(std::nan(""), "Pa"), "unknown");
   EXPECT_EQ(report::interval(19520, 21120, "Pa"), "19.52 to 21.12 kPa");
   EXPECT_EQ(report::interval(0.2, 0.41, ""), "0.200 to 0.410");
+  EXPECT_EQ(report::interval(12540, 13360, "Pa"), "12.54 to 13.36 kPa");
+}
+
+/// A wide interval has a lower end, a narrow one no more digits than anybody reads, and what is tiny is not zero.
+TEST(Words, EndsThatAreFarApartOrCloseTogether) {
+  EXPECT_EQ(report::interval(0.000304, 0.135, "m"), "0.30 to 135 mm");
+  EXPECT_EQ(report::interval(300, 200000, "Pa"), "300 Pa to 200 kPa");
+  EXPECT_EQ(report::interval(0, 0.31, ""), "0.00 to 0.31");
+  EXPECT_EQ(report::interval(-0.0004, 0.31, ""), "0.00 to 0.31");
+  EXPECT_EQ(report::interval(147.96790873, 147.96790875, "Pa"), "147.97 to 147.97 Pa");
+  EXPECT_EQ(report::quantity(1e-9, "N"), "1.00e-09 N");
+  EXPECT_EQ(report::quantity(0, "N"), "0.00 N");
+  EXPECT_EQ(report::quantity(0.0021, "N"), "0.00210 N");
+  EXPECT_EQ(report::interval(1e-9, 3e-9, "N"), "1.00e-09 to 3.00e-09 N");
 }
 
 TEST(Words, AnswerSaysWhatIsNotDeterminedAndWhatFailed) {
