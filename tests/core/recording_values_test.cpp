@@ -64,6 +64,24 @@ TEST(RecordingValues, WhatIsRightIsRight) {
   EXPECT_NO_THROW(demand_right_values({}));
 }
 
+TEST(RecordingValues, WhatAnalysesWouldStumbleOverIsNamed) {
+  const auto wrong = [](const std::function<void(Recording&)>& spoil) {
+    Recording recording = right();
+    spoil(recording);
+    std::string all;
+    for (const WrongValue& one : wrong_values(recording)) all += one.where + ": " + one.what + "\n";
+    return all;
+  };
+  const auto cloud = [](Recording& recording) -> PointCloud& { return std::get<PointCloud>(recording.pushes[0].steps[1].observations[1]); };
+  const auto markers = [](Recording& recording) -> Markers& { return std::get<Markers>(recording.pushes[0].steps[1].observations[2]); };
+  EXPECT_THAT(wrong([&](Recording& r) { cloud(r).points_m.resize(0, 3); }), HasSubstr("steps[1].observations[1].points_m: is empty"));
+  EXPECT_THAT(wrong([&](Recording& r) { cloud(r).normals = Points::Zero(3, 3); }), HasSubstr("normals: has 3 rows for 2 points"));
+  EXPECT_THAT(wrong([&](Recording& r) { cloud(r).sigma_m = VectorX::Constant(3, 1e-3); }), HasSubstr("sigma_m: has 3 values; give one, or one a point (2)"));
+  EXPECT_THAT(wrong([&](Recording& r) { markers(r).rest_m = Points::Zero(2, 3); }), HasSubstr("has 0 rows and rest_m 2 for 0 names"));
+  EXPECT_THAT(wrong([&](Recording& r) { r.pushes[0].steps[1].loads[0].travel_m = 0.001; }), HasSubstr("loads[0].travel_m: and force_n are both given"));
+  EXPECT_THAT(wrong([&](Recording& r) { r.density_kg_m3 = 1.1; }), HasSubstr("density_kg_m3: is outside 5 to 30000 kg/m3; is it in g/cm3?"));
+}
+
 TEST(RecordingValues, WhatIsWrongIsNamedByItsPlace) {
   const auto step = [](Recording& r) -> Step& { return r.pushes[0].steps[1]; };
   const auto load = [](Recording& r) -> Load& { return r.pushes[0].steps[1].loads[0]; };

@@ -38,6 +38,44 @@ TEST(MeshError, IsHalfToFourTimesTheBiasThatAFinerTruthShows) {
   EXPECT_GT(widened.parameters[0].upper_95, truth.young_pa);
 }
 
+/// A ball that is moved 1 mm into the block, whose force Hertz tells: what the mesh does is in the force alone.
+TEST(MeshError, OfAnImposedMotionIsInTheForceThatItAsksFor) {
+  Recording recording = pushed_block_recording();
+  const TetMesh linear = kuhn_block(4, 3, 2, block_size_m);
+  recording.rest.volume = linear;
+  recording.rest.surface = SimulatedSurface::boundary_of(linear, nullptr).rest();
+  recording.supports[0].kind = SupportKind::plane;
+  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
+  recording.tools[0].shape = ToolShape::sphere;
+  recording.tools[0].contact = ContactLaw::frictionless;
+  recording.model.material = "linear";
+  constexpr double young_pa = 20e3, nu = 0.3, depth_m = 1e-3;
+  recording.model.poisson_fixed = nu;
+  const double hertz_n = 4.0 / 3 * young_pa / (1 - nu * nu) * std::sqrt(recording.tools[0].radius_m) * std::pow(depth_m, 1.5);
+  auto& steps = recording.pushes[0].steps;
+  steps.resize(1);
+  steps[0].loads[0].force_n.reset();
+  steps[0].loads[0].travel_m = depth_m;
+  steps[0].loads[0].contact_m = Vec3(0.5 * block_size_m.x(), 0.5 * block_size_m.y(), block_size_m.z());
+  Wrench wrench;
+  wrench.force_n = Vec3(0, 0, -hertz_n);
+  wrench.force_sigma_n = 1e-3 * hertz_n;
+  const Inputs inputs{{wrench}};
+  const SimulatedObject coarse = coarse_block("linear");
+  const auto finer = finer_model(recording, coarse);
+  ASSERT_TRUE(finer);
+  FitOptions options;
+  options.cross_checks = false;
+  const Identification plain = fit(recording, coarse, inputs, options);
+  const Identification widened = fit(recording, coarse, inputs, options, {}, &*finer);
+  const double bias = std::log(plain.parameters[0].value / young_pa), left = std::log(widened.parameters[0].value / young_pa);
+  EXPECT_LT(bias, -0.05) << "a coarse mesh is stiff: the force needs a smaller E";
+  EXPECT_LT(std::abs(left), 0.8 * std::abs(bias));
+  ASSERT_FALSE(widened.budget.empty());
+  EXPECT_EQ(widened.budget.front().input, "mesh");
+  RecordProperty("bias", std::to_string(bias) + " " + std::to_string(left));
+}
+
 TEST(MeshError, NeedsARoundToolAndAMeshThatItMayRefine) {
   Recording recording = pushed_block_recording();
   EXPECT_FALSE(finer_model(recording, coarse_block())) << "no volume of its own";

@@ -273,6 +273,24 @@ TEST(Tetrahedralise, thin_walls_stay_whole_or_are_refused) {
   EXPECT_THAT(message_of([] { with(shapes::box(Vec3(0.2, 0.2, 0.0005)), 500); }), HasSubstr("too thin for 500 tetrahedra"));
 }
 
+/// The lattice is laid over all of the box: it filled the memory.
+TEST(Tetrahedralise, a_stray_triangle_far_away_is_refused_at_once) {
+  TriMesh mesh = shapes::sphere(0.05, 3);
+  const Index first = static_cast<Index>(mesh.vertices_m.rows());
+  mesh.vertices_m.conservativeResize(first + 3, 3);
+  mesh.vertices_m.bottomRows(3) << 5, 5, 5, 5.0001, 5, 5, 5, 5.0001, 5;
+  mesh.triangles.conservativeResize(mesh.triangles.rows() + 1, 3);
+  mesh.triangles.bottomRows(1) << first, first + 1, first + 2;
+  TetrahedraliseOptions options;
+  options.tetrahedra = 4000;
+  try {
+    tetrahedralise(mesh, options);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.message().find("tiny and far from the rest"), std::string::npos) << error.message();
+  }
+}
+
 TEST(Tetrahedralise, walls_far_too_thin_are_refused_before_any_work) {
   int told = 0;
   const auto count = [&](std::string_view, double) { return ++told > 0; };

@@ -123,6 +123,19 @@ TEST(Figures, SitesThatWerePushedOnceAreNotShownTwice) {
   for (const auto& figure : report::figures(data(id))) EXPECT_NE(figure.name, "per_site");
 }
 
+TEST(Figures, LongNamesAreCutBetweenLettersAndKeepTheirRegion) {
+  auto id = pressed_block::identification({.cells = 3, .pushes = 2, .steps = 3, .points = 20});
+  id.per_push[0].region = "Druckversuch \xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4\xc3\xa4";
+  id.budget[0].input = "camera_rotation_of_the_wrist";
+  id.budget[0].regions = {{"upper half", 3}, {"lower half", 2}};
+  std::string all;
+  for (const auto& figure : report::figures(data(id))) {
+    EXPECT_NO_THROW(nlohmann::json(figure.svg).dump()) << figure.name << ": not UTF-8";
+    all += figure.svg;
+  }
+  EXPECT_THAT(all, testing::AllOf(HasSubstr("..., upper half"), HasSubstr("..., lower half")));
+}
+
 TEST(Figures, HostileNamesStayText) {
   auto id = pressed_block::identification({.cells = 3, .pushes = 2, .steps = 3, .points = 20});
   id.budget[0].input = "<script>&\x01";

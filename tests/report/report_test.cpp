@@ -61,6 +61,9 @@ TEST(Words, AnswerSaysWhatIsNotDeterminedAndWhatFailed) {
   EXPECT_EQ(report::answer(id),
             "Young's modulus is 20.30 kPa (95 % interval 19.52 to 21.12 kPa). "
             "The Poisson ratio is 0.310 (95 % interval 0.210 to 0.410).");
+  Identification given = id;
+  given.parameters[1].lower_95 = given.parameters[1].upper_95 = given.parameters[1].value;
+  EXPECT_THAT(report::answer(given), HasSubstr("The Poisson ratio was given as 0.310."));
   id.parameters[1].determined = false;
   EXPECT_THAT(report::answer(id), HasSubstr("The Poisson ratio is not determined by these pushes"));
   id.termination = Termination::max_iterations;

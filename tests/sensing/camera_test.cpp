@@ -112,6 +112,7 @@ TEST(Camera, NothingBehindOrBeyondTheFold) {
   const Camera wavy = with(DistortionModel::plumb_bob, {-1, 0.35, 0, 0});
   EXPECT_TRUE(project(wavy, Vec3(0, 0.66, 1)));
   for (const double y : {0.68, 1.0, 1.5, 3.0}) EXPECT_FALSE(project(wavy, Vec3(0, y, 1))) << y;
+  EXPECT_FALSE(unproject(wavy, Vec2(319.5 + 525 * 2.0, 239.5))) << "on the branch beyond the fold";
   const Camera fisheye = with(DistortionModel::fisheye, {-0.3, 0, 0, 0});  // theta - 0.3 theta^3 turns at 1.054
   EXPECT_TRUE(project(fisheye, Vec3(std::sin(1.05), 0, std::cos(1.05))));
   EXPECT_FALSE(project(fisheye, Vec3(std::sin(1.06), 0, std::cos(1.06))));

@@ -93,6 +93,16 @@ TEST(RobotMask, FollowsTheJoint) {
   }
 }
 
+/// A description holds the camera's housing: it stands around the lens, and hid the whole image.
+TEST(RobotMask, TheCamerasOwnHousingHidesNothing) {
+  RobotModel housed = pendulum();
+  const DepthFrame frame = from_the_side(1.5F);
+  RobotShape housing = shape(RobotShape::Kind::box, {0.09, 0.025, 0.025});
+  housing.T_link_shape = Eigen::Translation3d(frame.T_base_camera.translation() - Vec3(0, 0.0083, 0));
+  housed.links[0].visual = {housing};
+  EXPECT_TRUE(RobotMask(housed).mask(frame, {"swing"}, {0.1}) == RobotMask(pendulum()).mask(frame, {"swing"}, {0.1}));
+}
+
 TEST(RobotMask, EncoderErrorWidensByItsLeverArm) {
   RobotMaskOptions sharp, loose;
   sharp.joint_std_rad = 0;
