@@ -18,7 +18,8 @@ class ValueChecker {
     spread("force_cross_talk_std", recording.force_cross_talk_std);
     spread("time_offset_std_s", recording.time_offset_std_s);
     spread("density_kg_m3", recording.density_kg_m3);
-    if (recording.density_kg_m3 > 30000 || (recording.density_kg_m3 > 0 && recording.density_kg_m3 < 5))
+    const double density = recording.density_kg_m3;
+    if (std::isfinite(density) && (density > 30000 || (density > 0 && density < 5)))
       add("density_kg_m3", "is outside 5 to 30000 kg/m3; is it in g/cm3? Multiply by 1000");
     spread("density_std_kg_m3", recording.density_std_kg_m3);
     finite("environment.gravity_m_s2", recording.environment.gravity_m_s2);
@@ -145,10 +146,10 @@ class ValueChecker {
   }
   void check(const Markers& markers, const std::string& at) {
     sigma(at + "sigma_m", markers.sigma_m);
-    const auto names = static_cast<Eigen::Index>(markers.names.size());
-    if (markers.rest_m.rows() != names || markers.observed_m.rows() != names)
-      add(at + "observed_m", "has " + std::to_string(markers.observed_m.rows()) + " rows and rest_m " + std::to_string(markers.rest_m.rows()) + " for " +
-                                 std::to_string(names) + " names; each marker has one row in both");
+    const auto names = static_cast<Eigen::Index>(markers.names.size()), rows = static_cast<Eigen::Index>(markers.observed_m.rows());
+    if (markers.rest_m.rows() != rows || (names != 0 && names != rows))
+      add(at + "observed_m", "has " + std::to_string(rows) + " rows, rest_m " + std::to_string(markers.rest_m.rows()) + " and names " + std::to_string(names) +
+                                 "; each marker has one in each (names may be left out)");
   }
   void check(const ToolTravel& travel, const std::string& at) {
     if (!travel.tool.empty()) known(at + "tool", travel.tool);

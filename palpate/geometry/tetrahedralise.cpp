@@ -293,6 +293,12 @@ Tetrahedralisation tetrahedralise(const TriMesh& surface, const TetrahedraliseOp
     if ((ratio > 0.95 && ratio < 5) || out.cancelled) break;
     cell *= std::pow(std::clamp(ratio / 1.25, 0.2, 3.0), 0.43);
   }
+  constexpr double next_to_nothing = 3e-4;
+  if (!best && reference < next_to_nothing * (solid.max_m() - solid.min_m()).prod())
+    throw Error(fmt::format("the box around it, {:.2g} m from corner to corner, is next to empty: leave out stray triangles, and parts that are "
+                            "tiny and far from the rest",
+                            solid.diagonal_m()),
+                "surface");
   if (!best) throw too_thin();
   const bool shell = reference > 0 && wall < 0.4 * intact_cell;
   if (best_ratio > 1.05 && o.edge_m == 0 && o.improve && !out.cancelled) {

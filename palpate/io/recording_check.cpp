@@ -291,14 +291,14 @@ class Checker {
 
   void check_observation(const Markers& markers, const Step& step) {
     if (!has_mesh_) return;
-    const auto named = static_cast<Eigen::Index>(markers.names.size());
-    for (Eigen::Index i = 0; i < std::min({named, markers.rest_m.rows(), markers.observed_m.rows()}); ++i) {
+    for (Eigen::Index i = 0; i < std::min(markers.rest_m.rows(), markers.observed_m.rows()); ++i) {
       for (const auto& [place, what] : {std::pair{markers.rest_m.row(i), "rest"}, {markers.observed_m.row(i), "observed"}}) {
         const double distance = (Vec3(place) - box_.centre()).norm();
         if (!(distance > 3 * box_.diagonal())) continue;  // hidden markers are NaN
         add(step.source,
             fmt::format("marker '{}' ({}) is {} from the object's centre; is it in metres and in the base frame?",
-                        markers.names[static_cast<std::size_t>(i)], what, length(distance)));
+                        static_cast<std::size_t>(i) < markers.names.size() ? markers.names[static_cast<std::size_t>(i)] : std::to_string(i), what,
+                        length(distance)));
         return;
       }
     }

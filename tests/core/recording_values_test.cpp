@@ -77,7 +77,7 @@ TEST(RecordingValues, WhatAnalysesWouldStumbleOverIsNamed) {
   EXPECT_THAT(wrong([&](Recording& r) { cloud(r).points_m.resize(0, 3); }), HasSubstr("steps[1].observations[1].points_m: is empty"));
   EXPECT_THAT(wrong([&](Recording& r) { cloud(r).normals = Points::Zero(3, 3); }), HasSubstr("normals: has 3 rows for 2 points"));
   EXPECT_THAT(wrong([&](Recording& r) { cloud(r).sigma_m = VectorX::Constant(3, 1e-3); }), HasSubstr("sigma_m: has 3 values; give one, or one a point (2)"));
-  EXPECT_THAT(wrong([&](Recording& r) { markers(r).rest_m = Points::Zero(2, 3); }), HasSubstr("has 0 rows and rest_m 2 for 0 names"));
+  EXPECT_THAT(wrong([&](Recording& r) { markers(r).rest_m = Points::Zero(2, 3); }), HasSubstr("observed_m: has 0 rows, rest_m 2 and names 0"));
   EXPECT_THAT(wrong([&](Recording& r) { r.pushes[0].steps[1].loads[0].travel_m = 0.001; }), HasSubstr("loads[0].travel_m: and force_n are both given"));
   EXPECT_THAT(wrong([&](Recording& r) { r.density_kg_m3 = 1.1; }), HasSubstr("density_kg_m3: is outside 5 to 30000 kg/m3; is it in g/cm3?"));
 }
@@ -104,7 +104,7 @@ TEST(RecordingValues, WhatIsWrongIsNamedByItsPlace) {
       {in_load + "tool", [&](Recording& r) { load(r).tool = "stik"; }},
       {in_load + "force_n", [&](Recording& r) { load(r).force_n.reset(); }},
       {in_load + "force_n", [&](Recording& r) { load(r).force_n->x() = nan; }},
-      {in_load + "travel_m", [&](Recording& r) { load(r).travel_m = infinity; }},
+      {in_load + "travel_m", [&](Recording& r) { load(r).force_n.reset(), load(r).travel_m = infinity; }},
       {in_load + "force_std_n", [&](Recording& r) { load(r).force_std_n = -1e-3; }},
       {in_load + "contact_m", [&](Recording& r) { load(r).contact_m.y() = nan; }},
       {in_load + "direction", [&](Recording& r) { load(r).direction.setZero(); }},

@@ -24,7 +24,7 @@ rest: {volume_mesh: rest.msh, state: stress_free}
 supports:
   - {kind: vertices, file: fixed.csv}
 tools:
-  - {name: ball, shape: sphere, radius_m: 0.02, contact: bonded}
+  - {name: ball, shape: disc, radius_m: 0.02, contact: bonded}
 cameras:
   - {name: top, width_px: 8, height_px: 6, fx_px: 10, fy_px: 10, cx_px: 3.5, cy_px: 2.5, depth_unit_m: 0.001,
      T_base_camera: {position_m: [0.05, 0.05, 0.6], quaternion_xyzw: [1, 0, 0, 0]}, noise: {model: constant, sigma_m: 0.002}}
@@ -138,6 +138,9 @@ TEST_F(AbsurdRecording, WhatIsMeasuredTwiceInOneStepIsRefused) {
 }
 
 TEST_F(AbsurdRecording, WhatIsOnlyOddIsSaidAndRead) {
+  EXPECT_THAT(warnings_with("shape: disc", "shape: sphere"),
+              ElementsAre(testing::AllOf(HasSubstr("a measured force of 'ball' is taken to press all of its radius"), HasSubstr("it touches about 0.0063 m"))));
+  EXPECT_THAT(warnings_with("shape: disc, radius_m: 0.02", "shape: sphere, radius_m: 0.02, radius_std_m: 0.01"), IsEmpty());
   EXPECT_THAT(warnings_with("radius_m: 0.02", "radius_m: 0.5"), ElementsAre(HasSubstr("more than the whole object")));
   EXPECT_THAT(warnings_with("fx_px: 10", "fx_px: 30"), ElementsAre(HasSubstr("pixels are mostly square")));
   EXPECT_THAT(warnings_with("cx_px: 3.5", "cx_px: 20"), testing::Contains(HasSubstr("far from the middle of the image of 8 x 6")));
