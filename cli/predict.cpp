@@ -65,13 +65,13 @@ int run(const Options& given, Session& session) {
   }
   for (const std::string& warning : warnings) session.warn(warning);
   constexpr double no_band = 1e-6;  // of the value: what rounding leaves of one
-  const auto tell = [&](const char* what, const prediction::Band& band, const char* unit) {
-    session.say(
-        fmt::format("{:<20} {}{}", what, report::quantity(band.value, unit),
-                    band.std > no_band * std::abs(band.value) ? "   95 % band " + report::interval(band.lower_95, band.upper_95, unit) : "   (given)"));
+  const auto tell = [&](const char* what, const prediction::Band& band, const char* unit, bool is_given = false) {
+    const bool banded = band.std > no_band * std::abs(band.value);
+    session.say(fmt::format("{:<20} {}{}", what, report::quantity(band.value, unit),
+                            is_given ? "   (given)" : banded ? "   95 % band " + report::interval(band.lower_95, band.upper_95, unit) : "   (whatever E is)"));
   };
-  tell("force", found.force_n, "N");
-  tell("travel", found.travel_m, "m");
+  tell("force", found.force_n, "N", given.force_n.has_value());
+  tell("travel", found.travel_m, "m", given.travel_m.has_value());
   tell("largest motion", found.largest_displacement_m, "m");
   tell("largest stress", found.largest_von_mises_pa, "Pa");
   session.say(fmt::format("stiffness            {:.4g} N/m (of the force to the travel there)", found.stiffness_n_m));
