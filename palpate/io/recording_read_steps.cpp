@@ -299,6 +299,7 @@ DepthFrame read_depth_frame(YamlKeys& keys, const TableRow* row, const std::stri
   DepthFrame frame = entry.frame;
   frame.pose_std_m = keys.within_or("pose_std_m", frame.pose_std_m, ranges::length_std);
   frame.pose_std_rad = keys.within_or("pose_std_rad", frame.pose_std_rad, ranges::angle_std);
+  frame.robot_is_masked = keys.boolean_or("robot_is_masked", false);
   bool has_pose = entry.has_pose;
   if (const auto pose = keys.optional("T_base_camera")) frame.T_base_camera = read_pose(*pose), has_pose = true;
   const auto file = keys.optional("file"), mask = keys.optional("mask");

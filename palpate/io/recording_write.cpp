@@ -105,6 +105,7 @@ struct RecordingWriter::Pages {
       put_file(stem + "_mask.png", mask_png(frame.mask));
       line.put("mask", stem + "_mask.png");
     }
+    if (frame.robot_is_masked) line.put("robot_is_masked", "true");  // or it would be masked again, as if it stood at the base
     line.put("T_base_camera", yaml_pose(frame.T_base_camera));
     line.number_unless(0, "pose_std_m", frame.pose_std_m).number_unless(0, "pose_std_rad", frame.pose_std_rad);
     return line.str();

@@ -65,6 +65,7 @@ inline Recording made_up() {
       if (i != 2) {
         frame.mask = MaskImage::Zero(6, 8);
         frame.mask(1, 2) = 1;
+        frame.robot_is_masked = true;
       }
       step.observations.emplace_back(frame);
       PointCloud cloud;

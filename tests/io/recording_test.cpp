@@ -277,6 +277,7 @@ TEST(WriteRecording, GivesBackWhatWasWritten) {
           const auto& other = std::get<DepthFrame>(b.observations[i]);
           EXPECT_EQ(frame->depth_m, other.depth_m);
           EXPECT_EQ(frame->mask, other.mask);
+          EXPECT_EQ(frame->robot_is_masked, other.robot_is_masked);
           EXPECT_EQ(frame->T_base_camera.matrix(), other.T_base_camera.matrix());
           EXPECT_EQ(frame->noise, other.noise);
           EXPECT_EQ(frame->camera.distortion_coefficients, other.camera.distortion_coefficients);
