@@ -10,6 +10,7 @@
 #include "cli/pressed_scene.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/fit.hpp"
+#include "palpate/fem/discretisation.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/report/words.hpp"
@@ -92,31 +93,15 @@ std::optional<std::string> beyond_what_was_seen(const Identification& answer, co
   return std::nullopt;
 }
 
-/// Longest edge of the elements whose centre is within a radius of a place; of none there, of the nearest.
-double longest_edge_m(const TetMesh& mesh, const Vec3& place_m, double radius_m) {
-  double longest_m = 0, nearest_m = std::numeric_limits<double>::infinity(), of_nearest_m = 0;
-  for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
-    const auto corner = [&](int k) { return Vec3(mesh.nodes_m.row(mesh.tetrahedra(e, k))); };
-    const double away_m = (0.25 * (corner(0) + corner(1) + corner(2) + corner(3)) - place_m).norm();
-    if (away_m > radius_m && away_m > nearest_m) continue;
-    double edge_m = 0;
-    for (int a = 0; a < 4; ++a)
-      for (int b = 0; b < a; ++b) edge_m = std::max(edge_m, (corner(a) - corner(b)).norm());
-    if (away_m <= radius_m) longest_m = std::max(longest_m, edge_m);
-    if (away_m < nearest_m) nearest_m = away_m, of_nearest_m = edge_m;
-  }
-  return longest_m > 0 ? longest_m : of_nearest_m;
-}
-
 /// The mesh was made fine where the object was pushed, and what it still does to E there was taken out.
 std::optional<std::string> coarse_there(const LearnedObject& learned, const Tool& tool, const Load& load) {
   const TetMesh& mesh = *learned.object.rest.volume;
-  const double radius_m = tool.radius_m, edge_m = longest_edge_m(mesh, load.contact_m, radius_m);
+  const double radius_m = tool.radius_m, edge_m = fem::longest_edge_near(mesh, {load.contact_m, radius_m});
   constexpr double fine = 0.75;  // quadratic elements follow a patch of one and a half edges a radius
   if (!(radius_m > 0) || edge_m < fine * radius_m) return std::nullopt;
   double pushed_m = std::numeric_limits<double>::infinity();
   for (const StepFit& step : learned.answer.steps)
-    if (step.force_n.norm() > 0 && step.tool_radius_m > 0) pushed_m = std::min(pushed_m, longest_edge_m(mesh, step.contact_m, step.tool_radius_m));
+    if (step.force_n.norm() > 0 && step.tool_radius_m > 0) pushed_m = std::min(pushed_m, fem::longest_edge_near(mesh, {step.contact_m, step.tool_radius_m}));
   constexpr double clearly = 1.25;
   if (!(edge_m > clearly * pushed_m)) return std::nullopt;
   return fmt::format("the mesh has edges of {} here, for a patch of {} radius, and of {} where the object was pushed: a coarse mesh is stiff, and "

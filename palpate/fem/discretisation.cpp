@@ -11,22 +11,6 @@
 namespace palpate::fem {
 namespace {
 
-/// Of a patch smaller than the elements: that of the nearest one.
-double longest_edge_near(const TetMesh& mesh, const ContactPatch& patch) {
-  double longest = 0, nearest_m = std::numeric_limits<double>::infinity(), of_nearest = 0;
-  for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
-    double distance = std::numeric_limits<double>::infinity(), edge = 0;
-    for (int a = 0; a < 4; ++a) {
-      const Vec3 x = mesh.nodes_m.row(mesh.tetrahedra(e, a)).transpose();
-      distance = std::min(distance, patch.distance_m(x));
-      for (int b = 0; b < a; ++b) edge = std::max(edge, (x - mesh.nodes_m.row(mesh.tetrahedra(e, b)).transpose()).norm());
-    }
-    if (distance <= patch.radius_m) longest = std::max(longest, edge);
-    if (distance < nearest_m) nearest_m = distance, of_nearest = edge;
-  }
-  return longest > 0 ? longest : of_nearest;
-}
-
 // The error left after two changes, where it falls as C h^p: (h0^p - h1^p) / (h1^p - h2^p) is the changes' ratio. Orders
 // beyond 2 are not believed: then the second change is small by chance, and the first one says what is left. Or the first is a
 // coarse mesh's that says nothing. The depth alone does not tell; where the area of the contact came to rest too, no chance is
@@ -50,6 +34,21 @@ double error_left(double first_change, double change, double h0, double h1, doub
 }
 
 }  // namespace
+
+double longest_edge_near(const TetMesh& mesh, const ContactPatch& patch) {
+  double longest = 0, nearest_m = std::numeric_limits<double>::infinity(), of_nearest = 0;
+  for (Index e = 0; e < mesh.tetrahedra.rows(); ++e) {
+    double distance = std::numeric_limits<double>::infinity(), edge = 0;
+    for (int a = 0; a < 4; ++a) {
+      const Vec3 x = mesh.nodes_m.row(mesh.tetrahedra(e, a)).transpose();
+      distance = std::min(distance, patch.distance_m(x));
+      for (int b = 0; b < a; ++b) edge = std::max(edge, (x - mesh.nodes_m.row(mesh.tetrahedra(e, b)).transpose()).norm());
+    }
+    if (distance <= patch.radius_m) longest = std::max(longest, edge);
+    if (distance < nearest_m) nearest_m = distance, of_nearest = edge;
+  }
+  return longest > 0 ? longest : of_nearest;
+}
 
 Discretisation discretise(const TetMesh& base, const Vec3& contact_m, double radius_m, const BoundaryOn& boundary_on,
                           const VectorX& force, const DiscretisationOptions& options) {

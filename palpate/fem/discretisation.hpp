@@ -32,6 +32,9 @@ RefinedMesh refine_near(const TetMesh& mesh, const Vec3& centre_m, double radius
 RefinedMesh refine_near(const TetMesh& mesh, const std::function<double(const Vec3&)>& distance_m, double edge_m,
                         double growth = 1.0, Index node_limit = 50000);
 
+/// Of the elements that reach into a patch; of a patch smaller than the elements, that of the nearest one.
+double longest_edge_near(const TetMesh& mesh, const ContactPatch& patch);
+
 /// Adds to a list of nodes of the base mesh the refined nodes whose two parents are in it.
 std::vector<Index> extend_nodes(std::vector<Index> nodes, const RefinedMesh& refined);
 
