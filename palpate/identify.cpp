@@ -14,6 +14,7 @@
 #include "palpate/estimation/contacts_on_surface.hpp"
 #include "palpate/estimation/deep_loads.hpp"
 #include "palpate/estimation/fit_on_fine_mesh.hpp"
+#include "palpate/estimation/moved_balls.hpp"
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/estimation/slips.hpp"
 #include "palpate/estimation/unseen_side.hpp"
@@ -403,7 +404,8 @@ Identified identify(const Recording& given, const IdentifyOptions& options, cons
   demand_right_values(wrong_values(given));
   Recording as_given = with_overrides(given, options);
   demand_loads(as_given);
-  if (options.method == "paper") as_given.regions.clear();  // the paper fits one stiffness
+  if (options.method == "paper") as_given.regions.clear();  // the paper fits one stiffness, and forces on patches
+  else as_given = estimation::with_balls_moved(std::move(as_given));
   std::vector<Points> masked_m;
   const estimation::Inputs all_observed = observe(as_given, &masked_m);  // sec. IV-B: point clouds, robot masked
   Identified out;

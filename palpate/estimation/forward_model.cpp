@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/observed_travel.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/estimation/names_of_unknowns.hpp"
@@ -42,11 +43,8 @@ std::vector<double> efforts(const Recording& recording) {
 
 /// Of an imposed motion in this one step: what the encoder that read it says of itself; 0 where none does.
 double travel_std_m(const Step& step, const Load& load) {
-  for (const auto& observation : step.observations) {
-    const auto* read = std::get_if<ToolTravel>(&observation);
-    if (read != nullptr && (read->tool.empty() || read->tool == load.tool) && read->sigma_m > 0) return read->sigma_m;
-  }
-  return 0;
+  const ToolTravel* read = observed_travel(step, load);
+  return read != nullptr && read->sigma_m > 0 ? read->sigma_m : 0;
 }
 
 }  // namespace

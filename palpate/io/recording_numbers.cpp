@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "palpate/core/observed_travel.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_reader.hpp"
 
@@ -310,28 +311,28 @@ class OddNumbers {
           pulls->source);
   }
 
-  /// A measured force acts on a patch of the tool's radius; a ball's patch grows with its depth (Hertz 1882).
+  /// A measured force acts on a patch of the tool's radius; a ball's patch grows with its depth (Hertz 1882). Where its travel was
+  /// read a fit goes by that.
   void look_at_ball(const Tool& ball) {
     double deepest_m = 0;
-    bool is_pressed = false;
-    for (const Push& push : recording_.pushes)
-      for (const Step& step : push.steps) {
-        is_pressed = is_pressed || std::any_of(step.loads.begin(), step.loads.end(), [&](const Load& load) {
-                       return load.tool == ball.name && load.force_n && load.force_n->norm() > 0;
-                     });
-        for (const Observation& one : step.observations) {
-          const auto* travel = std::get_if<ToolTravel>(&one);
-          if (travel != nullptr && (travel->tool.empty() || travel->tool == ball.name)) deepest_m = std::max(deepest_m, travel->travel_m);
+    bool is_unknown = false;
+    for (const Push& push : recording_.pushes) {
+      const bool slid = std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) { return step.slipped; });
+      if (shows_what_it_touches(ball, push) && !slid && !recording_.free) continue;
+      for (const Step& step : push.steps)
+        for (const Load& load : step.loads) {
+          if (load.tool != ball.name || !load.force_n || load.force_n->norm() == 0) continue;
+          is_unknown = true;
+          if (const ToolTravel* travel = observed_travel(step, load)) deepest_m = std::max(deepest_m, travel->travel_m);
         }
-      }
+    }
     const double touched_m = std::sqrt(ball.radius_m * deepest_m);
     constexpr double nearly_all = 0.8;
-    if (!is_pressed || touched_m > nearly_all * ball.radius_m) return;
+    if (!is_unknown || touched_m > nearly_all * ball.radius_m) return;
     const std::string seen =
         deepest_m > 0 ? fmt::format("at its deepest, {:.3g} m, it touches about {:.2g} m", deepest_m, touched_m) : "it touches less where it is shallow";
     say(fmt::format("a measured force of '{}' is taken to press all of its radius ({:.3g} m), but a ball touches about the root of radius times depth: "
-                    "{}. E comes out too low then; impose its motion (travel_m) and observe the force, or give the patch's radius as a disc's, or "
-                    "radius_std_m",
+                    "{}. E comes out too low then; observe its travel in every step that presses, or give the patch's radius as a disc's, or radius_std_m",
                     ball.name, ball.radius_m, seen),
         recording_.source);
   }

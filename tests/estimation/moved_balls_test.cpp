@@ -1,0 +1,138 @@
+// label: oracle
+// SPDX-License-Identifier: Apache-2.0
+// A ball whose force and travel were measured, as robots record it: Hertz's closed form is the measure.
+#include "palpate/estimation/moved_balls.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "palpate/core/observed_travel.hpp"
+#include "palpate/identify.hpp"
+#include "pushed_block.hpp"
+
+namespace palpate::estimation {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+constexpr double young_pa = 1e4, nu = 0.3, radius_m = 0.015;
+constexpr double sigma_m = 2e-5, sigma_n = 0.002;
+
+/// Hertz: F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5.
+double hertz_n(double depth_m) { return 4.0 / 3 * young_pa / (1 - nu * nu) * std::sqrt(radius_m) * std::pow(depth_m, 1.5); }
+
+/// A ball into a block on a table, as a wrist sensor and an encoder saw it.
+Recording pressed_block(unsigned seed) {
+  Recording recording = pushed_block_recording();
+  recording.rest.volume = kuhn_block(8, 8, 5, Vec3(0.08, 0.08, 0.05));
+  recording.supports[0].kind = SupportKind::plane;
+  recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
+  Tool ball;
+  ball.name = "ball";
+  ball.radius_m = radius_m;
+  ball.contact = ContactLaw::frictionless;
+  recording.tools = {ball};
+  recording.model.mesh = "as_given";
+  recording.model.refine = "none";
+  recording.model.material = "linear";
+  recording.model.poisson_fixed = nu;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise;
+  Push& push = recording.pushes[0];
+  push.force_tare_std_n = 0.001;
+  push.steps.clear();
+  for (const double depth_m : {0.0, 0.001, 0.0015, 0.002}) {
+    Load load;
+    load.tool = "ball";
+    load.contact_m = Vec3(0.04, 0.04, 0.05);
+    load.force_n = Vec3(0, 0, depth_m > 0 ? -hertz_n(depth_m) + sigma_n * noise(random) : 0);
+    load.force_std_n = sigma_n;
+    ToolTravel travel;
+    travel.travel_m = depth_m > 0 ? depth_m + sigma_m * noise(random) : 0;
+    travel.sigma_m = sigma_m;
+    Step step;
+    step.time_s = static_cast<double>(push.steps.size());
+    step.loads = {load};
+    step.observations = {travel};
+    push.steps.push_back(step);
+  }
+  return recording;
+}
+
+TEST(MovedBalls, AnEOfForceAndTravelIsHertzs) {
+  const Recording recording = pressed_block(1);
+  IdentifyOptions options;
+  const Identified found = identify(recording, options);
+  const Parameter& young = found.answer.parameters[0];
+  EXPECT_NEAR(young.value / young_pa, 1, 0.1) << "the mesh of 10 mm under a patch of 5 mm";
+  EXPECT_LT(young.lower_95, young_pa * 1.02);
+  EXPECT_THAT(found.object.warnings, Contains(HasSubstr("'ball' is a ball")));
+  ASSERT_EQ(found.answer.steps.size(), 4U);
+  EXPECT_NEAR(found.answer.steps[3].force_measured_n, hertz_n(0.002), 5 * sigma_n);
+  EXPECT_NEAR(found.answer.steps[3].force_predicted_n, hertz_n(0.002), 0.05 * hertz_n(0.002));
+
+  // The same, had its author given a patch of the ball's radius.
+  Recording patch = recording;
+  patch.tools[0].shape = ToolShape::disc;
+  EXPECT_LT(identify(patch, options).answer.parameters[0].value, 0.5 * young_pa) << "what is at stake";
+}
+
+TEST(MovedBalls, TheForceIsWhatWasObservedAlongThePush) {
+  Recording recording = pressed_block(2);
+  Step& last = recording.pushes[0].steps.back();
+  last.loads[0].force_n = Vec3(0.3, 0, -2);
+  last.loads[0].force_relative_std = 0.02;
+  Wrench felt;  // its torque is about nothing once the motion is imposed
+  felt.force_n = Vec3(0, 0, -2);
+  last.observations.push_back(felt);
+  const Recording moved = with_balls_moved(recording);
+  const Step& step = moved.pushes[0].steps.back();
+  EXPECT_FALSE(step.loads[0].force_n);
+  EXPECT_EQ(*step.loads[0].travel_m, std::get<ToolTravel>(step.observations[0]).travel_m);
+  ASSERT_EQ(step.observations.size(), 2U);
+  const auto& read = std::get<Wrench>(step.observations[1]);
+  EXPECT_EQ(read.force_n, Vec3(0, 0, -2));
+  EXPECT_EQ(read.along, Vec3(0, 0, -1));
+  EXPECT_NEAR(read.force_sigma_n, std::hypot(sigma_n, 0.02 * Vec3(0.3, 0, -2).norm()), 1e-12);
+  EXPECT_EQ(*moved.pushes[0].steps.front().loads[0].travel_m, 0) << "not yet touching";
+  EXPECT_EQ(moved.pushes[0].steps.front().observations.size(), 1U) << "and no force to see";
+  const Recording again = with_balls_moved(moved);
+  EXPECT_EQ(again.warnings.size(), moved.warnings.size());
+}
+
+TEST(MovedBalls, OthersKeepTheirForces) {
+  const auto keeps = [](const Recording& recording) {
+    const Recording same = with_balls_moved(recording);
+    EXPECT_THAT(same.warnings, IsEmpty());
+    return same.pushes[0].steps.back().loads[0].force_n.has_value();
+  };
+  const Recording ball = pressed_block(3);
+  Recording other = ball;
+  other.tools[0].shape = ToolShape::disc;
+  EXPECT_TRUE(keeps(other)) << "a pad";
+  other = ball;
+  other.tools[0].radius_std_m = 0.002;
+  EXPECT_TRUE(keeps(other)) << "its patch is known";
+  other = ball;
+  other.pushes[0].steps[2].observations.clear();
+  EXPECT_TRUE(keeps(other)) << "a travel that nobody read";
+  other = ball;
+  std::get<ToolTravel>(other.pushes[0].steps[2].observations[0]).tool = "stick";
+  EXPECT_TRUE(keeps(other)) << "another tool's";
+  other = ball;
+  other.pushes[0].steps[2].slipped = true;
+  EXPECT_TRUE(keeps(other)) << "it slid";
+  other = ball;
+  other.free = true;
+  EXPECT_TRUE(keeps(other)) << "nothing holds it";
+}
+
+}  // namespace
+}  // namespace palpate::estimation
