@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/core/recording_values.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/physical_range.hpp"
 
 namespace palpate {
 namespace {
@@ -14,9 +17,9 @@ class ValueChecker {
  public:
   void check(const Recording& recording) {
     tools_ = &recording.tools;
-    spread("force_scale_std", recording.force_scale_std);
-    spread("force_cross_talk_std", recording.force_cross_talk_std);
-    spread("time_offset_std_s", recording.time_offset_std_s);
+    spread("force_scale_std", recording.force_scale_std, ranges::share_std);
+    spread("force_cross_talk_std", recording.force_cross_talk_std, ranges::share_std);
+    spread("time_offset_std_s", recording.time_offset_std_s, ranges::clock_std);
     spread("density_kg_m3", recording.density_kg_m3);
     const double density = recording.density_kg_m3;
     if (std::isfinite(density) && (density > 30000 || (density > 0 && density < 5)))
@@ -24,14 +27,18 @@ class ValueChecker {
     spread("density_std_kg_m3", recording.density_std_kg_m3);
     finite("environment.gravity_m_s2", recording.environment.gravity_m_s2);
     check(recording.rest);
+    differ("tools", recording.tools);
+    differ("pushes", recording.pushes);
+    differ("regions", recording.regions);
+    for (std::size_t i = 0; i < recording.supports.size(); ++i) check(recording.supports[i], "supports[" + std::to_string(i) + "].");
     for (std::size_t i = 0; i < recording.tools.size(); ++i) check(recording.tools[i], "tools[" + std::to_string(i) + "].");
     for (std::size_t p = 0; p < recording.pushes.size(); ++p) {
       const Push& push = recording.pushes[p];
       const std::string at = "pushes[" + std::to_string(p) + "].";
-      spread(at + "force_tare_std_n", push.force_tare_std_n);
-      spread(at + "travel_offset_std_m", push.travel_offset_std_m);
-      spread(at + "torque_tare_std_nm", push.torque_tare_std_nm);
-      spread(at + "tip_std_m", push.tip_std_m);
+      spread(at + "force_tare_std_n", push.force_tare_std_n, ranges::force_std);
+      spread(at + "travel_offset_std_m", push.travel_offset_std_m, ranges::length_std);
+      spread(at + "torque_tare_std_nm", push.torque_tare_std_nm, ranges::torque_std);
+      spread(at + "tip_std_m", push.tip_std_m, ranges::length_std);
       for (std::size_t s = 0; s < push.steps.size(); ++s) {
         const std::string step = at + "steps[" + std::to_string(s) + "].";
         check(push.steps[s], recording.tools, step);
@@ -66,11 +73,32 @@ class ValueChecker {
     if (!fine) add(where, "holds NaN or infinity");
     return fine;
   }
-  void spread(const std::string& where, double value) {
-    if (finite(where, value) && value < 0) add(where, "is negative, " + std::to_string(value) + "; it must be 0 or more");
+  bool spread(const std::string& where, double value) {
+    const bool fine = finite(where, value) && value >= 0;
+    if (value < 0) add(where, fmt::format("is negative, {}; it must be 0 or more", value));
+    return fine;
   }
-  void sigma(const std::string& where, double value) {
-    if (!(value > 0) || !std::isfinite(value)) add(where, "must be a number above 0: the standard deviation of what was measured");
+  void spread(const std::string& where, double value, const PhysicalRange& range) {
+    if (spread(where, value)) within(where, value, range);
+  }
+  bool sigma(const std::string& where, double value, const PhysicalRange& range) {
+    if (value > 0 && std::isfinite(value)) return within(where, value, range);
+    add(where, "must be a number above 0: the standard deviation of what was measured");
+    return false;
+  }
+  bool within(const std::string& where, double value, const PhysicalRange& range) {
+    const bool fine = value >= range.least && value <= range.most;
+    const std::string unit = *range.unit == '\0' ? "" : std::string(" ") + range.unit;
+    if (!fine)
+      add(where, fmt::format("is {:g}{}, which cannot be: {:g} to {:g}{} is possible; {}", value, unit, range.least, range.most, unit, range.slip));
+    return fine;
+  }
+  /// Unknowns and messages go by these names.
+  template <typename Named>
+  void differ(const std::string& list, const std::vector<Named>& all) {
+    for (std::size_t i = 0; i < all.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        if (!all[i].name.empty() && all[i].name == all[j].name) return add(fmt::format("{}[{}].name", list, i), fmt::format("'{}' is that of {}[{}] too; names must differ", all[i].name, list, j));
   }
 
   template <typename Indices>
@@ -90,16 +118,24 @@ class ValueChecker {
       indices("rest.surface.triangles", rest.surface->triangles, rest.surface->vertices_m.rows());
     }
     for (std::size_t v = 0; v < rest.views.size(); ++v) check(rest.views[v], "rest.views[" + std::to_string(v) + "].");
-    spread("rest.surface_std_m", rest.surface_std_m);
+    spread("rest.surface_std_m", rest.surface_std_m, ranges::length_std);
+  }
+
+  void check(const Support& support, const std::string& at) {
+    spread(at + "pose_std_m", support.pose_std_m, ranges::length_std);
+    spread(at + "pose_std_rad", support.pose_std_rad, ranges::angle_std);
+    spread(at + "spread_std_m", support.spread_std_m, ranges::length_std);
+    spread(at + "compliance_m_per_n", support.compliance_m_per_n, ranges::compliance);
+    spread(at + "compliance_std_m_per_n", support.compliance_std_m_per_n, ranges::compliance);
   }
 
   void check(const Tool& tool, const std::string& at) {
-    spread(at + "radius_m", tool.radius_m);
-    spread(at + "radius_std_m", tool.radius_std_m);
-    spread(at + "length_m", tool.length_m);
-    spread(at + "friction_coefficient", tool.friction_coefficient);
-    spread(at + "compliance_m_per_n", tool.compliance_m_per_n);
-    spread(at + "compliance_std_m_per_n", tool.compliance_std_m_per_n);
+    spread(at + "radius_m", tool.radius_m, {0, ranges::tool_radius.most, "m", ranges::tool_radius.slip});
+    spread(at + "radius_std_m", tool.radius_std_m, ranges::length_std);
+    spread(at + "length_m", tool.length_m, {0, ranges::tool_length.most, "m", ranges::tool_length.slip});
+    spread(at + "friction_coefficient", tool.friction_coefficient, {0, ranges::friction.most, "", ranges::friction.slip});
+    spread(at + "compliance_m_per_n", tool.compliance_m_per_n, ranges::compliance);
+    spread(at + "compliance_std_m_per_n", tool.compliance_std_m_per_n, ranges::compliance);
   }
 
   void check(const Load& load, const std::string& at) {
@@ -107,24 +143,36 @@ class ValueChecker {
     if (!load.force_n && !load.travel_m) add(at + "force_n", "is not given, and travel_m neither; one of the two acts on the object");
     if (load.force_n && load.travel_m)
       add(at + "travel_m", "and force_n are both given; one is imposed, and what the other was is an observation (a ToolTravel or a Wrench)");
-    if (load.force_n) finite(at + "force_n", *load.force_n);
+    if (load.force_n && finite(at + "force_n", *load.force_n) && load.force_n->norm() > 0) can_press(at + "force_n", load);
     if (load.travel_m) finite(at + "travel_m", *load.travel_m);
-    spread(at + "force_std_n", load.force_std_n);
-    spread(at + "force_relative_std", load.force_relative_std);
-    spread(at + "contact_std_m", load.contact_std_m);
+    spread(at + "force_std_n", load.force_std_n, ranges::force_std);
+    spread(at + "force_relative_std", load.force_relative_std, ranges::share_std);
+    spread(at + "contact_std_m", load.contact_std_m, ranges::length_std);
     finite(at + "force_rate_n_s", load.force_rate_n_s);
     finite(at + "contact_m", load.contact_m);
     if (finite(at + "direction", load.direction) && !(load.direction.norm() > 1e-9)) add(at + "direction", "has no length; it is the unit vector of the push");
   }
 
+  /// A force needs a patch that it is spread over; said here, and not once a mesh was made.
+  void can_press(const std::string& where, const Load& load) {
+    for (const Tool& tool : *tools_) {
+      if (tool.name != load.tool || (tool.shape != ToolShape::platen && tool.shape != ToolShape::mesh)) continue;
+      add(where, "acts on '" + tool.name + "', which has no patch that a force is spread over: give its motion (travel_m), and the force as what was observed (a wrench)" +
+                     (tool.shape == ToolShape::mesh ? "; or describe the patch that it presses by a disc" : ""));
+    }
+  }
+
   void check(const DepthFrame& frame, const std::string& at) {
     finite(at + "time_s", frame.time_s);
     finite(at + "T_base_camera", frame.T_base_camera.matrix());
-    spread(at + "pose_std_m", frame.pose_std_m);
-    spread(at + "pose_std_rad", frame.pose_std_rad);
+    spread(at + "pose_std_m", frame.pose_std_m, ranges::length_std);
+    spread(at + "pose_std_rad", frame.pose_std_rad, ranges::angle_std);
     const Camera& camera = frame.camera;
     if (!(camera.fx_px > 0) || !(camera.fy_px > 0) || !std::isfinite(camera.fx_px + camera.fy_px + camera.cx_px + camera.cy_px))
       add(at + "camera", "fx_px and fy_px must be above 0, cx_px and cy_px finite");
+    if (frame.noise.model == "constant" && !std::isnan(frame.noise.sigma_m)) sigma(at + "noise.sigma_m", frame.noise.sigma_m, ranges::length_sigma);
+    spread(at + "noise.bias_std_m", frame.noise.bias_std_m, ranges::length_std);
+    spread(at + "noise.shared_std_m", frame.noise.shared_std_m, ranges::length_std);
     const auto size_of = [](const auto& image) { return std::to_string(image.cols()) + " x " + std::to_string(image.rows()); };
     if (frame.depth_m.cols() != camera.width_px || frame.depth_m.rows() != camera.height_px)
       add(at + "depth_m", "is " + size_of(frame.depth_m) + " pixels, its camera has " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px));
@@ -139,13 +187,13 @@ class ValueChecker {
     if (points > 0 && cloud.sigma_m.size() != 1 && cloud.sigma_m.size() != points)
       add(at + "sigma_m", "has " + std::to_string(cloud.sigma_m.size()) + " values; give one, or one a point (" + std::to_string(points) + ")");
     finite(at + "points_m", cloud.points_m);
-    spread(at + "pose_std_m", cloud.pose_std_m);
-    spread(at + "pose_std_rad", cloud.pose_std_rad);
-    if (cloud.sigma_m.size() > 0 && !((cloud.sigma_m.array() > 0) && cloud.sigma_m.array().isFinite()).all())
-      sigma(at + "sigma_m", 0);
+    spread(at + "pose_std_m", cloud.pose_std_m, ranges::length_std);
+    spread(at + "pose_std_rad", cloud.pose_std_rad, ranges::angle_std);
+    for (const double one : cloud.sigma_m)
+      if (!sigma(at + "sigma_m", one, ranges::length_sigma)) break;
   }
   void check(const Markers& markers, const std::string& at) {
-    sigma(at + "sigma_m", markers.sigma_m);
+    sigma(at + "sigma_m", markers.sigma_m, ranges::length_sigma);
     const auto names = static_cast<Eigen::Index>(markers.names.size()), rows = static_cast<Eigen::Index>(markers.observed_m.rows());
     if (markers.rest_m.rows() != rows || (names != 0 && names != rows))
       add(at + "observed_m", "has " + std::to_string(rows) + " rows, rest_m " + std::to_string(markers.rest_m.rows()) + " and names " + std::to_string(names) +
@@ -154,15 +202,15 @@ class ValueChecker {
   void check(const ToolTravel& travel, const std::string& at) {
     if (!travel.tool.empty()) known(at + "tool", travel.tool);
     finite(at + "travel_m", travel.travel_m);
-    sigma(at + "sigma_m", travel.sigma_m);
+    sigma(at + "sigma_m", travel.sigma_m, ranges::length_sigma);
   }
   void check(const Wrench& wrench, const std::string& at) {
     if (!wrench.tool.empty()) known(at + "tool", wrench.tool);
     finite(at + "force_n", wrench.force_n);
-    sigma(at + "force_sigma_n", wrench.force_sigma_n);
+    sigma(at + "force_sigma_n", wrench.force_sigma_n, ranges::force_sigma);
     if (!wrench.has_torque) return;
     finite(at + "torque_nm", wrench.torque_nm);
-    sigma(at + "torque_sigma_nm", wrench.torque_sigma_nm);
+    sigma(at + "torque_sigma_nm", wrench.torque_sigma_nm, ranges::torque_sigma);
   }
 
   void known(const std::string& where, const std::string& name) {

@@ -99,6 +99,34 @@ bool closed(const std::vector<Side>& sides) {
   return !sides.empty();
 }
 
+/// A closed part that faces inward is the wall of a cavity where another part surrounds it. Elsewhere it was written inside out, and
+/// would be carved away.
+Index turn_parts(TriMesh& mesh, const std::vector<std::vector<Index>>& patches) {
+  constexpr std::size_t most_asked = 200;
+  Index turned = 0;
+  for (const auto& patch : patches) {
+    TriMesh part{mesh.vertices_m, mesh.triangles(patch, Eigen::all)};
+    if (signed_volume(part) >= 0 || !closed(sorted_sides(part.triangles))) continue;
+    std::vector<char> own(static_cast<std::size_t>(mesh.triangles.rows()), 0);
+    for (const Index i : patch) own[static_cast<std::size_t>(i)] = 1;
+    std::vector<Index> rest;
+    for (Index i = 0; i < mesh.triangles.rows(); ++i)
+      if (own[static_cast<std::size_t>(i)] == 0) rest.push_back(i);
+    const WindingNumber around(TriMesh{mesh.vertices_m, mesh.triangles(rest, Eigen::all)});
+    const std::size_t asked = std::min(most_asked, patch.size());
+    std::size_t surrounded = 0;
+    for (std::size_t k = 0; k < asked; ++k) {
+      const auto corners = mesh.triangles.row(patch[k * patch.size() / asked]);
+      const Vec3 middle = (mesh.vertices_m.row(corners(0)) + mesh.vertices_m.row(corners(1)) + mesh.vertices_m.row(corners(2))).transpose() / 3;
+      surrounded += around(middle) > 0.5 ? 1 : 0;
+    }
+    if (surrounded == asked) continue;
+    for (const Index i : patch) std::swap(mesh.triangles(i, 1), mesh.triangles(i, 2));
+    turned += static_cast<Index>(patch.size());
+  }
+  return turned;
+}
+
 void close_holes(OrientedSurface& s, const std::vector<std::array<Index, 3>>& open) {
   HoleCovers covers = cover_holes(s.mesh, open);
   const auto first = s.mesh.triangles.rows();
@@ -163,6 +191,7 @@ OrientedSurface orient(const TriMesh& mesh) {
       out.flipped = n;
     }
     if (out.closed = closed(sides); !out.closed) close_holes(out, open);
+    else if (patches.size() > 1) out.flipped += turn_parts(out.mesh, patches);
     return out;
   }
   for (Index i = 0; i < n; ++i)

@@ -24,7 +24,7 @@ struct OrientedSurface {
 
 /// Orientation is carried over edges with two triangles; when the input was inconsistent, every patch is then turned so that
 /// most of the rays cast from its two sides agree on what is inside by the parity of their crossings. A consistent input
-/// keeps its orientation, unless all of it is inside out. Small holes are then closed.
+/// keeps its orientation, unless all of it is inside out, or a closed part of it that no other part surrounds. Small holes are then closed.
 OrientedSurface orient(const TriMesh& mesh);
 
 /// A soup seen as a solid: inside is where its winding number is above one half.

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "palpate/core/math.hpp"
-#include "palpate/io/physical_range.hpp"
+#include "palpate/core/physical_range.hpp"
 
 namespace palpate::io {
 

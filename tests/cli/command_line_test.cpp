@@ -3,10 +3,7 @@
 // The frame of the command line, seen from outside as a user and a script see it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -15,10 +12,13 @@
 #include <vector>
 
 #include "palpate/fem/materials.hpp"
+#include "said_by.hpp"
 #include "temporary_folder.hpp"
 
 namespace {
 
+using palpate::test::Said;
+using palpate::test::said_by;
 using palpate::test::TemporaryFolder;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -32,19 +32,12 @@ struct Outcome {
 Outcome palpate(const std::string& arguments) {
   const TemporaryFolder files("command_line");
   const auto errors = files / "stderr";
-  FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " 2>" + errors.string()).c_str(), "r");
-  Outcome outcome;
-  std::array<char, 4096> buffer;
-  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe))
-    outcome.out.append(buffer.data(), count);
-  const int status = pclose(pipe);
-  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  const Said said = said_by(std::string(PALPATE_CLI) + " " + arguments + " 2>" + errors.string());
   std::ifstream file(errors);
   std::stringstream text;
   text << file.rdbuf();
-  outcome.err = text.str();
   std::filesystem::remove(errors);
-  return outcome;
+  return {said.exit_code, said.text, text.str()};
 }
 
 std::vector<std::string> verbs() {
@@ -175,13 +168,7 @@ TEST(CommandLine, ProgressOnATerminalSaysStageAndShare) {
     GTEST_SKIP() << "no script(1), or no pseudo-terminals (/dev/pts): there is no terminal to show it on";
   const TemporaryFolder files("on_a_terminal");
   const auto folder = files / "out";
-  const std::string command =
-      "script -qec '" + std::string(PALPATE_CLI) + " record --demo -o " + folder.string() + "' /dev/null";
-  FILE* pipe = popen(command.c_str(), "r");
-  std::string seen;
-  std::array<char, 4096> buffer;
-  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) seen.append(buffer.data(), count);
-  pclose(pipe);
+  const std::string seen = said_by("script -qec '" + std::string(PALPATE_CLI) + " record --demo -o " + folder.string() + "' /dev/null").text;
   EXPECT_THAT(seen, testing::ContainsRegex("pressing the object +[0-9]+ %"));
   EXPECT_THAT(seen, HasSubstr("\r"));
   std::filesystem::remove_all(folder);
@@ -192,13 +179,7 @@ TEST(CommandLine, BashCompletionOffersVerbsAndTheirOptions) {
   const auto script = files / "palpate.bash";
   ASSERT_EQ(palpate("completion bash > " + script.string()).exit_code, 0);
   const auto complete = [&](const std::string& words, int at) {
-    const std::string command = "bash -c '. " + script.string() + "; COMP_WORDS=(" + words +
-                                "); COMP_CWORD=" + std::to_string(at) + "; _palpate; echo ${COMPREPLY[@]}'";
-    FILE* pipe = popen(command.c_str(), "r");
-    std::array<char, 4096> buffer{};
-    const std::size_t count = std::fread(buffer.data(), 1, buffer.size() - 1, pipe);
-    pclose(pipe);
-    return std::string(buffer.data(), count);
+    return said_by("bash -c '. " + script.string() + "; COMP_WORDS=(" + words + "); COMP_CWORD=" + std::to_string(at) + "; _palpate; echo ${COMPREPLY[@]}'").text;
   };
   EXPECT_THAT(complete("palpate doc", 1), HasSubstr("doctor"));
   EXPECT_THAT(complete("palpate doctor --th", 2), HasSubstr("--threads"));

@@ -3,10 +3,7 @@
 // `palpate model`, as a user and a script see it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -16,6 +13,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/recording.hpp"
+#include "said_by.hpp"
 #include "temporary_folder.hpp"
 
 namespace palpate {
@@ -33,13 +31,8 @@ struct Outcome {
 class Model : public testing::Test {
  protected:
   Outcome run(const std::string& arguments) const {
-    const std::string command = std::string(PALPATE_CLI) + " model " + arguments + " --json --quiet 2>/dev/null";
-    FILE* pipe = popen(command.c_str(), "r");
-    std::string out;
-    std::array<char, 4096> buffer;
-    while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) out.append(buffer.data(), count);
-    const int status = pclose(pipe);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, nlohmann::json::parse(out, nullptr, false)};
+    const test::Said said = test::said_by(std::string(PALPATE_CLI) + " model " + arguments + " --json --quiet 2>/dev/null");
+    return {said.exit_code, nlohmann::json::parse(said.text, nullptr, false)};
   }
 
   const test::TemporaryFolder files_{"model"};

@@ -5,11 +5,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -17,6 +14,7 @@
 #include "estimation/pushed_block.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/recording.hpp"
+#include "said_by.hpp"
 #include "temporary_folder.hpp"
 
 namespace palpate {
@@ -24,9 +22,7 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Outcome {
-  int exit_code = -1;
-  std::string text;
+struct Outcome : test::Said {
   nlohmann::json json;
   double value(const char* of) const { return json.at(of).at("value"); }
 };
@@ -34,12 +30,7 @@ struct Outcome {
 class AsLearned : public testing::Test {
  protected:
   Outcome run(const std::string& arguments, const char* said = "2>&1") const {
-    FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " " + said).c_str(), "r");
-    Outcome out;
-    std::array<char, 4096> buffer;
-    while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) out.text.append(buffer.data(), count);
-    const int status = pclose(pipe);
-    out.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    Outcome out{test::said_by(std::string(PALPATE_CLI) + " " + arguments + " " + said), {}};
     const auto brace = out.text.find('{');
     if (brace != std::string::npos) out.json = nlohmann::json::parse(out.text.substr(brace), nullptr, false);
     return out;

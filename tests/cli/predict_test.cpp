@@ -3,16 +3,14 @@
 // `palpate predict` and `palpate export` of a learned block: pushes that make no sense are refused, gravity acts once.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "estimation/pushed_block.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/recording.hpp"
+#include "said_by.hpp"
 #include "temporary_folder.hpp"
 
 namespace palpate {
@@ -20,10 +18,7 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Outcome {
-  int exit_code = -1;
-  std::string text;
-};
+using Outcome = test::Said;
 
 class LearnedBlock : public testing::Test {
  protected:
@@ -47,15 +42,7 @@ class LearnedBlock : public testing::Test {
     io::write_recording(recording, files_ / "recording");
     ASSERT_EQ(run("estimate " + (files_ / "recording").string() + " -o " + (files_ / "result").string() + " --quiet").exit_code, 0);
   }
-  Outcome run(const std::string& arguments) const {
-    FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " 2>&1").c_str(), "r");
-    Outcome out;
-    std::array<char, 4096> buffer;
-    while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) out.text.append(buffer.data(), count);
-    const int status = pclose(pipe);
-    out.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    return out;
-  }
+  Outcome run(const std::string& arguments) const { return test::said_by(std::string(PALPATE_CLI) + " " + arguments + " 2>&1"); }
   Outcome predict(const std::string& arguments) const { return run("predict " + (files_ / "result").string() + " --radius 0.006 " + arguments); }
 
   const test::TemporaryFolder files_{"learned_block"};

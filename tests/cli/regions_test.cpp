@@ -4,10 +4,8 @@
 // Truth and fit share their mesh: what meshes do to regions is tested where they are fitted.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -15,6 +13,7 @@
 #include "estimation/pushed_block.hpp"
 #include "palpate/io/file.hpp"
 #include "palpate/io/recording.hpp"
+#include "said_by.hpp"
 #include "temporary_folder.hpp"
 
 namespace palpate {
@@ -98,11 +97,9 @@ TEST_F(TwoHalves, EachSiteHasTheEOfItsHalf) {
 }
 
 std::string outcome_of(const std::string& arguments, int& exit_code) {
-  FILE* pipe = popen((std::string(PALPATE_CLI) + " " + arguments + " 2>&1").c_str(), "r");
-  std::string text;
-  for (int c = std::fgetc(pipe); c != EOF; c = std::fgetc(pipe)) text += static_cast<char>(c);
-  exit_code = WEXITSTATUS(pclose(pipe));
-  return text;
+  const test::Said said = test::said_by(std::string(PALPATE_CLI) + " " + arguments + " 2>&1");
+  exit_code = said.exit_code;
+  return said.text;
 }
 
 double poisson_of(const nlohmann::json& result, const std::string& region) {

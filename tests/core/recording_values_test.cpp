@@ -82,6 +82,30 @@ TEST(RecordingValues, WhatAnalysesWouldStumbleOverIsNamed) {
   EXPECT_THAT(wrong([&](Recording& r) { r.density_kg_m3 = 1.1; }), HasSubstr("density_kg_m3: is outside 5 to 30000 kg/m3; is it in g/cm3?"));
 }
 
+/// As files refuse them: the likely slip is named.
+TEST(RecordingValues, AWrongUnitIsNamedWithWhatIsPossible) {
+  const auto wrong = [](const std::function<void(Recording&)>& spoil) {
+    Recording recording = right();
+    spoil(recording);
+    const auto found = wrong_values(recording);
+    return found.size() == 1 ? found[0].where + ": " + found[0].what : std::to_string(found.size()) + " are wrong";
+  };
+  const auto seen = [](Recording& r, std::size_t o) -> Observation& { return r.pushes[0].steps[1].observations[o]; };
+  EXPECT_EQ(wrong([](Recording& r) { r.tools[0].radius_m = 10; }),
+            "tools[0].radius_m: is 10 m, which cannot be: 0 to 1 m is possible; is it in millimetres? It must be in metres");
+  EXPECT_THAT(wrong([](Recording& r) { r.force_scale_std = 2; }), HasSubstr("force_scale_std: is 2, which cannot be: 0 to 1 is possible; is it in percent?"));
+  EXPECT_THAT(wrong([](Recording& r) { r.tools[0].compliance_m_per_n = 0.4; }), HasSubstr("is it in mm/N?"));
+  EXPECT_THAT(wrong([](Recording& r) { r.supports.emplace_back().pose_std_rad = 2; }), HasSubstr("supports[0].pose_std_rad: is 2 rad"));
+  EXPECT_THAT(wrong([&](Recording& r) { std::get<DepthFrame>(seen(r, 0)).noise.sigma_m = 2; }), HasSubstr("observations[0].noise.sigma_m: is 2 m"));
+  EXPECT_THAT(wrong([&](Recording& r) { std::get<PointCloud>(seen(r, 1)).sigma_m(0) = 2; }), HasSubstr("observations[1].sigma_m: is 2 m"));
+  EXPECT_THAT(wrong([&](Recording& r) { std::get<Wrench>(seen(r, 4)).force_sigma_n = 1e6; }), HasSubstr("is it in millinewtons or grams?"));
+  EXPECT_THAT(wrong([](Recording& r) { r.pushes[0].steps[0].loads[0].contact_std_m = 3; }), HasSubstr("loads[0].contact_std_m: is 3 m"));
+  EXPECT_THAT(wrong([](Recording& r) { r.tools[0].shape = ToolShape::platen; }),
+              HasSubstr("pushes[0].steps[1].loads[0].force_n: acts on 'stick', which has no patch that a force is spread over: give its motion (travel_m)"));
+  EXPECT_EQ(wrong([](Recording& r) { r.tools.push_back(r.tools[0]); }), "tools[1].name: 'stick' is that of tools[0] too; names must differ");
+  EXPECT_EQ(wrong([](Recording& r) { r.pushes.push_back(r.pushes[0]); }), "pushes[1].name: 'push 1' is that of pushes[0] too; names must differ");
+}
+
 TEST(RecordingValues, WhatIsWrongIsNamedByItsPlace) {
   const auto step = [](Recording& r) -> Step& { return r.pushes[0].steps[1]; };
   const auto load = [](Recording& r) -> Load& { return r.pushes[0].steps[1].loads[0]; };

@@ -315,6 +315,28 @@ TEST(Tetrahedralise, an_inner_shell_that_faces_inward_is_a_cavity_and_all_inside
   EXPECT_NEAR(t.check.volume_m3, r.check.volume_m3, 1e-3 * r.check.volume_m3);
 }
 
+// It was carved away: of two balls side by side one was missing, and of parts that overlap what they have in common.
+TEST(Tetrahedralise, a_part_that_was_written_inside_out_is_turned) {
+  const auto turned = [](TriMesh mesh) {
+    mesh.triangles.col(1).swap(mesh.triangles.col(2));
+    return mesh;
+  };
+  const TriMesh body = shapes::sphere(0.05, 3), beside = shapes::sphere(0.03, 3, Vec3(0.1, 0, 0)), through = shapes::sphere(0.03, 3, Vec3(0.05, 0, 0)),
+                within = shapes::sphere(0.02, 3);
+  for (const TriMesh& part : {beside, through}) {
+    const TriMesh mesh = shapes::join(body, turned(part));
+    const OrientedSurface oriented = orient(mesh);
+    EXPECT_EQ(oriented.flipped, part.triangles.rows());
+    const Solid right(shapes::join(body, part)), found(mesh);
+    EXPECT_NEAR(found.signed_volume_m3(), right.signed_volume_m3(), 1e-12);
+    EXPECT_TRUE(found.inside(part.vertices_m.colwise().mean().transpose()));
+  }
+  // All inside out and one part right: the large ones decide, and then the small one is turned back.
+  EXPECT_NEAR(Solid(shapes::join(turned(body), beside)).signed_volume_m3(), Solid(shapes::join(body, beside)).signed_volume_m3(), 1e-12);
+  EXPECT_EQ(orient(shapes::join(body, turned(within))).flipped, 0) << "a cavity";
+  EXPECT_FALSE(Solid(shapes::join(body, turned(within))).inside(Vec3::Zero()));
+}
+
 // Where many places are finer, the cells elsewhere grow to keep the count; a solid bar is no thin shell for that.
 TEST(Tetrahedralise, a_bar_that_is_finer_under_its_tool_and_at_its_foot_is_filled) {
   const TriMesh m = lab::box_surface({0.56, -0.04, 0}, {0.64, 0.04, 0.16}, 20);

@@ -155,6 +155,12 @@ TEST_F(AbsurdRecording, WhatIsOnlyOddIsSaidAndRead) {
               ElementsAre(HasSubstr("gravity_m_s2")));
 }
 
+TEST_F(AbsurdRecording, ABallWhoseTravelWasReadWhereverItPressesIsRight) {
+  const std::string seen = "[{kind: depth, camera: top, file: depth.png, time_s: 0.1}", both = seen + ", {kind: travel, travel_m: 0.001, sigma_m: 0.0005}";
+  folder.put("recording.yaml", replaced(replaced(whole_index, "shape: disc", "shape: sphere"), seen, both));
+  EXPECT_THAT(read_recording(folder.path()).warnings, IsEmpty());
+}
+
 // An E was found of what a camera of a wrong pose saw elsewhere.
 TEST_F(AbsurdRecording, ACameraThatShowsTheObjectNowhereIsSaid) {
   EXPECT_THAT(warnings_with("position_m: [0.05, 0.05, 0.6]", "position_m: [1.5, 0.05, 0.6]"),

@@ -3,7 +3,7 @@
 // answer from it would be a number without a meaning.
 #pragma once
 
-namespace palpate::io {
+namespace palpate {
 
 struct PhysicalRange {
   double least, most;
@@ -41,4 +41,4 @@ inline constexpr PhysicalRange centre_over_width{-10, 10, "", "it must be in pix
 
 }  // namespace ranges
 
-}  // namespace palpate::io
+}  // namespace palpate
