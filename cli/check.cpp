@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "cli/bag_recording.hpp"
 #include "cli/number_checks.hpp"
@@ -39,6 +41,27 @@ TriMesh body_of(const Recording& recording) {
   if (recording.rest.surface) return *recording.rest.surface;
   if (recording.rest.volume) return geometry::boundary_surface(*recording.rest.volume).surface;
   throw Error("give the body's shape in the base frame as rest.surface_mesh", "rest");
+}
+
+template <typename Vector>
+std::vector<double> numbers(const Vector& of) {
+  return {of.data(), of.data() + of.size()};
+}
+
+/// Where the camera of the first image stands by what was found.
+std::string camera_as_found(const Recording& recording, const Pose& correction) {
+  for (const auto& push : recording.pushes)
+    for (const auto& step : push.steps)
+      for (const auto& observation : step.observations) {
+        const auto* frame = std::get_if<DepthFrame>(&observation);
+        if (frame == nullptr) continue;
+        const Pose found = correction * frame->T_base_camera;
+        const Eigen::Quaterniond turned(found.linear());
+        const Vec3 at = found.translation();
+        return fmt::format("; by it the first image's T_base_camera is position_m: [{:.4f}, {:.4f}, {:.4f}], quaternion_xyzw: [{:.4f}, {:.4f}, {:.4f}, {:.4f}]",
+                           at.x(), at.y(), at.z(), turned.x(), turned.y(), turned.z(), turned.w());
+      }
+  return "";
 }
 
 int run(const Options& given, Session& session) {
@@ -77,10 +100,17 @@ int run(const Options& given, Session& session) {
                               {"consistent", error.consistent}});
     fine = fine && error.consistent;
   }
+  const auto sees = [](const std::string& code) { return code == "camera_sees_something_else" || code == "touch_misses_body"; };
+  if (check.rays > 0) {
+    json["hand_eye_pivot_m"] = numbers(check.pivot_m);
+    for (int row = 0; row < 4; ++row) json["hand_eye_correction"].push_back(numbers(VectorX(check.hand_eye_correction.matrix().row(row))));
+    session.say(fmt::format("hand_eye is about {:.4g} {:.4g} {:.4g} m, the body's middle{}", check.pivot_m.x(), check.pivot_m.y(), check.pivot_m.z(),
+                            camera_as_found(recording, check.hand_eye_correction)));
+  }
   for (const auto& verdict : check.verdicts) {
     session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
     json["verdicts"].push_back({{"code", verdict.code}, {"message", verdict.message}});
-    fine = fine && verdict.code != "does_not_fit";
+    fine = fine && verdict.code != "does_not_fit" && !sees(verdict.code);
   }
   if (!check.message.empty()) session.warn(check.message);
   if (fine && undetermined.empty())
@@ -100,11 +130,12 @@ Run verbs::check(CLI::App& app) {
                  "of pushes on the known body: forces, travels, and depth images if there is a camera")
       ->required();
   app.add_option("--mapping", given->mapping, "what a bag's topics mean (default: mapping.yaml beside it)");
-  app.add_option("--stiffness", given->stiffness_n_per_m,
-                 "of the spring along every push, N/m; its plate is the recording's surface")
-      ->check(positive_number());
+  auto* const stiffness = app.add_option("--stiffness", given->stiffness_n_per_m,
+                 "of the spring along every push, N/m; its plate is the recording's surface");
+  stiffness->check(positive_number());
   app.add_flag("--rigid", given->rigid, "the body does not give way at all");
   app.add_option("--stiffness-std", given->check.stiffness_relative_std, "how well the stiffness is known, relative")
+      ->needs(stiffness)
       ->check(number_from_zero())
       ->capture_default_str();
   app.add_option("--placed-within", given->check.placed_std_m,

@@ -17,6 +17,7 @@ class ValueChecker {
  public:
   void check(const Recording& recording) {
     tools_ = &recording.tools;
+    any_size_ = recording.accept_size;
     spread("force_scale_std", recording.force_scale_std, ranges::share_std);
     spread("force_cross_talk_std", recording.force_cross_talk_std, ranges::share_std);
     spread("time_offset_std_s", recording.time_offset_std_s, ranges::clock_std);
@@ -81,6 +82,9 @@ class ValueChecker {
   void spread(const std::string& where, double value, const PhysicalRange& range) {
     if (spread(where, value)) within(where, value, range);
   }
+  void size(const std::string& where, double value, const PhysicalRange& of_tools) {
+    if (spread(where, value) && !any_size_) within(where, value, {0, of_tools.most, of_tools.unit, of_tools.slip});
+  }
   bool sigma(const std::string& where, double value, const PhysicalRange& range) {
     if (value > 0 && std::isfinite(value)) return within(where, value, range);
     add(where, "must be a number above 0: the standard deviation of what was measured");
@@ -130,9 +134,9 @@ class ValueChecker {
   }
 
   void check(const Tool& tool, const std::string& at) {
-    spread(at + "radius_m", tool.radius_m, {0, ranges::tool_radius.most, "m", ranges::tool_radius.slip});
+    size(at + "radius_m", tool.radius_m, ranges::tool_radius);
     spread(at + "radius_std_m", tool.radius_std_m, ranges::length_std);
-    spread(at + "length_m", tool.length_m, {0, ranges::tool_length.most, "m", ranges::tool_length.slip});
+    size(at + "length_m", tool.length_m, ranges::tool_length);
     spread(at + "friction_coefficient", tool.friction_coefficient, {0, ranges::friction.most, "", ranges::friction.slip});
     spread(at + "compliance_m_per_n", tool.compliance_m_per_n, ranges::compliance);
     spread(at + "compliance_std_m_per_n", tool.compliance_std_m_per_n, ranges::compliance);
@@ -219,6 +223,7 @@ class ValueChecker {
   }
 
   const std::vector<Tool>* tools_ = nullptr;
+  bool any_size_ = false;
   std::vector<WrongValue> found_;
 };
 

@@ -31,7 +31,8 @@ enum Fixed {
   camera_turn = 6,
   body = 9,  // likewise
   body_turn = 12,
-  pushes_from = 15  // tare and zero of each
+  bias = 15,  // of depths, along the ray
+  pushes_from = 16  // tare and zero of each
 };
 
 struct Reading {  // of one loaded step
@@ -47,6 +48,7 @@ struct Touch {
 
 struct View {
   std::size_t push = 0;
+  bool pressed = false;  ///< else nothing moves the body, whatever the sensor's zero
   double force_n = 0;
   Vec3 direction = Vec3::Zero();
   RayCloud rays;
@@ -77,7 +79,7 @@ struct Rows {
   std::vector<double> travel, touch, ray;  // in standard deviations; a ray that misses: infinite
   std::vector<Vec3> normal;                // of the plane that each ray met, in the body's frame
   double travel_squares = 0, ray_squares = 0;
-  std::size_t rays_hit = 0;
+  std::size_t rays_hit = 0, touches_missed = 0;
 };
 
 /// From a ray as it is stated to the body's own frame: origin' = turn origin + shift, direction' = turn direction.
@@ -89,7 +91,7 @@ struct RayMap {
 RayMap map_of(const Problem& p, const VectorX& x, const View& view) {
   const RigidOffset moved{x.segment<3>(body), x.segment<3>(body_turn), p.pivot_m};
   const RigidOffset seen{x.segment<3>(camera), x.segment<3>(camera_turn), p.pivot_m};
-  const Vec3 given_way = p.force_n(x, view.push, view.force_n) * p.give_of(x) * view.direction;
+  const Vec3 given_way = view.pressed ? Vec3(p.force_n(x, view.push, view.force_n) * p.give_of(x) * view.direction) : Vec3::Zero();
   const Mat3 back = moved.rotation().transpose();
   return {back * seen.rotation(), moved.apply_inverse(seen.apply(Vec3::Zero()) - given_way)};
 }
@@ -111,6 +113,7 @@ Rows residuals(const Problem& p, const VectorX& x, bool with_rays = true) {
     const double back_m = 0.1;
     const auto hit = p.tree.cast(tip - back_m * along, along);
     rows.touch.push_back(hit ? (back_m - hit->range_m) / t.std_m : 0);
+    rows.touches_missed += hit ? 0 : 1;
   }
   if (!with_rays) return rows;
   for (const View& view : p.views) {
@@ -129,7 +132,7 @@ Rows residuals(const Problem& p, const VectorX& x, bool with_rays = true) {
         rows.ray.push_back(std::numeric_limits<double>::infinity());
         continue;
       }
-      const double off = view.rays.range_m(i) - hit->range_m;
+      const double off = view.rays.range_m(i) - x(bias) - hit->range_m;
       rows.ray.push_back(off / view.rays.sigma_m(i));
       if (std::abs(rows.ray.back()) < tukey_cut) rows.ray_squares += off * off, ++rows.rays_hit;
     }
@@ -195,11 +198,12 @@ Normal normal_equations(const Problem& p, const VectorX& x, const std::vector<in
       const double weight = std::isfinite(r) ? tukey_weight(r, cut) : 0;
       if (weight == 0) continue;
       const Vec3 origin = view.rays.origins_m.row(i), direction = view.rays.directions.row(i);
-      const double range_m = view.rays.range_m(i) - r * view.rays.sigma_m(i);
+      const double range_m = view.rays.range_m(i) - x(bias) - r * view.rays.sigma_m(i);
       const Vec3 gradient = here.normal[ray] / (here.normal[ray].dot(map.turn * direction) * view.rays.sigma_m(i));
       for (Index c = 0; c < columns; ++c) {
         const RayMap& slope = slopes[static_cast<std::size_t>(c)];
-        row(c) = gradient.dot(slope.turn * (origin + range_m * direction) + slope.shift);
+        row(c) = moving[static_cast<std::size_t>(c)] == bias ? -1 / view.rays.sigma_m(i)
+                                                             : gradient.dot(slope.turn * (origin + range_m * direction) + slope.shift);
       }
       out.hessian.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
       out.gradient += weight * r * row;
@@ -277,9 +281,11 @@ Problem problem_of(const Recording& recording, const TriMesh& surface, const Inp
             p.readings.push_back({k, force_n, std::hypot(load->force_std_n, load->force_relative_std * force_n),
                                   travel->travel_m, travel->sigma_m});
       }
-      if (s < inputs.size())
+      // How far a spring gives under a force that nobody measured is not known.
+      const bool tells = p.give == 0 || load == nullptr || load->force_n;
+      if (s < inputs.size() && tells)
         if (const TermInput* rays = rays_in(inputs[s]))
-          p.views.push_back({k, force_n, direction, thinned(std::get<RayObservation>(*rays).rays)});
+          p.views.push_back({k, force_n != 0, force_n, direction, thinned(std::get<RayObservation>(*rays).rays)});
       ++s;
     }
   }
@@ -289,6 +295,8 @@ Problem problem_of(const Recording& recording, const TriMesh& surface, const Inp
   p.prior_std(scale) = options.stiffness_n_per_m ? options.force_scale_std : recording.force_scale_std;
   p.prior_std(compliance) = options.compliance_std_m_per_n;
   p.prior_std(spring) = options.stiffness_n_per_m ? options.stiffness_relative_std : 0;
+  for (const auto& step : inputs)
+    if (const TermInput* rays = rays_in(step)) p.prior_std(bias) = std::max(p.prior_std(bias), std::get<RayObservation>(*rays).bias_std_m);
   if (!p.views.empty()) {
     p.prior_std.segment<3>(camera).setConstant(options.hand_eye_std_m);
     p.prior_std.segment<3>(camera_turn).setConstant(options.hand_eye_std_rad);
@@ -328,11 +336,23 @@ void judge(const Problem& p, double dof, SelfCheck& check) {
     else if (group == "force_tare")
       said["force_tare_off"] =
           "the force's zero is off by more than force_tare_std_n allows: tare just before each push, away from the object";
+    else if (group == "depth_bias")
+      said["depth_bias_off"] = fmt::format("depths are {:.3g} mm too {}, by more than noise.bias_std_m allows: correct them, or state how far they may be off",
+                                           1e3 * std::abs(error.value), error.value > 0 ? "far" : "near");
     else
       said["hand_eye_off"] =
           "the camera does not stand where T_base_camera says, by more than pose_std_m and pose_std_rad allow: "
-          "calibrate it against the robot, or take the offset below into T_base_camera";
+          "calibrate it against the robot, or put hand_eye_correction before T_base_camera";
   }
+  constexpr double most = 0.5;
+  const bool sees_it = check.rays > most * static_cast<double>(check.rays_given);
+  if (!sees_it && check.rays_given > 0)
+    said["camera_sees_something_else"] =
+        fmt::format("only {} of {} rays end on the body: is rest its shape where it stands in the base frame, and T_base_camera the camera's pose there, "
+                    "in metres?", check.rays, check.rays_given);
+  if (check.touches_missed > 0)
+    said["touch_misses_body"] = fmt::format("the tip's way meets the body in {} of {} first touches: do contact_m (or T_base_tip), direction and rest share the base frame?",
+                                            check.touches, check.touches + check.touches_missed);
   bool scale_known = false, camera_known = !p.views.empty();
   for (const auto& error : check.errors) {
     if (error.name == "force_scale") scale_known = error.determined;
@@ -344,7 +364,7 @@ void judge(const Problem& p, double dof, SelfCheck& check) {
             ? "this spring tells scale and compliance apart only where the camera sees it give way: record depth images "
               "of the loaded spring, or check compliance on a rigid block first"
             : "a rigid block says nothing of the force's scale: push a spring of known stiffness as well";
-  if (!camera_known)
+  if (!camera_known && (sees_it || p.views.empty()))
     said["hand_eye_not_determined"] =
         p.views.empty() ? "no depth images: the camera's place cannot be checked"
                         : "the surface that is seen can slide along itself: show the camera three faces of the body";
@@ -368,6 +388,7 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   Normal at;
   for (const double widening : {16.0, 4.0, 1.0}) {
     double damping = 1e-6;
+    check.converged = false;
     at = normal_equations(p, x, moving, widening);
     for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
       MatrixX damped = at.hessian;
@@ -388,7 +409,7 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
       } else {
         damping *= 10;
         if (damping > 1e8) {
-          check.converged = true;  // rounding of triangle edges
+          check.converged = std::isfinite(at.cost);  // rounding of triangle edges
           break;
         }
       }
@@ -403,7 +424,7 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   for (const double r : left.touch) chi2 += r * r;
   for (const double r : left.ray) chi2 += std::abs(r) < tukey_cut ? r * r : 0;  // as they are counted
   // A prior is a row, too: what moves under one costs no degree of freedom, and its pull counts.
-  double dof = static_cast<double>(left.travel.size() + left.touch.size() + left.rays_hit);
+  double dof = static_cast<double>(left.travel.size() + left.touch.size() - left.touches_missed + left.rays_hit);
   for (const int k : moving) {
     if (std::isfinite(p.prior_std(k))) chi2 += std::pow(x(k) / p.prior_std(k), 2);
     else --dof;
@@ -411,8 +432,14 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   dof = std::max(1.0, dof);
   check.chi2_per_dof = chi2 / dof;
   check.travels = left.travel.size();
-  check.touches = left.touch.size();
+  check.touches_missed = left.touches_missed;
+  check.touches = left.touch.size() - left.touches_missed;
   check.rays = left.rays_hit;
+  check.rays_given = left.ray.size();
+  const RigidOffset seen{x.segment<3>(camera), x.segment<3>(camera_turn), p.pivot_m};
+  check.pivot_m = p.pivot_m;
+  check.hand_eye_correction.linear() = seen.rotation();
+  check.hand_eye_correction.translation() = seen.apply(Vec3::Zero());
   check.travel_rms_m = std::sqrt(left.travel_squares / std::max<double>(1, static_cast<double>(check.travels)));
   check.depth_rms_m = std::sqrt(left.ray_squares / std::max<double>(1, static_cast<double>(check.rays)));
 
@@ -442,6 +469,7 @@ SelfCheck self_check(const Recording& recording, const TriMesh& surface, const I
   const char* axes[] = {"x", "y", "z"};
   for (int d = 0; d < 3; ++d) add(std::string("hand_eye_") + axes[d], "m", camera + d, pose_std_m);
   for (int d = 0; d < 3; ++d) add(std::string("hand_eye_rotation_") + axes[d], "rad", camera_turn + d, pose_std_rad);
+  add("depth_bias", "m", bias, p.prior_std(bias));
   for (std::size_t k = 0; k < recording.pushes.size(); ++k) {
     // Its prior is what the recording states: it is told by its pull.
     const double stated = recording.pushes[k].force_tare_std_n;

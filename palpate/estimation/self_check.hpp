@@ -33,7 +33,9 @@ struct SelfCheckOptions {
 
 /// One error: found, with its interval, against what the recording states.
 struct CheckedError {
-  std::string name;  ///< force_scale, compliance, hand_eye_x ..., hand_eye_rotation_x ..., force_tare[push]
+  /// force_scale, compliance, hand_eye_x ..., hand_eye_rotation_x ... (about the body's middle, SelfCheck::pivot_m), depth_bias,
+  /// force_tare[push]
+  std::string name;
   std::string unit;
   double value = 0, std = 0, lower_95 = 0, upper_95 = 0;
   double stated_std = 0;    ///< of the recording; 0: it was taken as exact
@@ -47,13 +49,17 @@ struct SelfCheck {
   double chi2_per_dof = 0;
   double travel_rms_m = 0, depth_rms_m = 0;  ///< residuals
   std::size_t travels = 0, rays = 0, touches = 0;
+  std::size_t rays_given = 0, touches_missed = 0;  ///< with those that pass the body by, or end elsewhere
+  Vec3 pivot_m = Vec3::Zero();  ///< the middle of the body's vertices, base frame: hand_eye turns about it
+  /// From where the camera is said to stand to where it stands: T_base_camera = hand_eye_correction * T_base_camera as stated.
+  Pose hand_eye_correction = Pose::Identity();
   bool converged = false;
   std::string message;
 };
 
 /// @param recording  pushes with measured forces and read travels on the body; rest surface = the body in the base frame
 /// @param body       its surface at rest
-/// @param inputs     one list a step (rays and clouds are used)
+/// @param inputs     one list a step (rays are used)
 /// @throws Error when no push carries a force and a travel, or options are out of range.
 SelfCheck self_check(const Recording& recording, const TriMesh& body, const Inputs& inputs,
                      const SelfCheckOptions& options = {});

@@ -28,10 +28,22 @@ constexpr double sigma_m = 2e-5, sigma_n = 0.002;
 /// Hertz: F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5.
 double hertz_n(double depth_m) { return 4.0 / 3 * young_pa / (1 - nu * nu) * std::sqrt(radius_m) * std::pow(depth_m, 1.5); }
 
+/// Finer under the ball, at the middle of the top: 3.5 mm there.
+TetMesh block() {
+  const Vec3 size_m(0.08, 0.08, 0.05);
+  TetMesh mesh = kuhn_block(8, 8, 5, size_m);
+  const auto drawn_in = [](double s) { return s * (0.35 + 0.65 * s * s); };  // from -1 to 1
+  for (Index n = 0; n < mesh.nodes_m.rows(); ++n) {
+    for (int d = 0; d < 2; ++d) mesh.nodes_m(n, d) = 0.5 * size_m(d) * (1 + drawn_in(2 * mesh.nodes_m(n, d) / size_m(d) - 1));
+    mesh.nodes_m(n, 2) = size_m.z() * (1 - drawn_in(1 - mesh.nodes_m(n, 2) / size_m.z()));
+  }
+  return mesh;
+}
+
 /// A ball into a block on a table, as a wrist sensor and an encoder saw it.
 Recording pressed_block(unsigned seed) {
   Recording recording = pushed_block_recording();
-  recording.rest.volume = kuhn_block(8, 8, 5, Vec3(0.08, 0.08, 0.05));
+  recording.rest.volume = block();
   recording.supports[0].kind = SupportKind::plane;
   recording.supports[0].plane = {Vec3::Zero(), Vec3::UnitZ()};
   Tool ball;
@@ -69,9 +81,10 @@ Recording pressed_block(unsigned seed) {
 TEST(MovedBalls, AnEOfForceAndTravelIsHertzs) {
   const Recording recording = pressed_block(1);
   IdentifyOptions options;
+  options.fit.cross_checks = false;
   const Identified found = identify(recording, options);
   const Parameter& young = found.answer.parameters[0];
-  EXPECT_NEAR(young.value / young_pa, 1, 0.1) << "the mesh of 10 mm under a patch of 5 mm";
+  EXPECT_NEAR(young.value / young_pa, 1, 0.1) << "the mesh, which stays as it is";
   EXPECT_LT(young.lower_95, young_pa * 1.02);
   EXPECT_THAT(found.object.warnings, Contains(HasSubstr("'ball' is a ball")));
   ASSERT_EQ(found.answer.steps.size(), 4U);
