@@ -72,11 +72,14 @@ json list_by_load(const std::vector<YoungAtLoad>& items) {
   return list;
 }
 
-std::string file_name_of(const std::string& path) {
+/// Its file's or folder's; of the folder that one stands in ("."), which says nothing, its own.
+std::string name_of(const Recording& recording) {
+  const std::string& path = recording.source;
   const std::size_t end = path.find_last_not_of('/');
-  if (end == std::string::npos) return path;
+  if (end == std::string::npos) return path.empty() ? recording.name : path;
   const std::size_t slash = path.find_last_of('/', end);
-  return path.substr(slash + 1, end - slash);
+  const std::string last = path.substr(slash + 1, end - slash);
+  return last == "." || last == ".." ? recording.name : last;
 }
 
 double root_mean_square(const VectorX& values) {
@@ -241,7 +244,7 @@ json scene_of(const Recording& recording) {
     supports.push_back(support.name.empty() ? words_of(support.kind) : support.name + ": " + words_of(support.kind));
   }
   if (recording.free) supports.push_back("free");
-  return {{"source", file_name_of(recording.source)},
+  return {{"source", name_of(recording)},
           {"rest_state", words_of(recording.rest.state)},
           {"gravity_m_s2", as_json(recording.environment.gravity_m_s2)},
           {"tools", tools},
@@ -334,8 +337,7 @@ void add_geometry(json& page, const Identification& identification, const Payloa
 
 json payload(const Identification& identification, const Recording* recording, const PayloadOptions& options) {
   std::string title = options.title;
-  if (title.empty() && recording != nullptr) title = file_name_of(recording->source);
-  if (title.empty() && recording != nullptr) title = recording->name;
+  if (title.empty() && recording != nullptr) title = name_of(*recording);
   if (title.empty()) title = "palpate";
 
   json page;

@@ -119,6 +119,16 @@ TEST(Report, CarriesEveryNumberOfTheAnswerInFull) {
   EXPECT_EQ(counted, id.fit.points_used);
 }
 
+TEST(Report, OfTheFolderOneStandsInHasTheRecordingsName) {
+  for (const char* here : {".", "./", "..", ""}) {
+    Recording recording = pressed_block::recording();
+    recording.name = "sponge", recording.source = here;
+    const json data = data_of(report::html(pressed_block::identification(), &recording));
+    EXPECT_EQ(data["title"], "sponge") << here;
+    EXPECT_EQ(data["scene"]["source"], "sponge") << here;
+  }
+}
+
 TEST(Report, QuantisedSurfaceIsWithinAFewMicrometres) {
   const auto id = pressed_block::identification();
   const json data = data_of(report::html(id, nullptr));
