@@ -68,7 +68,7 @@ struct RatedPush {
   PushCandidate candidate;
   int view = -1;            ///< index in SensorPlan::views; -1: there are none
   double force_n = 0;       ///< highest
-  double travel_m = 0;      ///< at that force, small strains
+  double travel_m = 0;      ///< at that force, small strains; the encoder's, with what the tool's compliance gives way
   int steps = 0;            ///< levels up to it
   double seen_share = 0;    ///< of the surface around the tool, by that view
   ExpectedSpread expected;  ///< after the push

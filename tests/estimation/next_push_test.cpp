@@ -136,6 +136,36 @@ TEST(NextPush, LimitsOfTheRobotBind) {
   for (const RatedPush& push : shallow.pushes) EXPECT_LE(push.travel_m, 0.00101);
 }
 
+TEST(NextPush, WhatTheToolGivesWayIsTravelOfTheEncoderNotOfTheObject) {
+  const SimulatedObject object = block_object(1);
+  const auto candidates = block_candidates(3, 0);
+  const SensorPlan sensors = block_sensors(object.surface.rest());
+  Recording yielding = block_on_table();
+  yielding.tools[0].compliance_m_per_n = 0.002;
+  const auto hardest_of = [&](const Recording& scene, double travel_limit_m) {
+    RankOptions options;
+    options.limits.travel_m = travel_limit_m;
+    const PushRanking ranking = rank_pushes(scene, object, "pad", candidates, sensors, untouched(), options);
+    std::vector<RatedPush> hardest(candidates.size());
+    for (std::size_t c = 0; c < candidates.size(); ++c)
+      for (const RatedPush& push : ranking.pushes)
+        if (push.candidate.contact_m == candidates[c].contact_m && push.steps > hardest[c].steps) hardest[c] = push;
+    return hardest;
+  };
+  // Where the object is what bounds the push the force stays, and the encoder goes farther.
+  const auto rigid = hardest_of(block_on_table(), 0.1), soft = hardest_of(yielding, 0.1), bound = hardest_of(yielding, 0.002);
+  int seen = 0;
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    if (rigid[c].steps == 0) continue;
+    ++seen;
+    EXPECT_NEAR(soft[c].force_n, rigid[c].force_n, 1e-9 * rigid[c].force_n);
+    EXPECT_NEAR(soft[c].travel_m, rigid[c].travel_m + 0.002 * rigid[c].force_n, 1e-9);
+    EXPECT_NEAR(bound[c].travel_m, 0.002, 2e-5);
+    EXPECT_NEAR(bound[c].force_n, 0.002 / (rigid[c].travel_m / rigid[c].force_n + 0.002), 0.01 * bound[c].force_n);
+  }
+  EXPECT_GT(seen, 0);
+}
+
 TEST(NextPush, NothingIsSuggestedThroughTheTableOrWhereTheCameraSeesNothing) {
   std::map<std::string, int> refused;
   for (const auto& candidate : block_candidates(20, 4, &refused)) {
