@@ -38,7 +38,7 @@ struct Options {
 constexpr int longest_plan = 30;
 
 struct Known {
-  Recording recording;
+  Recording recording;  ///< of a result: the object as it was fitted
   std::optional<Identification> answer;
 };
 
@@ -63,7 +63,7 @@ Known read(Session& session, const Options& given, std::vector<std::string>& war
     warnings.push_back("the recording is not where it was: give it with --recording, for its cameras and sensors");
     known.recording = std::move(learned.object);
   } else {
-    known.recording = load_recording_unchecked(session, recording, given.mapping);
+    known.recording = as_fitted(std::move(learned.object), load_recording_unchecked(session, recording, given.mapping));
   }
   return known;
 }

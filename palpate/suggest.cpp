@@ -269,6 +269,14 @@ std::string push_words(const estimation::RatedPush& push, const PushScene& scene
   return words;
 }
 
+Recording as_fitted(Recording object, const Recording& recording) {
+  object.pushes = recording.pushes;
+  object.rest.views = recording.rest.views;
+  object.robot = recording.robot;
+  object.joint_names = recording.joint_names;
+  return object;
+}
+
 PushScene prepare_pushes(const Recording& recording, const SuggestOptions& options, const OnProgress& progress) {
   PushScene scene;
   scene.tool = tool_of(recording, options.tool);

@@ -52,6 +52,12 @@ struct PushScene {
 /// ranked by, and its intervals are those of that model. Empty: it can.
 std::string why_not_to_build_on(const Identification& so_far);
 
+/// What pushes after a fit are planned on: the object as it was fitted (mesh, regions, supports, priors), with the cameras, sensors and
+/// robot of the recording. From the recording alone a shape that views showed would be made anew, and regions that the fit chose
+/// would be missing.
+/// @param object  Identified::object, or the recording in a result's model/
+Recording as_fitted(Recording object, const Recording& recording);
+
 /// @throws Error where the shape cannot be simulated, the tool is not round, or no candidate is left.
 PushScene prepare_pushes(const Recording& recording, const SuggestOptions& options, const OnProgress& progress = {});
 

@@ -24,16 +24,6 @@ estimation::CandidateOptions few_candidates(Index nodes) {
   return options;
 }
 
-/// The object as it was fitted, with the cameras and sensors of the pushes so far.
-Recording as_fitted(const Recording& recording, const Identified& found) {
-  Recording scene = found.object;
-  scene.pushes = recording.pushes;
-  scene.rest.views = recording.rest.views;
-  scene.robot = recording.robot;
-  scene.joint_names = recording.joint_names;
-  return scene;
-}
-
 std::string words_of(const estimation::PushRanking& ranking, const PushScene& scene, const Parameter& poisson,
                      const ModelDefaults& model) {
   const estimation::RatedPush& best = ranking.pushes.front();
@@ -69,7 +59,7 @@ void name_push_for_poisson(const Recording& recording, Identified& found, int th
   options.candidates = few_candidates(found.volume.nodes_m.rows());
   options.threads = threads;
   try {
-    const PushScene scene = prepare_pushes(as_fitted(recording, found), options, progress);
+    const PushScene scene = prepare_pushes(as_fitted(found.object, recording), options, progress);
     const estimation::PushRanking ranking = suggest(scene, &answer, options, progress);
     if (!ranking.pushes.empty()) verdict->message += words_of(ranking, scene, *poisson, found.object.model);
   } catch (const Error&) {  // no push can be planned here; the answer stands without

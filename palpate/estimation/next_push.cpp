@@ -2,6 +2,7 @@
 #include "palpate/estimation/next_push.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -14,7 +15,8 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr double known_exactly = 1e12;  // information of what is fixed
+constexpr double known_exactly = 1e12;      // information of what is fixed
+constexpr double within_covariance = 0.99;  // of a variance, at most, that one of its parts may have
 
 /// (log E of every region, nu) as rows of (log E of the first, nu, log ratios, force scale).
 MatrixX every_young(Index unknowns) {
@@ -44,20 +46,62 @@ double root_of_determinant(const MatrixX& covariance) {
   return covariance.llt().matrixLLT().diagonal().prod();
 }
 
-ExpectedSpread spread_of(const MatrixX& information, const Eigen::Vector2d& uncured) {
+/// Correlations that cannot be all at once, made weaker alike until they can; what is a covariance stays as it is.
+/// @param left  of the variance along the worst direction, at least; not above 0: singular is fine
+MatrixX made_possible(const MatrixX& covariance, double left) {
+  const VectorX std = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  MatrixX correlation = std.cwiseInverse().asDiagonal() * covariance * std.cwiseInverse().asDiagonal();
+  correlation.diagonal().setZero();
+  const double lowest = Eigen::SelfAdjointEigenSolver<MatrixX>(correlation, Eigen::EigenvaluesOnly).eigenvalues()(0);
+  if (1 + lowest > left) return covariance;
+  MatrixX out = -0.9 / lowest * covariance;
+  out.diagonal() = covariance.diagonal();
+  return out;
+}
+
+/// Standard deviations that errors which no push takes away have given to every log E and then nu.
+VectorX shares_of(const Identification& answer, const std::vector<std::string>& regions, Index count) {
+  VectorX squares = VectorX::Zero(count);
+  for (const auto& entry : answer.budget) {
+    if (entry.input != "mesh" && entry.input != "unseen side" && entry.input != "foot") continue;
+    for (Index r = 0; r < count - 1; ++r) {
+      double percent = entry.young_modulus_percent;
+      for (const RegionShare& share : entry.regions)
+        if (!regions.empty() && share.region == regions[static_cast<std::size_t>(r)]) percent = share.young_modulus_percent;
+      squares(r) += std::pow(percent / 100, 2);
+    }
+    squares(count - 1) += entry.poisson_shift * entry.poisson_shift;
+  }
+  return squares.cwiseSqrt();
+}
+
+/// The part of a covariance that these errors made. Their products are in it too, with signs that the budget does not tell: as much of
+/// them is taken as leaves the least correlation. Of one E and nu what is left is then a covariance for sure, as what was before them is.
+MatrixX part_of(const VectorX& shares, const MatrixX& covariance) {
+  const VectorX most = shares.cwiseMin((within_covariance * covariance.diagonal()).cwiseSqrt());
+  MatrixX part(covariance.rows(), covariance.cols());
+  for (Index i = 0; i < part.rows(); ++i)
+    for (Index j = 0; j < part.cols(); ++j) {
+      const double product = most(i) * most(j);
+      part(i, j) = i == j ? product : std::clamp(covariance(i, j), -product, product);
+    }
+  return made_possible(part, -1e-9);
+}
+
+/// @param touched  false: nothing of E is known but what pushes that are planned would tell
+ExpectedSpread spread_of(const MatrixX& information, const MatrixX& uncured, bool touched) {
   const Index regions = information.rows() - 2;
+  if (uncured.size() == 0) return spread_of(information, MatrixX::Zero(regions + 1, regions + 1), touched);
   ExpectedSpread spread;
-  // Nothing of E is known before the first touch: that row has no inverse.
-  if (!(information(0, 0) > 0)) {
+  if (!touched && !(information(0, 0) > 0)) {  // that row has no inverse
     spread.log_young_std = spread.young_volume = spread.volume = std::numeric_limits<double>::infinity();
     spread.region_log_young_std = VectorX::Constant(regions, spread.log_young_std);
-    spread.poisson_std = information(1, 1) > 0 ? std::sqrt(1 / information(1, 1) + uncured(1)) : spread.log_young_std;
+    spread.poisson_std = information(1, 1) > 0 ? std::sqrt(1 / information(1, 1) + uncured(regions, regions)) : spread.log_young_std;
     return spread;
   }
   const MatrixX rows = every_young(information.rows());
   MatrixX covariance = rows * information.ldlt().solve(rows.transpose());
-  covariance.diagonal().head(regions).array() += uncured(0);
-  covariance(regions, regions) += uncured(1);
+  covariance += uncured;
   covariance.diagonal() = covariance.diagonal().cwiseMax(1e-24);
   spread.region_log_young_std = covariance.diagonal().head(regions).cwiseSqrt();
   spread.log_young_std = spread.region_log_young_std.maxCoeff();
@@ -132,25 +176,24 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
     covariance(regions, regions) = 1 / known_exactly;
   }
 
-  // The mesh's error comes back with every push, and none shows the unseen side or the foot. Its sign of correlation is not told, so it goes out of the diagonal.
-  for (const auto& entry : answer.budget) {
-    if (entry.input != "mesh" && entry.input != "unseen side" && entry.input != "foot") continue;
-    known.uncured(0) += std::pow(entry.young_modulus_percent / 100, 2);
-    known.uncured(1) += fixed ? 0 : entry.poisson_shift * entry.poisson_shift;
-  }
-  known.uncured(0) = std::min(known.uncured(0), 0.9 * covariance.diagonal().head(regions).minCoeff());
-  known.uncured(1) = std::min(known.uncured(1), 0.9 * covariance(regions, regions));
-  VectorX left(regions + 1);
-  for (Index k = 0; k <= regions; ++k) left(k) = std::sqrt(1 - known.uncured(k < regions ? 0 : 1) / covariance(k, k));
-  covariance = left.asDiagonal() * covariance * left.asDiagonal();
+  covariance = made_possible(covariance, 1e-9);
 
-  // E is proportional to the force: d log E / d scale = 1 exactly, of every region.
+  // E is proportional to the force: d log E / d scale = 1 exactly, of every region. The scale has no more than the covariance holds of a
+  // common error of every E (Schur's complement): else the two together would be no covariance.
   double scale_std = recording.force_scale_std;
   for (const auto& nuisance : answer.nuisances)
     if (nuisance.name == "force_scale") scale_std = std::min(scale_std, nuisance.std);
-  const double scale = std::min(scale_std * scale_std, 0.9 * covariance.diagonal().head(regions).minCoeff());
+  VectorX common = VectorX::Ones(regions + 1);
+  common(regions) = 0;
+  const double scale = std::min(scale_std * scale_std, within_covariance / common.dot(covariance.ldlt().solve(common)));
+  const MatrixX of_scale = scale * common * common.transpose();
+
+  // The mesh's error comes back with every push, and none shows the unseen side or the foot.
+  VectorX shares = shares_of(answer, known.regions, regions + 1);
+  if (fixed) shares(regions) = 0;
+  known.uncured = part_of(shares, covariance - of_scale);
   MatrixX joint = MatrixX::Zero(regions + 2, regions + 2);
-  joint.topLeftCorner(regions + 1, regions + 1) = covariance;
+  joint.topLeftCorner(regions + 1, regions + 1) = made_possible(covariance - of_scale - known.uncured, 1e-9) + of_scale;
   joint(regions + 1, regions + 1) = scale > 0 ? scale : 1 / known_exactly;
   joint.col(regions + 1).head(regions).setConstant(scale);
   joint.row(regions + 1).head(regions).setConstant(scale);
@@ -166,7 +209,7 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
 ExpectedSpread expected_after(const Knowledge& knowledge, const std::vector<const RatedPush*>& pushes) {
   MatrixX information = knowledge.information;
   for (const RatedPush* push : pushes) information += push->information;
-  return spread_of(information, knowledge.uncured);
+  return spread_of(information, knowledge.uncured, knowledge.touched);
 }
 
 PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, const std::string& tool,

@@ -43,8 +43,8 @@ struct Knowledge {
   std::vector<std::string> regions;                    ///< R names; empty: one stiffness everywhere
   VectorX log_ratio;                                   ///< R - 1: where information is computed
   MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, R - 1 log ratios, force scale), their priors included
-  /// Variance of log E (of every region) and nu that no push takes away: the mesh's and the unseen side's.
-  Eigen::Vector2d uncured = Eigen::Vector2d::Zero();
+  /// Covariance of (log E of every region, nu) that no push takes away: the mesh's, the unseen side's and the foot's. Empty: none.
+  MatrixX uncured;
   bool touched = false;                                ///< false: nothing but priors, E is a guess
 
   double young_modulus_of(int region) const;  ///< Pa; 0: the first, or the whole object
@@ -68,7 +68,7 @@ struct RatedPush {
   PushCandidate candidate;
   int view = -1;            ///< index in SensorPlan::views; -1: there are none
   double force_n = 0;       ///< highest
-  double travel_m = 0;      ///< at that force, small strains
+  double travel_m = 0;      ///< at that force, small strains; the encoder's, with what the tool's compliance gives way
   int steps = 0;            ///< levels up to it
   double seen_share = 0;    ///< of the surface around the tool, by that view
   ExpectedSpread expected;  ///< after the push

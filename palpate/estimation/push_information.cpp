@@ -252,7 +252,8 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
     }
     const PushCandidate& candidate = candidates[c];
     const PushLimits& limits = options.limits;
-    double highest_n = std::min(limits.force_n, limits.travel_m / give);
+    // The encoder goes on by what stick and arm give way; the object gives without them.
+    double highest_n = std::min(limits.force_n, limits.travel_m / (give + plan.tool.compliance_m_per_n));
     const int region = region_at(small_strains, candidate.contact_m);
     highest_n = std::min(highest_n, limits.pressure_over_young * knowledge.young_modulus_of(region) * pressed_m2);
     if (candidate.thickness_m > 0) highest_n = std::min(highest_n, limits.thickness_share * candidate.thickness_m / give);
@@ -335,7 +336,7 @@ std::vector<RatedPush> PushInformation::rate(std::size_t c) {
       one.view = views.empty() ? -1 : views[v].first;
       one.seen_share = views.empty() ? 0 : shares[v];
       one.force_n = push.steps[s].loads[0].force_n->norm();
-      one.travel_m = travel_m[s];
+      one.travel_m = travel_m[s] + plan.tool.compliance_m_per_n * one.force_n;
       one.steps = static_cast<int>(s + 1 - (plan.rest_step ? 1 : 0));
       one.region = plan.region[c];
       one.information = plan.marginal(blocks);

@@ -102,6 +102,30 @@ std::string outcome_of(const std::string& arguments, int& exit_code) {
   return said.text;
 }
 
+// The recording names no regions, and its mesh may be replaced: what was fitted is in the result.
+TEST_F(TwoHalves, TheNextPushIsPlannedOnTheObjectThatWasFitted) {
+  estimated("--regions by-site");
+  Recording changed = io::read_recording_unchecked(files / "block");
+  ASSERT_TRUE(changed.regions.empty());
+  const auto planned = [&](const std::string& options) {
+    const test::Said said = test::said_by(std::string(PALPATE_CLI) + " suggest '" + (files / "out").string() +
+                                          "' --json --quiet --contacts 6 --tilts 1 " + options + " 2> /dev/null");
+    EXPECT_EQ(said.exit_code, 0) << said.text;
+    return nlohmann::json::parse(said.text, nullptr, false);
+  };
+  const nlohmann::json plan = planned("");
+  ASSERT_TRUE(plan["touched"].get<bool>()) << plan.dump(1);
+  EXPECT_EQ(plan["young_modulus_pa"].size(), 2u);
+  ASSERT_FALSE(plan["pushes"].empty());
+  for (const auto& push : plan["pushes"]) {
+    EXPECT_TRUE(push["region"] == "left" || push["region"] == "right");
+    EXPECT_EQ(push["view"], "cloud") << "of the recording";
+  }
+  changed.rest.volume = estimation::kuhn_block(4, 4, 2, estimation::block_size_m);
+  io::write_recording(changed, files / "changed");
+  EXPECT_EQ(planned("--recording '" + (files / "changed").string() + "'")["pushes"], plan["pushes"]);
+}
+
 double poisson_of(const nlohmann::json& result, const std::string& region) {
   for (const auto& one : result["parameters"])
     if (one["name"] == "poisson_ratio" && one["region"] == region) return one["value"];

@@ -136,6 +136,36 @@ TEST(NextPush, LimitsOfTheRobotBind) {
   for (const RatedPush& push : shallow.pushes) EXPECT_LE(push.travel_m, 0.00101);
 }
 
+TEST(NextPush, WhatTheToolGivesWayIsTravelOfTheEncoderNotOfTheObject) {
+  const SimulatedObject object = block_object(1);
+  const auto candidates = block_candidates(3, 0);
+  const SensorPlan sensors = block_sensors(object.surface.rest());
+  Recording yielding = block_on_table();
+  yielding.tools[0].compliance_m_per_n = 0.002;
+  const auto hardest_of = [&](const Recording& scene, double travel_limit_m) {
+    RankOptions options;
+    options.limits.travel_m = travel_limit_m;
+    const PushRanking ranking = rank_pushes(scene, object, "pad", candidates, sensors, untouched(), options);
+    std::vector<RatedPush> hardest(candidates.size());
+    for (std::size_t c = 0; c < candidates.size(); ++c)
+      for (const RatedPush& push : ranking.pushes)
+        if (push.candidate.contact_m == candidates[c].contact_m && push.steps > hardest[c].steps) hardest[c] = push;
+    return hardest;
+  };
+  // Where the object is what bounds the push the force stays, and the encoder goes farther.
+  const auto rigid = hardest_of(block_on_table(), 0.1), soft = hardest_of(yielding, 0.1), bound = hardest_of(yielding, 0.002);
+  int seen = 0;
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    if (rigid[c].steps == 0) continue;
+    ++seen;
+    EXPECT_NEAR(soft[c].force_n, rigid[c].force_n, 1e-9 * rigid[c].force_n);
+    EXPECT_NEAR(soft[c].travel_m, rigid[c].travel_m + 0.002 * rigid[c].force_n, 1e-9);
+    EXPECT_NEAR(bound[c].travel_m, 0.002, 2e-5);
+    EXPECT_NEAR(bound[c].force_n, 0.002 / (rigid[c].travel_m / rigid[c].force_n + 0.002), 0.01 * bound[c].force_n);
+  }
+  EXPECT_GT(seen, 0);
+}
+
 TEST(NextPush, NothingIsSuggestedThroughTheTableOrWhereTheCameraSeesNothing) {
   std::map<std::string, int> refused;
   for (const auto& candidate : block_candidates(20, 4, &refused)) {
@@ -258,6 +288,94 @@ TEST(NextPush, WhatIsKnownOfRegionsComesBackOutOfAnAnswer) {
   const ExpectedSpread scaled = expected_after(known, {&weighed});
   EXPECT_NEAR(std::pow(scaled.region_log_young_std(0), 2), 0.04 - 1e-4, 1e-7);
   EXPECT_NEAR(std::pow(scaled.region_log_young_std(1), 2), 0.09 - 1e-4, 1e-7);
+}
+
+/// An answer with this covariance of (log E of every region, nu).
+Identification answer_of(const MatrixX& covariance) {
+  Identification answer;
+  const Index regions = covariance.rows() - 1;
+  for (Index r = 0; r <= regions; ++r) {
+    Parameter one{r < regions ? "young_modulus" : "poisson_ratio", r < regions && regions > 1 ? "part " + std::to_string(r) : "", ""};
+    one.value = r < regions ? 2e4 : 0.3;
+    answer.parameters.push_back(one);
+  }
+  answer.covariance = covariance;
+  return answer;
+}
+
+BudgetEntry share_of(const VectorX& shift) {
+  const Index regions = shift.size() - 1;
+  BudgetEntry entry{"unseen side", 100 * std::abs(shift(0)), std::abs(shift(regions))};
+  for (Index r = 0; regions > 1 && r < regions; ++r) entry.regions.push_back({"part " + std::to_string(r), 100 * std::abs(shift(r))});
+  return entry;
+}
+
+/// That tells a combination of (log E of the first, nu, log ratios, force scale) almost exactly.
+RatedPush push_that_tells(const VectorX& combination) {
+  RatedPush push;
+  push.information = 1e10 * combination * combination.transpose();
+  return push;
+}
+
+// E within 1.3 %, 1 % of which is the force's scale, and an unseen side that moves E by 3 % and nu by 0.02 one way or the other.
+TEST(NextPush, AnErrorOfEAndNuThatNoPushTakesAwayLeavesWhatIsKnown) {
+  for (const double sign : {1.0, -1.0}) {
+    const Vec2 shift(0.03, sign * 0.02);
+    const MatrixX fitted = Vec2(0.013 * 0.013, 0.012 * 0.012).asDiagonal();
+    Identification answer = answer_of(fitted + shift * shift.transpose());
+    answer.budget = {share_of(shift)};
+    const Knowledge known = after_fit(block_on_table(), answer);
+    EXPECT_EQ(known.information.llt().info(), Eigen::Success);
+    const ExpectedSpread so_far = expected_after(known, {});
+    EXPECT_NEAR(so_far.log_young_std, std::sqrt(answer.covariance(0, 0)), 1e-9);
+    EXPECT_NEAR(so_far.poisson_std, std::sqrt(answer.covariance(1, 1)), 1e-9);
+    EXPECT_NEAR(so_far.volume, std::sqrt(answer.covariance.determinant()), 1e-9);
+    // What E is but for the force's scale says nothing of nu, and leaves the scale and the unseen side.
+    const RatedPush stiff = push_that_tells(Vec3(1, 0, -1));
+    const ExpectedSpread after = expected_after(known, {&stiff});
+    EXPECT_NEAR(after.log_young_std, std::hypot(0.01, 0.03), 5e-4);
+    EXPECT_NEAR(after.poisson_std, so_far.poisson_std, 1e-4);
+    const RatedPush wide = push_that_tells(Vec3(0, 1, 0));
+    EXPECT_NEAR(expected_after(known, {&wide}).poisson_std, 0.02, 5e-4);
+  }
+}
+
+// Whatever a fit finds, and whatever part of it no push takes away: what is known is a distribution, with the answer's intervals.
+TEST(NextPush, WhatIsKnownIsADistributionWhateverTheBudget) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  for (int trial = 0; trial < 600; ++trial) {
+    const Index regions = 1 + trial % 4;
+    VectorX scale_of = VectorX::Ones(regions + 1);
+    scale_of(regions) = 0;
+    MatrixX root(regions + 1, regions + 1);
+    for (Index i = 0; i < root.size(); ++i) root(i) = 0.02 * normal(random) * std::pow(10, -uniform(random));
+    MatrixX covariance = root * root.transpose() + 1e-4 * scale_of * scale_of.transpose();
+    std::vector<BudgetEntry> budget;
+    for (const char* source : {"mesh", "unseen side", "foot"}) {
+      VectorX shift(regions + 1);
+      for (Index i = 0; i <= regions; ++i) shift(i) = 0.1 * uniform(random) * normal(random);
+      covariance += shift * shift.transpose();
+      budget.push_back(share_of(shift));
+      budget.back().input = source;
+    }
+    // Rounded, stated by hand, or of a fit at a bound of nu: not always a covariance.
+    if (trial % 3 == 2) covariance.row(0).tail(regions) = 1.1 * covariance.row(0).tail(regions), covariance.col(0) = covariance.row(0).transpose();
+    Identification answer = answer_of(covariance);
+    answer.budget = budget;
+    const Knowledge known = after_fit(block_on_table(), answer);
+    EXPECT_EQ(known.information.llt().info(), Eigen::Success) << "trial " << trial;
+    const ExpectedSpread so_far = expected_after(known, {});
+    for (Index r = 0; r < regions; ++r) EXPECT_NEAR(so_far.region_log_young_std(r), std::sqrt(covariance(r, r)), 1e-6) << "trial " << trial;
+    EXPECT_NEAR(so_far.poisson_std, std::sqrt(covariance(regions, regions)), 1e-6) << "trial " << trial;
+    VectorX told(regions + 2);
+    for (Index i = 0; i < told.size(); ++i) told(i) = normal(random);
+    const RatedPush push = push_that_tells(told);
+    const ExpectedSpread after = expected_after(known, {&push});
+    EXPECT_TRUE(after.volume > 0 && after.volume < so_far.volume) << "trial " << trial << ": " << after.volume << " of " << so_far.volume;
+    for (Index r = 0; r < regions; ++r) EXPECT_LE(after.region_log_young_std(r), so_far.region_log_young_std(r) + 1e-9) << "trial " << trial;
+  }
 }
 
 TEST(NextPush, BadPlansAreRefused) {

@@ -128,7 +128,7 @@ TEST(TargetPlan, WithThreeRegionsItIsAsShortAsTheShortestOfAllCombinations) {
 TEST(TargetPlan, OutOfReachItComesAsNearAsItCan) {
   const std::vector<RatedPush> pushes{push_of(0.03, 0.025), push_of(0.015, 0.3)};
   Knowledge coarse = nearly_nothing();
-  coarse.uncured << 0.03 * 0.03, 0.0;  // the mesh's: no push takes it away
+  coarse.uncured = Vec2(0.03 * 0.03, 0).asDiagonal();  // the mesh's: no push takes it away
   const SpreadTarget target{0.04, 0.02};
   const TargetPlan plan = plan_for_target(coarse, pushes, target, 4);
   EXPECT_FALSE(plan.reached);
