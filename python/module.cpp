@@ -150,10 +150,11 @@ py::object export_to(const py::object& found, const std::string& to, const py::o
   return to_python(names);
 }
 
-py::object suggest_pushes(const py::object& given, const py::object& so_far, const py::dict& options, const py::object& progress) {
-  const Recording recording = recording_of(given);
+py::object suggest_pushes(const py::object& given, const py::object& so_far, const py::object& object, const py::dict& options, const py::object& progress) {
+  Recording recording = recording_of(given);
   std::optional<Identification> answer;
   if (!so_far.is_none()) answer = from_python<Identification>(so_far, Place("so_far"));
+  if (!object.is_none()) recording = as_fitted(from_python<Recording>(object, Place("so_far.object")), recording);
   if (answer)
     if (const std::string why = why_not_to_build_on(*answer); !why.empty()) throw Error("cannot be built on: " + why, "so_far");
   SuggestOptions asked;

@@ -180,19 +180,21 @@ def export(found: Identified, to: str, folder: str | PathLike[str], *, density_k
     return _palpate.export(found, to, folder, density_kg_m3, gravity_m_s2)
 
 
-def suggest(recording: Recording, so_far: Identification | None = None, *, goal="both", tool=None, tip_link=None, contacts=24, tilts=2, views=0, young_modulus_pa=2e4,
+def suggest(recording: Recording, so_far: Identified | Identification | None = None, *, goal="both", tool=None, tip_link=None, contacts=24, tilts=2, views=0, young_modulus_pa=2e4,
             force_limit_n=50.0, travel_limit_m=0.10, seed=1, threads=0,
             progress: Callable[[str, float], Any] | None = None) -> list[SuggestedPush]:
     """Pushes that would tell the most, best first: a list of SuggestedPush. Empty: none that is possible is in view (`views` adds some).
 
-    so_far:            `found.answer`, what the pushes until now gave; None: before the first touch
+    so_far:            what `identify` found of the pushes until now: they are planned on the object as it was fitted. With `found.answer`
+                       alone the object is made anew of the recording; None: before the first touch
     goal:              whose interval is to shrink: 'young-modulus', 'poisson-ratio' or 'both'
     tip_link:          of the recording's robot, z along the push: only what its joints reach is compared
     contacts, tilts:   places that are compared, and slanted directions at each
     views:             further places of the camera that are compared
     young_modulus_pa:  guess before the first touch
     """
-    return _palpate.suggest(recording, so_far, dict(goal=goal, tool=tool, tip_link=tip_link, contacts=contacts, tilts=tilts, views=views,
+    answer, fitted = (so_far.answer, so_far.object) if isinstance(so_far, Identified) else (so_far, None)
+    return _palpate.suggest(recording, answer, fitted, dict(goal=goal, tool=tool, tip_link=tip_link, contacts=contacts, tilts=tilts, views=views,
                                                     young_modulus_pa=young_modulus_pa, force_limit_n=force_limit_n,
                                                     travel_limit_m=travel_limit_m, seed=seed, threads=threads), progress)
 

@@ -123,8 +123,7 @@ class Identified(unittest.TestCase):
             words = "--quiet --json predict OUT --contact 0.03 0.025 0.08 --radius 0.01 --force 0.5".replace("OUT", folder).split()
             theirs = json.loads(subprocess.run([os.environ["PALPATE_CLI"], *words], check=True, capture_output=True).stdout)
         self.assertAlmostEqual(pressed.travel_m.upper_95 / theirs["travel_m"]["upper_95"], 1, 6)
-        with self.assertRaisesRegex(palpate.Error, "round"):
-            palpate.suggest(recording, found.answer)  # a platen has no place to choose
+        self.assertRaisesRegex(palpate.Error, "round", palpate.suggest, recording, found.answer)  # a platen has no place to choose
 
 
 def fields_of_structs(header):
@@ -381,14 +380,15 @@ class Robots(unittest.TestCase):
         steps = []
         made, report = palpate.push(Gantry(), block_on_a_table(), [0.5, 0, 0.5], name="first", force_limit_n=1, force_step_n=0.25,
                                     on_step=lambda name, step: steps.append(name))
-        self.assertEqual((made.name, report.stop, report.steps), ("first", "force limit", len(made.steps)))
-        self.assertEqual(steps, ["first"] * len(made.steps))
+        self.assertEqual((made.name, report.stop, report.steps, steps), ("first", "force limit", len(made.steps), ["first"] * len(made.steps)))
         self.assertAlmostEqual(report.highest_force_n, 1, 1)
         scene = block_on_a_table()
         scene.pushes.append(made)  # whose sensors are those of the next
         further = palpate.suggest(scene, goal="young-modulus", tilts=0)
         self.assertIn("push at", further[0].words)
         self.assertLessEqual(further[0].young_modulus_within, further[-1].young_modulus_within)
+        found = palpate.identify(scene, poisson_ratio=0.3, refine="none", regions="by-site", cross_checks=False)
+        self.assertIn("push at", palpate.suggest(scene, found, tilts=0)[0].words)
 
     def test_is_stopped_where_a_call_raises(self):
         def broken():
