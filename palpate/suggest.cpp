@@ -186,6 +186,7 @@ void add_views(PushScene& scene, const Recording& recording, const SuggestOption
     more = std::max(more, 3);
     scene.warnings.push_back("no camera is known: one like a RealSense D435 was assumed, at four places around the object");
   }
+  if (more > 0 && cameras.empty()) scene.warnings.push_back("the recording has clouds and no camera, of which further places could be compared: views are left aside");
   for (int k = 1; k <= more && !cameras.empty(); ++k) {
     const double angle = 2 * EIGEN_PI * k / (more + 1);
     DepthFrame turned = cameras.front();

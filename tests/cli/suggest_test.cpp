@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -122,6 +123,25 @@ TEST(SuggestSensors, ErrorsAreThoseOfStepsThatHaveThem) {
   ASSERT_TRUE(of_both.travel_sigma_m);
   EXPECT_EQ(*of_both.travel_sigma_m, 7e-5);
   EXPECT_EQ(of_both.travel_offset_std_m, 3e-4) << "of the push that it was read in";
+}
+
+TEST(SuggestSensors, PlacesOfACameraThatThereIsNotAreSaidToBeLeftAside) {
+  Recording recording = box_on_table();
+  PointCloud cloud;
+  cloud.points_m = recording.rest.surface->vertices_m;
+  cloud.sigma_m = VectorX::Constant(1, 1e-3);
+  recording.pushes.resize(1);
+  recording.pushes[0].steps.resize(1);
+  recording.pushes[0].steps[0].observations = {cloud};
+  SuggestOptions options;
+  options.candidates.contacts = 2;
+  options.candidates.tilts = 1;
+  for (const int views : {0, 3}) {
+    options.viewpoints = views;
+    const auto warnings = prepare_pushes(recording, options).warnings;
+    EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(), [](const std::string& one) { return one.find("views are left aside") != std::string::npos; }),
+              views > 0 ? 1 : 0);
+  }
 }
 
 TEST_F(Suggest, OfAnObjectInRegionsEveryPushSaysWhichOfThemItPresses) {
