@@ -100,7 +100,6 @@ int run(const Options& given, Session& session) {
                               {"consistent", error.consistent}});
     fine = fine && error.consistent;
   }
-  const auto sees = [](const std::string& code) { return code == "camera_sees_something_else" || code == "touch_misses_body"; };
   if (check.rays > 0) {
     json["hand_eye_pivot_m"] = numbers(check.pivot_m);
     for (int row = 0; row < 4; ++row) json["hand_eye_correction"].push_back(numbers(VectorX(check.hand_eye_correction.matrix().row(row))));
@@ -110,7 +109,7 @@ int run(const Options& given, Session& session) {
   for (const auto& verdict : check.verdicts) {
     session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
     json["verdicts"].push_back({{"code", verdict.code}, {"message", verdict.message}});
-    fine = fine && verdict.code != "does_not_fit" && !sees(verdict.code);
+    fine = fine && verdict.code != "does_not_fit" && verdict.code != "camera_sees_something_else" && verdict.code != "touch_misses_body";
   }
   if (!check.message.empty()) session.warn(check.message);
   if (fine && undetermined.empty())
@@ -130,9 +129,9 @@ Run verbs::check(CLI::App& app) {
                  "of pushes on the known body: forces, travels, and depth images if there is a camera")
       ->required();
   app.add_option("--mapping", given->mapping, "what a bag's topics mean (default: mapping.yaml beside it)");
-  auto* const stiffness = app.add_option("--stiffness", given->stiffness_n_per_m,
-                 "of the spring along every push, N/m; its plate is the recording's surface");
-  stiffness->check(positive_number());
+  auto* const stiffness =
+      app.add_option("--stiffness", given->stiffness_n_per_m, "of the spring along every push, N/m; its plate is the recording's surface")
+          ->check(positive_number());
   app.add_flag("--rigid", given->rigid, "the body does not give way at all");
   app.add_option("--stiffness-std", given->check.stiffness_relative_std, "how well the stiffness is known, relative")
       ->needs(stiffness)
