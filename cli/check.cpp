@@ -103,7 +103,7 @@ int run(const Options& given, Session& session) {
   if (check.rays > 0) {
     json["hand_eye_pivot_m"] = numbers(check.pivot_m);
     for (int row = 0; row < 4; ++row) json["hand_eye_correction"].push_back(numbers(VectorX(check.hand_eye_correction.matrix().row(row))));
-    session.say(fmt::format("hand_eye is about {:.4g} {:.4g} {:.4g} m, the body's middle{}", check.pivot_m.x(), check.pivot_m.y(), check.pivot_m.z(),
+    session.say(fmt::format("hand_eye is about {:.3f} {:.3f} {:.3f} m, the body's middle{}", check.pivot_m.x(), check.pivot_m.y(), check.pivot_m.z(),
                             camera_as_found(recording, check.hand_eye_correction)));
   }
   for (const auto& verdict : check.verdicts) {

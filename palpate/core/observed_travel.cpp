@@ -15,6 +15,7 @@ bool shows_what_it_touches(const Tool& ball, const Push& push) {
   if (ball.shape != ToolShape::sphere || !(ball.radius_m > 0) || ball.radius_std_m > 0) return false;
   bool presses = false;
   for (const Step& step : push.steps) {
+    if (step.slipped) return false;
     for (const Load& load : step.loads) {
       if (load.tool != ball.name) continue;
       if (load.travel_m) return false;

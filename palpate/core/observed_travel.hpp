@@ -10,7 +10,7 @@ namespace palpate {
 const ToolTravel* observed_travel(const Step& step, const Load& load);
 
 /// A ball whose force is measured, whose patch nobody stated (`radius_std_m`), and whose travel was read wherever it presses in
-/// this push: then its travel says how much of it touches.
+/// this push, in which nothing slid: then its travel says how much of it touches.
 bool shows_what_it_touches(const Tool& ball, const Push& push);
 
 }  // namespace palpate

@@ -54,8 +54,7 @@ Recording with_balls_moved(Recording recording) {
   for (const Tool& ball : recording.tools) {
     bool moved = false;
     for (Push& push : recording.pushes) {
-      const bool slid = std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) { return step.slipped; });
-      if (slid || !shows_what_it_touches(ball, push)) continue;
+      if (!shows_what_it_touches(ball, push)) continue;
       move(ball, push);
       moved = true;
     }

@@ -344,8 +344,8 @@ void judge(const Problem& p, double dof, SelfCheck& check) {
           "the camera does not stand where T_base_camera says, by more than pose_std_m and pose_std_rad allow: "
           "calibrate it against the robot, or put hand_eye_correction before T_base_camera";
   }
-  constexpr double most = 0.5;
-  const bool sees_it = check.rays > most * static_cast<double>(check.rays_given);
+  constexpr double some = 0.2;  // of the rays: tables, clutter and grazed faces take theirs of a good rig's, too
+  const bool sees_it = static_cast<double>(check.rays) > some * static_cast<double>(check.rays_given);
   if (!sees_it && check.rays_given > 0)
     said["camera_sees_something_else"] =
         fmt::format("only {} of {} rays end on the body: is rest its shape where it stands in the base frame, and T_base_camera the camera's pose there, "

@@ -317,8 +317,7 @@ class OddNumbers {
     double deepest_m = 0;
     bool is_unknown = false;
     for (const Push& push : recording_.pushes) {
-      const bool slid = std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) { return step.slipped; });
-      if (shows_what_it_touches(ball, push) && !slid && !recording_.free) continue;
+      if (shows_what_it_touches(ball, push) && !recording_.free) continue;
       for (const Step& step : push.steps)
         for (const Load& load : step.loads) {
           if (load.tool != ball.name || !load.force_n || load.force_n->norm() == 0) continue;
