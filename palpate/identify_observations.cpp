@@ -2,6 +2,7 @@
 // What the sensors of every step saw, without what is not the object.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "palpate/estimation/grazing.hpp"
 #include "palpate/identify.hpp"
 #include "palpate/sensing/back_projection.hpp"
+#include "palpate/sensing/cloud_mask.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/lens_scatter.hpp"
 #include "palpate/sensing/masked_points.hpp"
@@ -38,6 +40,14 @@ std::pair<Vec3, Vec3> surroundings(const Recording& recording) {
   const Vec3 low = rest_m->colwise().minCoeff(), high = rest_m->colwise().maxCoeff();
   const Vec3 margin = Vec3::Constant(0.5 * (high - low).maxCoeff());
   return {low - margin, high + margin};
+}
+
+/// Tables and walls, of the room and those that hold the object.
+std::vector<Plane> half_spaces(const Recording& recording) {
+  std::vector<Plane> planes = recording.environment.planes;
+  for (const Support& support : recording.supports)
+    if (support.kind == SupportKind::table || support.kind == SupportKind::wall) planes.push_back(support.plane);
+  return planes;
 }
 
 /// Names of the frames' cameras, told by their intrinsics: one that stands at a place, or one that is carried around. "" for a
@@ -73,6 +83,7 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
   const std::vector<std::string> cameras = cameras_of(frames);
   std::size_t frame_number = 0;
   const auto [low_m, high_m] = surroundings(recording);
+  const std::vector<Plane> planes = half_spaces(recording);
   if (masked_m != nullptr) masked_m->clear();
   std::optional<sensing::RobotMask> robot;  // a robot that was recorded without shapes cannot be masked
   if (recording.robot && sensing::has_shapes(*recording.robot)) robot.emplace(*recording.robot);
@@ -94,7 +105,7 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
                                                      frame->T_base_camera.linear(),
                                                      estimation::outline_margin_px / std::min(frame->camera.fx_px, frame->camera.fy_px)});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
-          terms.push_back(*cloud);
+          terms.push_back(sensing::points_of_object(*cloud, planes, low_m, high_m));
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {
           terms.push_back(*markers);
         } else if (const auto* travel = std::get_if<ToolTravel>(&observation)) {

@@ -13,6 +13,7 @@
 #include "palpate/acquisition/step_force.hpp"
 #include "palpate/acquisition/stream_joints.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/sensing/cloud_mask.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/plane_mask.hpp"
 #include "palpate/sensing/robot_mask.hpp"
@@ -403,9 +404,8 @@ class Assembly {
         of_steps_.add(camera.name + ": the image cannot be used of", step.time_s, ": " + error.message());
         continue;
       }
-      const auto& robot = plan_.recording.robot;
-      if (camera.mask_robot.value_or(robot && sensing::has_shapes(*robot) && !streams_.joints.empty()))
-        frame = without_robot(std::move(frame), step.time_s);
+      if (const auto at = robot_to_mask(camera.mask_robot, frame.time_s, step.time_s, "image of", "topics.depth"))
+        frame = sensing::with_mask(frame, mask_->mask_known(frame, at->joints.names, at->joints.positions, at->T_base_root));
       frame.robot_is_masked = true;  // or it is not to be
       step.observations.emplace_back(std::move(frame));
     }
@@ -417,12 +417,15 @@ class Assembly {
         of_steps_.add(stream.name + ": no cloud with a known pose near", step.time_s);
         continue;
       }
+      const auto at = robot_to_mask(stream.mask_robot, stream.times_s[*number] + cloud_offset_s_, step.time_s, "cloud of", "topics.clouds");
+      if (at && !in_clouds_) in_clouds_ = std::make_unique<sensing::RobotInClouds>(*mask_);
       try {
         PointCloud cloud = stream.cloud(*number);
         cloud.points_m = (cloud.points_m * pose->linear().transpose()).rowwise() + pose->translation().transpose();
         cloud.sigma_m = VectorX::Constant(1, stream.sigma_m);
         cloud.pose_std_m = stream.pose_std_m;
         cloud.pose_std_rad = stream.pose_std_rad;
+        if (at) cloud = in_clouds_->without_robot(cloud, at->joints.names, at->joints.positions, at->T_base_root);
         step.observations.emplace_back(std::move(cloud));
       } catch (const Error& error) {
         of_steps_.add(stream.name + ": the cloud cannot be used of", step.time_s, ": " + error.message());
@@ -447,24 +450,32 @@ class Assembly {
     return positions;
   }
 
-  DepthFrame without_robot(DepthFrame frame, double step_s) {
-    if (!plan_.recording.robot)
-      throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description",
-                  plan_.source + ": topics.depth");
-    if (!mask_) mask_ = std::make_unique<sensing::RobotMask>(*plan_.recording.robot);
+  struct PosedRobot {
+    Pose T_base_root;
+    NamedJoints joints;
+  };
+
+  /// The robot when an image or a cloud was taken, where it is to be left out and known; where it is not known that is said.
+  std::optional<PosedRobot> robot_to_mask(std::optional<bool> wanted, double time_s, double step_s, const std::string& where,
+                                          const std::string& topics) {
+    const auto& robot = plan_.recording.robot;
+    if (!wanted.value_or(robot && sensing::has_shapes(*robot) && !streams_.joints.empty())) return std::nullopt;
+    if (!robot)
+      throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description", plan_.source + ": " + topics);
+    if (!mask_) mask_ = std::make_unique<sensing::RobotMask>(*robot);
     const sensing::Kinematics& kinematics = mask_->kinematics();
     const std::string root = kinematics.robot().links[std::size_t(kinematics.root_link())].name;
-    const auto base = pose_of(root, frame.time_s);
+    const auto base = pose_of(root, time_s);
     if (!base) {
-      of_steps_.add("the robot is not masked in the image of", step_s, ": the pose of '" + root + "' is not known");
-      return frame;
+      of_steps_.add("the robot is not masked in the " + where, step_s, ": the pose of '" + root + "' is not known");
+      return std::nullopt;
     }
-    const NamedJoints joints = known_joints_at(streams_, plan_.recording.robot, frame.time_s);
+    const NamedJoints joints = known_joints_at(streams_, robot, time_s);
     if (const auto unmasked = unmasked_links(*mask_, joints, streams_)) {
-      of_steps_.add(unmasked->who + " not masked in the image of", step_s, ": " + unmasked->why);
-      if (unmasked->is_whole_robot) return frame;
+      of_steps_.add(unmasked->who + " not masked in the " + where, step_s, ": " + unmasked->why);
+      if (unmasked->is_whole_robot) return std::nullopt;
     }
-    return sensing::with_mask(frame, mask_->mask_known(frame, joints.names, joints.positions, *base));
+    return PosedRobot{*base, joints};
   }
 
   const StreamPlan& plan_;
@@ -476,6 +487,7 @@ class Assembly {
   std::vector<double> camera_offset_s_;
   std::vector<std::set<std::size_t>> used_images_, used_clouds_;
   std::unique_ptr<sensing::RobotMask> mask_;
+  std::unique_ptr<sensing::RobotInClouds> in_clouds_;
   RepeatedNotes of_steps_;
   FromStreams out_;
 };

@@ -56,6 +56,7 @@ struct CloudStream {
   std::string name, frame;
   double sigma_m = std::numeric_limits<double>::quiet_NaN();
   double pose_std_m = 0, pose_std_rad = 0;
+  std::optional<bool> mask_robot;  ///< absent: where the robot is described and its pose is known
   std::vector<double> times_s;
   std::function<PointCloud(std::size_t)> cloud;  ///< in `frame`
 };

@@ -55,6 +55,7 @@ void read_clouds(const YamlField& list, BagMapping& mapping) {
     MappedCloud cloud;
     cloud.topic = topic_of(keys.required("topic"));
     cloud.frame = keys.text_or("frame", "");
+    if (const auto wanted = keys.optional("mask_robot")) cloud.mask_robot = wanted->boolean();
     cloud.sigma_m = keys.required("sigma_m", "the standard deviation of a point, per axis").within(ranges::length_sigma);
     cloud.pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std);
     cloud.pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);

@@ -30,6 +30,7 @@ struct MappedCamera {
 struct MappedCloud {
   MappedTopic topic;
   std::string frame;
+  std::optional<bool> mask_robot;  ///< absent: where its description, joints and pose are known
   double sigma_m = 0, pose_std_m = 0, pose_std_rad = 0;
 };
 

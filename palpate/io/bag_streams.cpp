@@ -356,6 +356,7 @@ void read_cloud(const StreamReader& reader, const MappedCloud& mapped, const Mes
   CloudStream stream;
   stream.name = mapped.topic.name;
   stream.frame = mapped.frame;
+  stream.mask_robot = mapped.mask_robot;
   stream.sigma_m = mapped.sigma_m;
   stream.pose_std_m = mapped.pose_std_m;
   stream.pose_std_rad = mapped.pose_std_rad;

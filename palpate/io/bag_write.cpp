@@ -276,6 +276,7 @@ class BagWriter {
       YamlLine line;
       line.put("topic", "/points").number("sigma_m", cloud_.sigma_m[0]);
       line.number_unless(0, "pose_std_m", cloud_.pose_std_m).number_unless(0, "pose_std_rad", cloud_.pose_std_rad);
+      if (recording_.robot) line.put("mask_robot", "false");  // a recording's clouds are without it
       text += "  clouds:\n    - " + line.str() + "\n";
     }
     text += frames_.mapping_text() + "wrench: {reports: force_on_object, tare: none}\n";

@@ -29,10 +29,14 @@ double median_around_m(const DepthImage& depth_m, Eigen::Index row, Eigen::Index
 
 }  // namespace
 
-MaskImage mask_planes(const DepthFrame& frame, const std::vector<Plane>& planes, const PlaneMaskOptions& options) {
+void check(const PlaneMaskOptions& options) {
   if (!(options.margin_m >= 0)) throw Error("must not be negative", "PlaneMaskOptions.margin_m");
   if (!(options.sigmas >= 0)) throw Error("must not be negative", "PlaneMaskOptions.sigmas");
   if (options.window_px < 0) throw Error("must not be negative", "PlaneMaskOptions.window_px");
+}
+
+MaskImage mask_planes(const DepthFrame& frame, const std::vector<Plane>& planes, const PlaneMaskOptions& options) {
+  check(options);
   MaskImage mask = MaskImage::Zero(frame.depth_m.rows(), frame.depth_m.cols());
   std::vector<float> scratch;
   if (planes.empty()) return mask;

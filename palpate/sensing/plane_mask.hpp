@@ -13,6 +13,9 @@ struct PlaneMaskOptions {
   int window_px = 2;        ///< half width of the window whose median depth decides; 0 = the pixel itself
 };
 
+/// @throws Error naming the option that is out of range.
+void check(const PlaneMaskOptions& options);
+
 /// Pixels that show tables and walls: 1 where the ray reaches a plane before the measurement does, or less than the margins
 /// after it. Margins act along the normal; a low part of the object within them is lost, which a likelihood can bear, while
 /// a pixel of the table taken for the object would bias it. Close to the margin the median of the neighbours decides: were it

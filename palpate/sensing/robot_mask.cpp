@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include "palpate/core/error.hpp"
@@ -141,34 +140,45 @@ DepthImage RobotMask::render(const std::vector<Pose>& link_poses, const Camera& 
   return render_depth(bodies, camera, T_base_camera);
 }
 
+RobotMask::PosedLink RobotMask::posed(std::size_t k, const std::vector<Pose>& link_poses) const {
+  return {k, link_poses[std::size_t(links_[k])],
+          kinematics_.position_std_m(link_poses, links_[k], farthest_m_[k], options_.joint_std_rad)};
+}
+
+std::vector<RobotMask::PosedLink> RobotMask::known_links(const std::vector<std::string>& joint_names,
+                                                         const std::vector<double>& joints) const {
+  const std::vector<std::optional<Pose>> known = kinematics_.known_link_poses(joint_names, joints);
+  std::vector<Pose> poses;
+  for (const std::optional<Pose>& one : known) poses.push_back(one.value_or(Pose::Identity()));
+  std::vector<PosedLink> links;
+  for (std::size_t k = 0; k < links_.size(); ++k)
+    if (known[std::size_t(links_[k])]) links.push_back(posed(k, poses));
+  return links;
+}
+
 MaskImage RobotMask::mask(const DepthFrame& frame, const std::vector<std::string>& joint_names,
                           const std::vector<double>& joints, const Pose& T_base_root) const {
-  std::vector<std::size_t> shapes(links_.size());
-  std::iota(shapes.begin(), shapes.end(), std::size_t{0});
-  return mask_posed(frame, kinematics_.link_poses(joint_names, joints), shapes, T_base_root);
+  const std::vector<Pose> poses = kinematics_.link_poses(joint_names, joints);
+  std::vector<PosedLink> links;
+  for (std::size_t k = 0; k < links_.size(); ++k) links.push_back(posed(k, poses));
+  return mask_posed(frame, links, T_base_root);
 }
 
 MaskImage RobotMask::mask_known(const DepthFrame& frame, const std::vector<std::string>& joint_names,
                                 const std::vector<double>& joints, const Pose& T_base_root) const {
-  const std::vector<std::optional<Pose>> known = kinematics_.known_link_poses(joint_names, joints);
-  std::vector<Pose> poses;
-  for (const std::optional<Pose>& one : known) poses.push_back(one.value_or(Pose::Identity()));
-  std::vector<std::size_t> shapes;
-  for (std::size_t k = 0; k < links_.size(); ++k)
-    if (known[std::size_t(links_[k])]) shapes.push_back(k);
-  return mask_posed(frame, poses, shapes, T_base_root);
+  return mask_posed(frame, known_links(joint_names, joints), T_base_root);
 }
 
-MaskImage RobotMask::mask_posed(const DepthFrame& frame, const std::vector<Pose>& link_poses,
-                                const std::vector<std::size_t>& shapes, const Pose& T_base_root) const {
+MaskImage RobotMask::mask_posed(const DepthFrame& frame, const std::vector<PosedLink>& links, const Pose& T_base_root) const {
   double std_m = 0;  // of the worst link
   std::vector<PosedMesh> bodies;
-  for (const std::size_t k : shapes) {
-    std_m = std::max(std_m, kinematics_.position_std_m(link_poses, links_[k], farthest_m_[k], options_.joint_std_rad));
-    bodies.push_back({&meshes_[k], T_base_root * link_poses[std::size_t(links_[k])]});
+  for (const PosedLink& link : links) {
+    const TriMesh& mesh = meshes_[link.shaped];
+    std_m = std::max(std_m, link.position_std_m);
+    bodies.push_back({&mesh, T_base_root * link.T_root_link});
     // The camera's own housing is around it, and would hide everything.
     constexpr double housing_m = 0.05;
-    if (is_around(meshes_[k], bodies.back().T_base_mesh.inverse() * Vec3(frame.T_base_camera.translation()))) bodies.back().near_m = housing_m;
+    if (is_around(mesh, bodies.back().T_base_mesh.inverse() * Vec3(frame.T_base_camera.translation()))) bodies.back().near_m = housing_m;
   }
   const double pose_margin = options_.pose_sigmas * std::hypot(std_m, options_.base_std_m, frame.pose_std_m);
   RenderMaskOptions margins = options_.margins;

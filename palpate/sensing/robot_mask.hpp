@@ -49,10 +49,20 @@ class RobotMask {
                        const Pose& T_base_root = Pose::Identity()) const;
   /// Links with a shape, in the order of the description.
   const std::vector<Index>& shaped_links() const { return links_; }
+  /// All shapes of the k-th of them, in the link's frame.
+  const TriMesh& link_mesh(std::size_t k) const { return meshes_[k]; }
+
+  struct PosedLink {
+    std::size_t shaped = 0;  ///< of shaped_links()
+    Pose T_root_link = Pose::Identity();
+    double position_std_m = 0;  ///< of its farthest vertex, by the joints' errors
+  };
+  /// Those links with a shape whose pose these joints tell.
+  std::vector<PosedLink> known_links(const std::vector<std::string>& joint_names, const std::vector<double>& joints) const;
 
  private:
-  MaskImage mask_posed(const DepthFrame& frame, const std::vector<Pose>& link_poses, const std::vector<std::size_t>& shapes,
-                       const Pose& T_base_root) const;
+  MaskImage mask_posed(const DepthFrame& frame, const std::vector<PosedLink>& links, const Pose& T_base_root) const;
+  PosedLink posed(std::size_t k, const std::vector<Pose>& link_poses) const;
 
   Kinematics kinematics_;
   RobotMaskOptions options_;

@@ -99,6 +99,41 @@ TEST(FromStreams, PixelsOfTheRobotAreLeftOut) {
   EXPECT_THROW(recording_from(masked, streams), Error) << "no description, no mask";
 }
 
+TEST(FromStreams, PointsOfTheRobotAreLeftOutOfClouds) {
+  SensorStreams streams = lab();
+  for (const PoseSample& sample : streams.frames[0].samples)
+    streams.joints.push_back({sample.time_s, {height_m(sample.time_s)}});
+  streams.joint_names = {"lift"};
+  CloudStream clouds;
+  clouds.name = "/points";
+  clouds.frame = "base";
+  clouds.sigma_m = 0.001;
+  for (int i = 0; i < 300; ++i) clouds.times_s.push_back(0.1 * i);
+  clouds.cloud = [&](std::size_t i) {
+    PointCloud cloud;
+    cloud.points_m.resize(2, 3);
+    cloud.points_m << 0.31, 0.1, height_m(0.1 * static_cast<double>(i)), 0.4, 0.1, 0;  // on the tip's box, and beside it
+    return cloud;
+  };
+  streams.clouds.push_back(clouds);
+  StreamPlan masked = plan();
+  masked.recording.robot = column();
+  const auto fewest_and_most_points = [&] {
+    std::pair<Index, Index> points{1000, 0};
+    for (const Step& step : recording_from(masked, streams).recording.pushes.at(0).steps)
+      for (const Observation& one : step.observations)
+        if (const auto* cloud = std::get_if<PointCloud>(&one))
+          points = {std::min<Index>(points.first, cloud->points_m.rows()), std::max<Index>(points.second, cloud->points_m.rows())};
+    return points;
+  };
+  EXPECT_EQ(fewest_and_most_points(), (std::pair<Index, Index>(1, 1))) << "it is described and its pose is known";
+  streams.clouds[0].mask_robot = false;
+  EXPECT_EQ(fewest_and_most_points(), (std::pair<Index, Index>(2, 2)));
+  streams.clouds[0].mask_robot = true;
+  masked.recording.robot.reset();
+  EXPECT_THAT(refusal(masked, streams), AllOf(HasSubstr("topics.clouds"), HasSubstr("mask_robot needs the robot")));
+}
+
 TEST(FromStreams, TheRobotIsMaskedWhereItStandsAndOnceAndOnlyIfItIsWanted) {
   SensorStreams streams = lab();
   // A gripper shares the topic; the column stands 10 m aside, far out of the picture.

@@ -48,6 +48,35 @@ std::string complaint(const Recording& recording, const IdentifyOptions& options
   return "nothing";
 }
 
+/// What a depth camera's clouds hold beside the object: a table 2 cm below it and a wall behind, most of the points.
+void put_in_a_room(Recording& recording) {
+  recording.environment.planes = {Plane{Vec3(0, 0, -0.02), Vec3::UnitZ()}};
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> share(-1, 1);
+  std::normal_distribution<double> normal;
+  for (Step& step : recording.pushes[0].steps) {
+    PointCloud& cloud = std::get<PointCloud>(step.observations[0]);
+    const Index object = cloud.points_m.rows(), more = 5000;
+    cloud.points_m.conservativeResize(object + 2 * more, 3);
+    for (Index i = 0; i < more; ++i) {
+      cloud.points_m.row(object + i) << 0.3 * share(random), 0.3 * share(random), -0.02 + cloud.sigma_m(0) * normal(random);
+      cloud.points_m.row(object + more + i) << 1.5, share(random), share(random);
+    }
+  }
+}
+
+TEST(UncommonRecordings, CloudsMayHoldTheRoom) {
+  Recording recording = block_with_clouds("linear");
+  const Identified alone = identify(recording);
+  put_in_a_room(recording);
+  const Identified in_a_room = identify(recording);
+  EXPECT_EQ(in_a_room.answer.parameters[0].value, alone.answer.parameters[0].value);
+  EXPECT_EQ(in_a_room.answer.parameters[0].lower_95, alone.answer.parameters[0].lower_95);
+
+  std::get<PointCloud>(recording.pushes[0].steps[1].observations[0]).points_m.col(2).array() += 3;
+  EXPECT_THAT(complaint(recording), AllOf(HasSubstr("cloud"), HasSubstr("shows the object")));
+}
+
 TEST(UncommonRecordings, NoPushIsRefusedForEveryLaw) {
   for (const char* material : {"linear", "neo_hookean"}) {
     Recording recording = block_with_clouds("linear");

@@ -254,6 +254,24 @@ TEST_F(Mapping, OffsetsAndTheRecordersClockAreTaken) {
   EXPECT_NEAR(by_log.cameras.at(0).times_s.at(2), true_ones.cameras.at(0).times_s.at(2), 1e-9);
 }
 
+TEST_F(Mapping, SaysWhetherTheRobotIsToBeTakenOutOfClouds) {
+  const auto wanted = [&](const std::string& key) {
+    std::string changed = text;
+    const std::size_t at = changed.find("topic: /points");
+    EXPECT_NE(at, std::string::npos);
+    changed.erase(at, changed.find("sigma_m", at) - at);
+    changed.insert(at, "topic: /points, " + key);
+    const std::size_t end = changed.find("}", at), other = changed.find(", mask_robot", at + 14 + key.size());
+    if (other < end) changed.erase(other, end - other);
+    folder.put("bag/changed.yaml", changed);
+    BagMapping mapping = read_mapping(folder.path() / "bag/changed.yaml");
+    return read_streams(read_bag(folder.path() / "bag"), mapping).clouds.at(0).mask_robot;
+  };
+  EXPECT_EQ(wanted(""), std::nullopt);
+  EXPECT_EQ(wanted("mask_robot: true, "), true);
+  EXPECT_EQ(wanted("mask_robot: false, "), false);
+}
+
 TEST_F(Mapping, AMarkThatNoPushDescribesIsSaid) {
   const std::size_t second = text.find("    - {name: \"push 2\"");
   ASSERT_NE(second, std::string::npos);

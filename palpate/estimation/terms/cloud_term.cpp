@@ -101,7 +101,7 @@ class CloudTerm : public Term {
 
 std::unique_ptr<Term> make_cloud_term(const PointCloud& cloud, const TermContext& context) {
   const std::string where = context.model.step(context.step).source + " cloud";
-  if (cloud.points_m.rows() == 0) throw Error("the cloud is empty", where);
+  if (cloud.points_m.rows() == 0) throw Error("no point of the cloud shows the object: none is near it and above tables and walls", where);
   if (cloud.sigma_m.size() != 1 && cloud.sigma_m.size() != cloud.points_m.rows()) {
     throw Error("give one standard deviation (sigma_m), or one a point", where);
   }
