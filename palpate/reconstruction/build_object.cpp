@@ -12,6 +12,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/geometry/union_find.hpp"
 #include "palpate/reconstruction/facets.hpp"
+#include "palpate/reconstruction/foreign_points.hpp"
 #include "palpate/reconstruction/fused_surface.hpp"
 #include "palpate/registration/views.hpp"
 
@@ -50,21 +51,15 @@ void drop_support(std::vector<PointCloud>& clouds, const Plane& plane) {
     if (n == 0) continue;
     const double size = (c.points_m.colwise().maxCoeff() - c.points_m.colwise().minCoeff()).norm();
     const double limit = std::max(3 * mean_sigma(c), 1e-3 * size);
-    const bool normals = c.normals.rows() == n, each = c.sigma_m.size() == n && n > 1;
-    Index kept = 0;
+    const bool normals = c.normals.rows() == n;
+    std::vector<char> stays;
     for (Index i = 0; i < n; ++i) {
       const double height = plane.normal.dot(Vec3(c.points_m.row(i).transpose()) - plane.point_m);
       // a flank close above the plane belongs to the object: only what also faces like the plane is taken for it
       const bool flat = !normals || plane.normal.dot(c.normals.row(i).transpose()) > 0.8;
-      if (height < -limit || (height < limit && flat)) continue;
-      c.points_m.row(kept) = c.points_m.row(i).eval();
-      if (normals) c.normals.row(kept) = c.normals.row(i).eval();
-      if (each) c.sigma_m[kept] = c.sigma_m[i];
-      ++kept;
+      stays.push_back(!(height < -limit || (height < limit && flat)));
     }
-    c.points_m.conservativeResize(kept, 3);
-    if (normals) c.normals.conservativeResize(kept, 3);
-    if (each) c.sigma_m.conservativeResize(kept);
+    keep_points(c, stays);
   }
 }
 
@@ -225,6 +220,10 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   std::vector<Pose> correction;
   double by_poses_m = 0;
   if (fuse.support) drop_support(clouds, *fuse.support);
+  if (const ForeignPoints foreign = drop_foreign(clouds, fuse.touched); foreign.share > 0)
+    warnings.push_back(std::to_string(static_cast<int>(100 * foreign.share + 0.5)) + " % of what the views show stands about " +
+                       std::to_string(static_cast<int>(1e3 * foreign.nearest_m + 0.5)) +
+                       " mm beside the object, and was left out of its shape");
   if (options.align_views && uncertain) {
     std::vector<std::size_t> filled;
     std::vector<PointCloud> moving;
