@@ -50,6 +50,18 @@ std::vector<Plane> half_spaces(const Recording& recording) {
   return planes;
 }
 
+/// The tool of a step where the robot says that its tip is, also before it touches; no stick: none.
+std::vector<sensing::Stick> sticks_of(const Recording& recording, const Push& push, const Step& step) {
+  if (!step.T_base_tip) return {};
+  const auto pushing = std::find_if(push.steps.begin(), push.steps.end(), [](const Step& one) { return one.loads.size() == 1; });
+  if (pushing == push.steps.end()) return {};
+  const Load& load = pushing->loads.front();
+  for (const Tool& tool : recording.tools)
+    if (tool.name == load.tool && (tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc))
+      return {{step.T_base_tip->translation(), load.direction, tool.radius_m}};
+  return {};
+}
+
 /// Names of the frames' cameras, told by their intrinsics: one that stands at a place, or one that is carried around. "" for a
 /// camera of one frame.
 std::vector<std::string> cameras_of(const std::vector<const DepthFrame*>& frames) {
@@ -105,7 +117,8 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
                                                      frame->T_base_camera.linear(),
                                                      estimation::outline_margin_px / std::min(frame->camera.fx_px, frame->camera.fy_px)});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
-          terms.push_back(sensing::points_of_object(*cloud, planes, low_m, high_m));
+          const PointCloud seen = sensing::without_sticks(*cloud, sticks_of(recording, push, step));
+          terms.push_back(sensing::points_of_object(seen, planes, low_m, high_m));
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {
           terms.push_back(*markers);
         } else if (const auto* travel = std::get_if<ToolTravel>(&observation)) {

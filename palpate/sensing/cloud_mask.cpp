@@ -111,6 +111,22 @@ PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& p
   return chosen(cloud, thinned(above, options.most_points));
 }
 
+PointCloud without_sticks(const PointCloud& cloud, const std::vector<Stick>& sticks) {
+  constexpr double margin_m = 0.003;
+  check_sigma(cloud);
+  std::vector<Index> others;
+  for (Index i = 0; i < cloud.points_m.rows(); ++i) {
+    const double beside_m = margin_m + 3 * sigma_m(cloud, i);
+    const bool on_stick = std::any_of(sticks.begin(), sticks.end(), [&](const Stick& stick) {
+      const Vec3 from_tip = cloud.points_m.row(i).transpose() - stick.tip_m;
+      const double behind_m = -stick.inward.dot(from_tip);
+      return behind_m > -beside_m && (from_tip + behind_m * stick.inward).norm() < stick.radius_m + beside_m;
+    });
+    if (!on_stick) others.push_back(i);
+  }
+  return chosen(cloud, others);
+}
+
 struct RobotInClouds::Link {
   geometry::TriangleTree surface;
   Vec3 low_m, high_m;

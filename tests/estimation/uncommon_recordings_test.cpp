@@ -48,7 +48,7 @@ std::string complaint(const Recording& recording, const IdentifyOptions& options
   return "nothing";
 }
 
-/// What a depth camera's clouds hold beside the object: a table 2 cm below it and a wall behind, most of the points.
+/// What a depth camera's clouds hold beside the object: the stick, a table 2 cm below and a wall behind, most of the points.
 void put_in_a_room(Recording& recording) {
   recording.environment.planes = {Plane{Vec3(0, 0, -0.02), Vec3::UnitZ()}};
   std::mt19937 random(3);
@@ -57,16 +57,20 @@ void put_in_a_room(Recording& recording) {
   for (Step& step : recording.pushes[0].steps) {
     PointCloud& cloud = std::get<PointCloud>(step.observations[0]);
     const Index object = cloud.points_m.rows(), more = 5000;
-    cloud.points_m.conservativeResize(object + 2 * more, 3);
+    const Vec3 contact_m = step.loads[0].contact_m;
+    cloud.points_m.conservativeResize(object + 3 * more, 3);
     for (Index i = 0; i < more; ++i) {
       cloud.points_m.row(object + i) << 0.3 * share(random), 0.3 * share(random), -0.02 + cloud.sigma_m(0) * normal(random);
       cloud.points_m.row(object + more + i) << 1.5, share(random), share(random);
+      const double turned = M_PI * share(random), up_m = 0.052 + 0.045 * share(random);
+      cloud.points_m.row(object + 2 * more + i) = contact_m + Vec3(0.012 * std::cos(turned), 0.012 * std::sin(turned), up_m);
     }
   }
 }
 
 TEST(UncommonRecordings, CloudsMayHoldTheRoom) {
   Recording recording = block_with_clouds("linear");
+  for (Step& step : recording.pushes[0].steps) step.T_base_tip = Pose(Eigen::Translation3d(step.loads[0].contact_m));
   const Identified alone = identify(recording);
   put_in_a_room(recording);
   const Identified in_a_room = identify(recording);
