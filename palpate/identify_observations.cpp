@@ -16,6 +16,7 @@
 #include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/plane_mask.hpp"
 #include "palpate/sensing/robot_mask.hpp"
+#include "palpate/sensing/stick_mask.hpp"
 
 namespace palpate {
 namespace {
@@ -109,6 +110,9 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
           if (robot && !frame->robot_is_masked && !step.joints_rad.empty()) {
             masked = sensing::with_mask(masked, robot->mask_known(*frame, recording.joint_names, step.joints_rad));
           }
+          // Nobody has masked anything: then at least the stick, whose tip the step knows.
+          if (!robot && !frame->robot_is_masked && frame->mask.size() == 0)
+            masked = sensing::with_mask(masked, sensing::mask_sticks(*frame, sticks_of(recording, push, step)));
           if (masked_m != nullptr && masked_m->back().rows() == 0) {
             masked_m->back() = sensing::masked_points(masked, low_m, high_m, masked_a_step);
           }

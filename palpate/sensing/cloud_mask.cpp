@@ -28,14 +28,6 @@ using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<do
 
 double sigma_m(const PointCloud& cloud, Index point) { return cloud.sigma_m(cloud.sigma_m.size() == 1 ? 0 : point); }
 
-PointCloud chosen(const PointCloud& cloud, const std::vector<Index>& points) {
-  PointCloud out = cloud;
-  out.points_m = cloud.points_m(points, Eigen::all);
-  if (cloud.normals.rows() == cloud.points_m.rows()) out.normals = cloud.normals(points, Eigen::all);
-  if (cloud.sigma_m.size() > 1) out.sigma_m = cloud.sigma_m(points);
-  return out;
-}
-
 /// Every n-th, so that no more than `most` are left.
 std::vector<Index> thinned(const std::vector<Index>& points, double most) {
   const auto stride = static_cast<std::size_t>(std::max(1.0, std::ceil(static_cast<double>(points.size()) / most)));
@@ -92,7 +84,7 @@ PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& p
     if ((point.array() >= low_m.array()).all() && (point.array() <= high_m.array()).all()) left.push_back(i);
   }
   // Neighbours are asked for of what may stay; most of a table goes below.
-  const PointCloud near = chosen(cloud, left = thinned(left, 8 * options.most_points));
+  const PointCloud near = chosen_points(cloud, left = thinned(left, 8 * options.most_points));
   std::vector<char> stays(left.size(), 1);
   HeightsAround around(near.points_m, options.neighbours);
   for (const Plane& plane : planes) {
@@ -108,23 +100,15 @@ PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& p
   std::vector<Index> above;
   for (std::size_t i = 0; i < left.size(); ++i)
     if (stays[i]) above.push_back(left[i]);
-  return chosen(cloud, thinned(above, options.most_points));
+  return chosen_points(cloud, thinned(above, options.most_points));
 }
 
-PointCloud without_sticks(const PointCloud& cloud, const std::vector<Stick>& sticks) {
-  constexpr double margin_m = 0.003;
-  check_sigma(cloud);
-  std::vector<Index> others;
-  for (Index i = 0; i < cloud.points_m.rows(); ++i) {
-    const double beside_m = margin_m + 3 * sigma_m(cloud, i);
-    const bool on_stick = std::any_of(sticks.begin(), sticks.end(), [&](const Stick& stick) {
-      const Vec3 from_tip = cloud.points_m.row(i).transpose() - stick.tip_m;
-      const double behind_m = -stick.inward.dot(from_tip);
-      return behind_m > -beside_m && (from_tip + behind_m * stick.inward).norm() < stick.radius_m + beside_m;
-    });
-    if (!on_stick) others.push_back(i);
-  }
-  return chosen(cloud, others);
+PointCloud chosen_points(const PointCloud& cloud, const std::vector<Index>& points) {
+  PointCloud out = cloud;
+  out.points_m = cloud.points_m(points, Eigen::all);
+  if (cloud.normals.rows() == cloud.points_m.rows()) out.normals = cloud.normals(points, Eigen::all);
+  if (cloud.sigma_m.size() > 1) out.sigma_m = cloud.sigma_m(points);
+  return out;
 }
 
 struct RobotInClouds::Link {
@@ -160,7 +144,7 @@ PointCloud RobotInClouds::without_robot(const PointCloud& cloud, const std::vect
   std::vector<Index> others;
   for (std::size_t i = 0; i < shows_robot.size(); ++i)
     if (!shows_robot[i]) others.push_back(static_cast<Index>(i));
-  return chosen(cloud, others);
+  return chosen_points(cloud, others);
 }
 
 }  // namespace palpate::sensing

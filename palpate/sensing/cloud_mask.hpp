@@ -27,17 +27,8 @@ struct CloudMaskOptions {
 PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& planes, const Vec3& low_m, const Vec3& high_m,
                             const CloudMaskOptions& options = {});
 
-/// A tool as sensors see it when nothing but its radius is known: a stick of this radius that ends at the tip.
-struct Stick {
-  Vec3 tip_m = Vec3::Zero();            ///< base frame
-  Vec3 inward = -Vec3::UnitZ();         ///< unit length, along the stick and into the object
-  double radius_m = 0;
-};
-
-/// The points that are neither on a stick nor under its tip: not within its radius, 3 mm and three standard deviations of its
-/// axis, from that far before the tip on.
-/// @throws Error when sigma_m has neither one value nor one a point
-PointCloud without_sticks(const PointCloud& cloud, const std::vector<Stick>& sticks);
+/// Chosen points with their normals and standard deviations.
+PointCloud chosen_points(const PointCloud& cloud, const std::vector<Index>& points);
 
 /// Takes the robot out of clouds. Const calls are thread-safe.
 class RobotInClouds {

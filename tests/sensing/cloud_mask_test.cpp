@@ -102,20 +102,6 @@ TEST(PointsOfObject, AreNearItAndAboveTheTable) {
     EXPECT_EQ(left.points_m.row(i), room.cloud.points_m.row(static_cast<Index>(left.normals(i, 0))));
 }
 
-TEST(Sticks, AreTakenOutFromTheirTipsOn) {
-  // On the axis of a stick that comes along x and ends at the origin, beside it, and before it.
-  PointCloud cloud;
-  cloud.sigma_m = VectorX::Constant(1, sigma_m);
-  cloud.points_m.resize(5, 3);
-  cloud.points_m << -0.05, 0, 0, -0.05, 0.0155, 0, -0.05, 0.0165, 0, 0.0055, 0, 0, 0.0065, 0, 0;
-  const std::vector<Stick> sticks{{Vec3::Zero(), Vec3::UnitX(), 0.01}};
-  const PointCloud left = without_sticks(cloud, sticks);
-  ASSERT_EQ(left.points_m.rows(), 2) << "three are within 10 + 3 + 3 mm of the axis, and no 6 mm before the tip";
-  EXPECT_EQ(left.points_m(0, 1), 0.0165);
-  EXPECT_EQ(left.points_m(1, 0), 0.0065);
-  EXPECT_EQ(without_sticks(cloud, {}).points_m, cloud.points_m);
-}
-
 TEST(RobotInClouds, IsTakenOutWhereItIs) {
   const RoomCloud room = room_cloud(1000);
   const RobotMask robot(ball_robot());
