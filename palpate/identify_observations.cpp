@@ -2,21 +2,18 @@
 // What the sensors of every step saw, without what is not the object.
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "palpate/estimation/grazing.hpp"
 #include "palpate/identify.hpp"
+#include "palpate/sensing/arm_mask.hpp"
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/cloud_mask.hpp"
-#include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/lens_scatter.hpp"
 #include "palpate/sensing/masked_points.hpp"
 #include "palpate/sensing/plane_mask.hpp"
-#include "palpate/sensing/robot_mask.hpp"
-#include "palpate/sensing/stick_mask.hpp"
 
 namespace palpate {
 namespace {
@@ -49,18 +46,6 @@ std::vector<Plane> half_spaces(const Recording& recording) {
   for (const Support& support : recording.supports)
     if (support.kind == SupportKind::table || support.kind == SupportKind::wall) planes.push_back(support.plane);
   return planes;
-}
-
-/// The tool of a step where the robot says that its tip is, also before it touches; no stick: none.
-std::vector<sensing::Stick> sticks_of(const Recording& recording, const Push& push, const Step& step) {
-  if (!step.T_base_tip) return {};
-  const auto pushing = std::find_if(push.steps.begin(), push.steps.end(), [](const Step& one) { return one.loads.size() == 1; });
-  if (pushing == push.steps.end()) return {};
-  const Load& load = pushing->loads.front();
-  for (const Tool& tool : recording.tools)
-    if (tool.name == load.tool && (tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc))
-      return {{step.T_base_tip->translation(), load.direction, tool.radius_m}};
-  return {};
 }
 
 /// Names of the frames' cameras, told by their intrinsics: one that stands at a place, or one that is carried around. "" for a
@@ -98,21 +83,14 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
   const auto [low_m, high_m] = surroundings(recording);
   const std::vector<Plane> planes = half_spaces(recording);
   if (masked_m != nullptr) masked_m->clear();
-  std::optional<sensing::RobotMask> robot;  // a robot that was recorded without shapes cannot be masked
-  if (recording.robot && sensing::has_shapes(*recording.robot)) robot.emplace(*recording.robot);
+  const sensing::ArmMask arm(recording);
   for (const auto& push : recording.pushes) {
     for (const auto& step : push.steps) {
       auto& terms = inputs.emplace_back();
       if (masked_m != nullptr) masked_m->emplace_back(0, 3);
       for (const auto& observation : step.observations) {
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
-          auto masked = sensing::with_mask(*frame, sensing::mask_planes(*frame, recording.environment.planes));
-          if (robot && !frame->robot_is_masked && !step.joints_rad.empty()) {
-            masked = sensing::with_mask(masked, robot->mask_known(*frame, recording.joint_names, step.joints_rad));
-          }
-          // Nobody has masked anything: then at least the stick, whose tip the step knows.
-          if (!robot && !frame->robot_is_masked && frame->mask.size() == 0)
-            masked = sensing::with_mask(masked, sensing::mask_sticks(*frame, sticks_of(recording, push, step)));
+          const auto masked = sensing::with_mask(arm.without_arm(*frame, push, step), sensing::mask_planes(*frame, recording.environment.planes));
           if (masked_m != nullptr && masked_m->back().rows() == 0) {
             masked_m->back() = sensing::masked_points(masked, low_m, high_m, masked_a_step);
           }
@@ -121,8 +99,7 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
                                                      frame->T_base_camera.linear(),
                                                      estimation::outline_margin_px / std::min(frame->camera.fx_px, frame->camera.fy_px)});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
-          const PointCloud seen = sensing::without_sticks(*cloud, sticks_of(recording, push, step));
-          terms.push_back(sensing::points_of_object(seen, planes, low_m, high_m));
+          terms.push_back(sensing::points_of_object(arm.without_arm(*cloud, push, step), planes, low_m, high_m));
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {
           terms.push_back(*markers);
         } else if (const auto* travel = std::get_if<ToolTravel>(&observation)) {

@@ -406,7 +406,7 @@ class Assembly {
       }
       if (const auto at = robot_to_mask(camera.mask_robot, frame.time_s, step.time_s, "image of", "topics.depth"))
         frame = sensing::with_mask(frame, mask_->mask_known(frame, at->joints.names, at->joints.positions, at->T_base_root));
-      frame.robot_is_masked = true;  // or it is not to be
+      frame.robot_is_masked = plan_.recording.robot || camera.mask_robot;  // or it is not to be
       step.observations.emplace_back(std::move(frame));
     }
     for (std::size_t c = 0; c < streams_.clouds.size(); ++c) {

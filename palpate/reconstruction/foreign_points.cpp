@@ -41,15 +41,17 @@ class Clusters {
     }
   }
 
+  double cell_m() const { return cell_m_; }
   /// Cells of each cluster.
   const std::map<Index, std::vector<Index>>& members() const { return members_; }
   Vec3 middle_m(Index cell) const {
     const Cell& at = cells_[static_cast<std::size_t>(cell)];
     return cell_m_ * Vec3(static_cast<double>(at[0]) + 0.5, static_cast<double>(at[1]) + 0.5, static_cast<double>(at[2]) + 0.5);
   }
-  Index nearest_to(const Vec3& point_m) const {
-    Index nearest = 0;
-    double least_m2 = infinity;
+  /// -1: no cell is so near.
+  Index nearest_to(const Vec3& point_m, double within_m) const {
+    Index nearest = -1;
+    double least_m2 = within_m * within_m;
     for (std::size_t c = 0; c < cells_.size(); ++c) {
       const double away_m2 = (middle_m(static_cast<Index>(c)) - point_m).squaredNorm();
       if (away_m2 < least_m2) least_m2 = away_m2, nearest = root_[c];
@@ -98,7 +100,11 @@ double cell_for(const std::vector<PointCloud>& clouds) {
 /// One round: the foreign clusters, and how near they come.
 std::set<Index> foreign_clusters(const Clusters& clusters, std::size_t all_points, const std::vector<Touch>& touched, double& nearest_m) {
   std::set<Index> body_clusters, foreign;
-  for (const Touch& touch : touched) body_clusters.insert(clusters.nearest_to(touch.point_m));
+  // A side that no view shows may be touched, too: what is nearest to it may be something else.
+  for (const Touch& touch : touched)
+    if (const Index cluster = clusters.nearest_to(touch.point_m, 2 * clusters.cell_m() + touch.radius_m); cluster >= 0)
+      body_clusters.insert(cluster);
+  if (body_clusters.empty()) return foreign;
   std::vector<Vec3> body;
   Vec3 low = Vec3::Constant(infinity), high = -low;
   for (const Index cluster : body_clusters)

@@ -15,7 +15,8 @@ struct ForeignPoints {
 };
 
 /// Leaves out points that hang together with nothing that was touched: further from it than 0.15 of its own size, and at least
-/// a fiftieth of all points, for fewer are noise that fusing bears. Nothing is left out where nothing was touched.
+/// a fiftieth of all points, for fewer are noise that fusing bears. Nothing is left out where nothing was touched that the
+/// views show.
 ForeignPoints drop_foreign(std::vector<PointCloud>& clouds, const std::vector<Touch>& touched);
 
 /// Keeps the points of a cloud that `stays` says (one value a point), with their normals and standard deviations.

@@ -2,11 +2,9 @@
 #include "palpate/sensing/images_at_rest.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <variant>
 
-#include "palpate/sensing/plane_mask.hpp"
-#include "palpate/sensing/robot_mask.hpp"
+#include "palpate/sensing/arm_mask.hpp"
 
 namespace palpate::sensing {
 
@@ -17,8 +15,7 @@ bool has_shapes(const RobotModel& robot) {
 
 std::vector<DepthFrame> images_at_rest(const Recording& recording) {
   std::vector<DepthFrame> frames = recording.rest.views;
-  std::optional<RobotMask> robot;
-  if (recording.robot && has_shapes(*recording.robot)) robot.emplace(*recording.robot);
+  const ArmMask arm(recording);
   for (const auto& push : recording.pushes) {
     if (push.steps.empty()) continue;
     const Step& step = push.steps.front();
@@ -27,11 +24,7 @@ std::vector<DepthFrame> images_at_rest(const Recording& recording) {
     });
     if (loaded || step.unloading) continue;
     for (const auto& observation : step.observations) {
-      const auto* frame = std::get_if<DepthFrame>(&observation);
-      if (frame == nullptr) continue;
-      frames.push_back(robot && !frame->robot_is_masked && !step.joints_rad.empty()
-                           ? with_mask(*frame, robot->mask_known(*frame, recording.joint_names, step.joints_rad))
-                           : *frame);
+      if (const auto* frame = std::get_if<DepthFrame>(&observation)) frames.push_back(arm.without_arm(*frame, push, step));
     }
   }
   return frames;

@@ -99,6 +99,20 @@ TEST(FromStreams, PixelsOfTheRobotAreLeftOut) {
   EXPECT_THROW(recording_from(masked, streams), Error) << "no description, no mask";
 }
 
+TEST(FromStreams, ImagesWithoutARobotAreNotCalledMasked) {
+  SensorStreams streams = lab();
+  const auto called_masked = [&] {
+    for (const Step& step : recording_from(plan(), streams).recording.pushes.at(0).steps)
+      for (const Observation& one : step.observations)
+        if (const auto* frame = std::get_if<DepthFrame>(&one)) return frame->robot_is_masked;
+    ADD_FAILURE() << "no image";
+    return false;
+  };
+  EXPECT_FALSE(called_masked()) << "else nobody would mask the stick";
+  streams.cameras[0].mask_robot = false;
+  EXPECT_TRUE(called_masked()) << "nothing is to be masked";
+}
+
 TEST(FromStreams, PointsOfTheRobotAreLeftOutOfClouds) {
   SensorStreams streams = lab();
   for (const PoseSample& sample : streams.frames[0].samples)

@@ -89,6 +89,12 @@ TEST(ForeignPoints, WhatStandsNearIsAPartOfIt) {
   EXPECT_EQ(two[0].points_m.rows(), 40000);
 }
 
+TEST(ForeignPoints, AHiddenSideThatWasTouchedTellsNothing) {
+  std::vector<PointCloud> two{joined(cube, block(Vec3(0.3, 0, 0), Vec3::Constant(side_m), 4000))};
+  EXPECT_EQ(drop_foreign(two, {{Vec3(0.2, 0.05, 0.05), Vec3::UnitX(), 0.01}}).share, 0) << "10 cm from either";
+  EXPECT_NEAR(drop_foreign(two, on_top).share, 0.5, 1e-12);
+}
+
 TEST(ForeignPoints, FewPointsAreNoise) {
   std::vector<PointCloud> noisy{joined(cube, block(Vec3(0.4, 0, 0), Vec3::Constant(0.01), 20))};
   EXPECT_EQ(drop_foreign(noisy, on_top).share, 0);
