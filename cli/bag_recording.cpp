@@ -14,6 +14,7 @@
 #include "palpate/io/file.hpp"
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
+#include "palpate/sensing/arm_mask.hpp"
 #include "palpate/sensing/depth_noise.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/robot_mask.hpp"
@@ -118,11 +119,29 @@ std::optional<std::string> unmasked(const Recording& recording) {
   return std::nullopt;
 }
 
+/// Images of a pressed object in which nothing says what is arm.
+std::optional<std::string> nothing_masked(const Recording& recording) {
+  if (recording.robot && sensing::has_shapes(*recording.robot)) return std::nullopt;
+  std::size_t images = 0;
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps) {
+      if (step.loads.empty() || !sensing::sticks_of(recording, push, step).empty()) continue;
+      for (const Observation& one : step.observations)
+        if (const auto* frame = std::get_if<DepthFrame>(&one)) images += frame->mask.size() == 0 && !frame->robot_is_masked;
+    }
+  if (images == 0) return std::nullopt;
+  return fmt::format("nothing masks the arm in {} images of the pressed object, and what is not masked is taken for the object: give 'mask', or "
+                     "the robot's description with joints, or for a ball or disc the step's T_base_tip; where no arm is in the picture, say "
+                     "robot_is_masked: true",
+                     images);
+}
+
 }  // namespace
 
 void warn_of_oddities(Recording& recording) {
   for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
   if (auto lack = unmasked(recording)) recording.warnings.push_back(std::move(*lack));
+  if (auto lack = nothing_masked(recording)) recording.warnings.push_back(std::move(*lack));
 }
 
 void check_loaded(Recording& recording, const std::string& lister) {

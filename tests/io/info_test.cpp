@@ -216,6 +216,25 @@ TEST_F(Info, ComparesTheScatterOfUnloadedStepsWithWhatIsStated) {
   EXPECT_TRUE(nlohmann::json::parse(outcome.out)["static_scatter"][0]["doubtful"].get<bool>());
 }
 
+TEST_F(Info, SaysWhereNothingMasksTheArm) {
+  put_still_life(folder, {});
+  EXPECT_NE(info_of(folder).err.find("nothing masks the arm in 2 images"), std::string::npos);
+  const std::string text = folder.get("recording.yaml");
+  std::string told = text;
+  for (std::size_t at = 0; (at = told.find("kind: depth,", at)) != std::string::npos; at += 12) told.insert(at + 12, " robot_is_masked: true,");
+  folder.put("recording.yaml", told);
+  EXPECT_EQ(info_of(folder).err.find("nothing masks"), std::string::npos) << "no arm is in the picture";
+  told = text;
+  for (std::size_t at = 0; (at = told.find("loads:", at)) != std::string::npos;) {
+    const std::size_t indent = at - told.rfind('\n', at) - 1;
+    const std::string pose = "T_base_tip: [[1, 0, 0, 0.05], [0, 1, 0, 0.05], [0, 0, 1, 0.7], [0, 0, 0, 1]]\n" + std::string(indent, ' ');
+    told.insert(at, pose);
+    at += pose.size() + 6;
+  }
+  folder.put("recording.yaml", told);
+  EXPECT_EQ(info_of(folder).err.find("nothing masks"), std::string::npos) << "the stick is masked by its radius";
+}
+
 // A bag of ours has images with masks, and clouds: the mapping to start from names them all.
 TEST(InfoOfABag, SuggestsMaskAndClouds) {
   if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
