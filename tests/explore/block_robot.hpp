@@ -20,6 +20,7 @@ class BlockRobot : public acquisition::Robot {
     for (int k = 0; k < 3; ++k) bias_n_(k) = 0.2 * normal_(random_);
     camera_.camera = {120, 100, 320, 320, 59.5, 49.5, DistortionModel::none, {}};
     camera_.noise.sigma_m = 1e-3;
+    camera_.robot_is_masked = true;  // it sees through the stick
     camera_.pose_std_m = 5e-4;
     camera_.pose_std_rad = 1e-3;
     const Vec3 forward = (Vec3(0.04, 0.04, 0.03) - estimation::camera_eye_m).normalized();
