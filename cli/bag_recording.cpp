@@ -16,7 +16,6 @@
 #include "palpate/io/recording.hpp"
 #include "palpate/sensing/arm_mask.hpp"
 #include "palpate/sensing/depth_noise.hpp"
-#include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate::cli {

@@ -14,7 +14,6 @@
 #include "palpate/acquisition/stream_joints.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/cloud_mask.hpp"
-#include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/plane_mask.hpp"
 #include "palpate/sensing/robot_mask.hpp"
 

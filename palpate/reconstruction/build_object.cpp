@@ -7,6 +7,7 @@
 #include <set>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/point_cloud.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
@@ -52,14 +53,14 @@ void drop_support(std::vector<PointCloud>& clouds, const Plane& plane) {
     const double size = (c.points_m.colwise().maxCoeff() - c.points_m.colwise().minCoeff()).norm();
     const double limit = std::max(3 * mean_sigma(c), 1e-3 * size);
     const bool normals = c.normals.rows() == n;
-    std::vector<char> stays;
+    std::vector<Index> stay;
     for (Index i = 0; i < n; ++i) {
       const double height = plane.normal.dot(Vec3(c.points_m.row(i).transpose()) - plane.point_m);
       // a flank close above the plane belongs to the object: only what also faces like the plane is taken for it
       const bool flat = !normals || plane.normal.dot(c.normals.row(i).transpose()) > 0.8;
-      stays.push_back(!(height < -limit || (height < limit && flat)));
+      if (!(height < -limit || (height < limit && flat))) stay.push_back(i);
     }
-    keep_points(c, stays);
+    c = chosen_points(c, stay);
   }
 }
 

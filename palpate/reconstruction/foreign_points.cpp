@@ -8,6 +8,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "palpate/core/point_cloud.hpp"
 #include "palpate/geometry/union_find.hpp"
 #include "palpate/reconstruction/facets.hpp"
 
@@ -127,22 +128,6 @@ std::set<Index> foreign_clusters(const Clusters& clusters, std::size_t all_point
 
 }  // namespace
 
-void keep_points(PointCloud& cloud, const std::vector<char>& stays) {
-  const auto count = static_cast<Index>(cloud.points_m.rows());
-  const bool normals = cloud.normals.rows() == count, each = cloud.sigma_m.size() == count && count > 1;
-  Index kept = 0;
-  for (Index i = 0; i < count; ++i) {
-    if (!stays[static_cast<std::size_t>(i)]) continue;
-    cloud.points_m.row(kept) = cloud.points_m.row(i).eval();
-    if (normals) cloud.normals.row(kept) = cloud.normals.row(i).eval();
-    if (each) cloud.sigma_m[kept] = cloud.sigma_m[i];
-    ++kept;
-  }
-  cloud.points_m.conservativeResize(kept, 3);
-  if (normals) cloud.normals.conservativeResize(kept, 3);
-  if (each) cloud.sigma_m.conservativeResize(kept);
-}
-
 ForeignPoints drop_foreign(std::vector<PointCloud>& clouds, const std::vector<Touch>& touched) {
   std::size_t all = 0, dropped = 0;
   for (const PointCloud& cloud : clouds) all += static_cast<std::size_t>(cloud.points_m.rows());
@@ -159,10 +144,11 @@ ForeignPoints drop_foreign(std::vector<PointCloud>& clouds, const std::vector<To
     nearest_m = std::min(nearest_m, near_m);
     std::size_t point = 0;
     for (PointCloud& cloud : clouds) {
-      std::vector<char> stays;
-      for (Index i = 0; i < cloud.points_m.rows(); ++i) stays.push_back(foreign.count(clusters.cluster_of(point++)) == 0);
-      dropped += static_cast<std::size_t>(std::count(stays.begin(), stays.end(), 0));
-      keep_points(cloud, stays);
+      std::vector<Index> stay;
+      for (Index i = 0; i < cloud.points_m.rows(); ++i)
+        if (foreign.count(clusters.cluster_of(point++)) == 0) stay.push_back(i);
+      dropped += static_cast<std::size_t>(cloud.points_m.rows()) - stay.size();
+      cloud = chosen_points(cloud, stay);
     }
   }
   return {all > 0 ? static_cast<double>(dropped) / static_cast<double>(all) : 0, dropped > 0 ? nearest_m : 0};

@@ -19,7 +19,4 @@ struct ForeignPoints {
 /// views show.
 ForeignPoints drop_foreign(std::vector<PointCloud>& clouds, const std::vector<Touch>& touched);
 
-/// Keeps the points of a cloud that `stays` says (one value a point), with their normals and standard deviations.
-void keep_points(PointCloud& cloud, const std::vector<char>& stays);
-
 }  // namespace palpate::reconstruction

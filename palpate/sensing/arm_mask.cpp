@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/plane_mask.hpp"
 
 namespace palpate::sensing {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/point_cloud.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::sensing {
@@ -25,8 +26,6 @@ struct Placed {
 };
 
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Placed>, Placed, 3, Index>;
-
-double sigma_m(const PointCloud& cloud, Index point) { return cloud.sigma_m(cloud.sigma_m.size() == 1 ? 0 : point); }
 
 /// Every n-th, so that no more than `most` are left.
 std::vector<Index> thinned(const std::vector<Index>& points, double most) {
@@ -64,11 +63,6 @@ class HeightsAround {
   std::vector<double> squared_m2_, around_;
 };
 
-void check_sigma(const PointCloud& cloud) {
-  if (cloud.sigma_m.size() != 1 && cloud.sigma_m.size() != cloud.points_m.rows())
-    throw Error("give one standard deviation, or one a point", "cloud.sigma_m");
-}
-
 }  // namespace
 
 PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& planes, const Vec3& low_m, const Vec3& high_m,
@@ -76,7 +70,7 @@ PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& p
   check(options.planes);
   if (options.neighbours < 0) throw Error("must not be negative", "CloudMaskOptions.neighbours");
   if (!(options.most_points >= 1)) throw Error("must be at least 1", "CloudMaskOptions.most_points");
-  check_sigma(cloud);
+  demand_sigmas(cloud);
   const Index count = static_cast<Index>(cloud.points_m.rows());
   std::vector<Index> left;
   for (Index i = 0; i < count; ++i) {
@@ -84,7 +78,8 @@ PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& p
     if ((point.array() >= low_m.array()).all() && (point.array() <= high_m.array()).all()) left.push_back(i);
   }
   // Neighbours are asked for of what may stay; most of a table goes below.
-  const PointCloud near = chosen_points(cloud, left = thinned(left, 8 * options.most_points));
+  left = thinned(left, 8 * options.most_points);
+  const PointCloud near = chosen_points(cloud, left);
   std::vector<char> stays(left.size(), 1);
   HeightsAround around(near.points_m, options.neighbours);
   for (const Plane& plane : planes) {
@@ -92,7 +87,7 @@ PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& p
     for (std::size_t i = 0; i < left.size(); ++i) {
       if (!stays[i]) continue;
       const Index point = static_cast<Index>(i);
-      const double sigma = sigma_m(near, point), margin_m = options.planes.margin_m + options.planes.sigmas * sigma;
+      const double sigma = sigma_of_m(near, point), margin_m = options.planes.margin_m + options.planes.sigmas * sigma;
       const bool doubtful = options.neighbours > 0 && std::abs(heights_m(point) - margin_m) < 6 * sigma;
       stays[i] = (doubtful ? around.median_m(point, heights_m) : heights_m(point)) >= margin_m;
     }
@@ -101,14 +96,6 @@ PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& p
   for (std::size_t i = 0; i < left.size(); ++i)
     if (stays[i]) above.push_back(left[i]);
   return chosen_points(cloud, thinned(above, options.most_points));
-}
-
-PointCloud chosen_points(const PointCloud& cloud, const std::vector<Index>& points) {
-  PointCloud out = cloud;
-  out.points_m = cloud.points_m(points, Eigen::all);
-  if (cloud.normals.rows() == cloud.points_m.rows()) out.normals = cloud.normals(points, Eigen::all);
-  if (cloud.sigma_m.size() > 1) out.sigma_m = cloud.sigma_m(points);
-  return out;
 }
 
 struct RobotInClouds::Link {
@@ -130,7 +117,7 @@ RobotInClouds::RobotInClouds(const RobotMask& robot, double margin_m) : robot_(r
 
 PointCloud RobotInClouds::without_robot(const PointCloud& cloud, const std::vector<std::string>& joint_names,
                                         const std::vector<double>& joints_rad, const Pose& T_base_root) const {
-  check_sigma(cloud);
+  demand_sigmas(cloud);
   std::vector<char> shows_robot(static_cast<std::size_t>(cloud.points_m.rows()), 0);
   for (const RobotMask::PosedLink& link : robot_.known_links(joint_names, joints_rad)) {
     const Pose T_link_base = (T_base_root * link.T_root_link).inverse();
@@ -138,7 +125,7 @@ PointCloud RobotInClouds::without_robot(const PointCloud& cloud, const std::vect
     for (std::size_t i = 0; i < shows_robot.size(); ++i) {
       const Index point = static_cast<Index>(i);
       if (!shows_robot[i])
-        shows_robot[i] = links_[link.shaped]->is_near(T_link_base * Vec3(cloud.points_m.row(point)), place_m + 3 * sigma_m(cloud, point));
+        shows_robot[i] = links_[link.shaped]->is_near(T_link_base * Vec3(cloud.points_m.row(point)), place_m + 3 * sigma_of_m(cloud, point));
     }
   }
   std::vector<Index> others;

@@ -27,9 +27,6 @@ struct CloudMaskOptions {
 PointCloud points_of_object(const PointCloud& cloud, const std::vector<Plane>& planes, const Vec3& low_m, const Vec3& high_m,
                             const CloudMaskOptions& options = {});
 
-/// Chosen points with their normals and standard deviations.
-PointCloud chosen_points(const PointCloud& cloud, const std::vector<Index>& points);
-
 /// Takes the robot out of clouds. Const calls are thread-safe.
 class RobotInClouds {
  public:

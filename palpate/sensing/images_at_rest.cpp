@@ -8,11 +8,6 @@
 
 namespace palpate::sensing {
 
-bool has_shapes(const RobotModel& robot) {
-  return std::any_of(robot.links.begin(), robot.links.end(),
-                     [](const RobotLink& link) { return !link.visual.empty() || !link.collision.empty(); });
-}
-
 std::vector<DepthFrame> images_at_rest(const Recording& recording) {
   std::vector<DepthFrame> frames = recording.rest.views;
   const ArmMask arm(recording);

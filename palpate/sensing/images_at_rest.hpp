@@ -8,9 +8,6 @@
 
 namespace palpate::sensing {
 
-/// Whether any link has a shape: a robot that was recorded without shapes cannot be masked.
-bool has_shapes(const RobotModel& robot);
-
 /// The recording's views of the object, and the first image of each push while nothing loaded it, without the arm (ArmMask).
 std::vector<DepthFrame> images_at_rest(const Recording& recording);
 

@@ -86,6 +86,11 @@ TriMesh shape_mesh(const RobotShape& shape) {
   return shape.mesh;
 }
 
+bool has_shapes(const RobotModel& robot) {
+  return std::any_of(robot.links.begin(), robot.links.end(),
+                     [](const RobotLink& link) { return !link.visual.empty() || !link.collision.empty(); });
+}
+
 RobotMask::RobotMask(RobotModel robot, RobotMaskOptions options)
     : kinematics_(std::move(robot)), options_(std::move(options)) {
   check(options_.margins);

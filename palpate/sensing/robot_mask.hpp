@@ -17,6 +17,9 @@ namespace palpate::sensing {
 /// @throws Error when a size is not positive or a mesh is empty.
 TriMesh shape_mesh(const RobotShape& shape);
 
+/// Whether any link has a shape: a robot that was recorded without shapes cannot be masked.
+bool has_shapes(const RobotModel& robot);
+
 enum class RobotGeometry { visual, collision };
 
 struct RobotMaskOptions {

@@ -3,9 +3,8 @@
 
 #include <algorithm>
 
-#include "palpate/core/error.hpp"
+#include "palpate/core/point_cloud.hpp"
 #include "palpate/sensing/camera.hpp"
-#include "palpate/sensing/cloud_mask.hpp"
 #include "palpate/sensing/depth_noise.hpp"
 
 namespace palpate::sensing {
@@ -23,11 +22,10 @@ bool is_on_one(const std::vector<Stick>& sticks, const Vec3& point_m, double sig
 }  // namespace
 
 PointCloud without_sticks(const PointCloud& cloud, const std::vector<Stick>& sticks) {
-  if (cloud.sigma_m.size() != 1 && cloud.sigma_m.size() != cloud.points_m.rows())
-    throw Error("give one standard deviation, or one a point", "cloud.sigma_m");
+  demand_sigmas(cloud);
   std::vector<Index> others;
   for (Index i = 0; i < cloud.points_m.rows(); ++i)
-    if (!is_on_one(sticks, cloud.points_m.row(i), cloud.sigma_m(cloud.sigma_m.size() == 1 ? 0 : i))) others.push_back(i);
+    if (!is_on_one(sticks, cloud.points_m.row(i), sigma_of_m(cloud, i))) others.push_back(i);
   return chosen_points(cloud, others);
 }
 
