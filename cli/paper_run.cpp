@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "cli/paper_truths.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/version.hpp"
 #include "palpate/report/words.hpp"
@@ -60,7 +61,11 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
   for (const lab::PaperScene* scene : plan.scenes) {
     // What serves one seed alone is not worth solving for over all of nu's range.
     std::optional<SharedModels> shared;
-    if (plan.seeds > 1) shared.emplace();
+    const auto share_anew = [&] {
+      shared.emplace();
+      if (scene->true_law != "linear") shared->truths = lab::PressedMemory(truths_in(out / "truths"));  // others take seconds
+    };
+    if (plan.seeds > 1) share_anew();
     for (int k = 0; k < plan.seeds && !work.stopped(); ++k) {
       const SeedAsked asked = asked_of(*scene, k);
       if (folder.has(asked)) continue;
@@ -69,7 +74,7 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
         work.trial(*scene, asked.seed, asked.options, shared ? &*shared : nullptr, trial);
       } catch (const std::exception& error) {
         trial.failed = error.what();
-        if (shared) shared.emplace();  // it may be half made
+        if (shared) share_anew();  // it may be half made
       }
       if (work.stopped()) break;
       trial.seed = asked.seed;

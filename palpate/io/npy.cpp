@@ -72,10 +72,10 @@ MatrixX parse_npy(std::string_view bytes, const std::string& name) {
   return values;
 }
 
-std::string npy_bytes(const MatrixX& values) {
+std::string npy_bytes(const MatrixX& values, NpyType type) {
   const std::string shape =
       values.cols() == 1 ? fmt::format("({},)", values.rows()) : fmt::format("({}, {})", values.rows(), values.cols());
-  std::string header = fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': {}, }}", shape);
+  std::string header = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': {}, }}", type == NpyType::float64 ? "<f8" : "<f4", shape);
   const std::size_t unpadded = npy_magic.size() + 4 + header.size() + 1;
   header.append((64 - unpadded % 64) % 64, ' ');
   header += '\n';
@@ -85,7 +85,12 @@ std::string npy_bytes(const MatrixX& values) {
   store(out, static_cast<std::uint16_t>(header.size()));
   out += header;
   for (Eigen::Index row = 0; row < values.rows(); ++row) {
-    for (Eigen::Index column = 0; column < values.cols(); ++column) store(out, static_cast<float>(values(row, column)));
+    for (Eigen::Index column = 0; column < values.cols(); ++column) {
+      if (type == NpyType::float64)
+        store(out, values(row, column));
+      else
+        store(out, static_cast<float>(values(row, column)));
+    }
   }
   return out;
 }

@@ -14,7 +14,9 @@ bool is_npy(std::string_view bytes);
 /// uint16, uint8, bool. Throws Error naming the file.
 MatrixX parse_npy(std::string_view bytes, const std::string& name);
 
-/// float32; rows x columns, or one dimension for a single column.
-std::string npy_bytes(const MatrixX& values);
+enum class NpyType { float32, float64 };
+
+/// Rows x columns, or one dimension for a single column.
+std::string npy_bytes(const MatrixX& values, NpyType type = NpyType::float32);
 
 }  // namespace palpate::io

@@ -18,6 +18,31 @@ struct PressedMemory::States {
   Index nodes = 0;
   std::vector<State> pressed;  // one after the other, each from the one before
   int solved = 0;
+  std::string name;
+
+  void load(const Store& store) {
+    if (!store.load) return;
+    const std::optional<MatrixX> kept = store.load(name);
+    if (!kept || kept->rows() < 1 || row({0, 0, rest.vertices_m}) != kept->row(0)) return;
+    for (Eigen::Index k = 1; k < kept->rows(); ++k) {
+      const Eigen::RowVectorXd of = kept->row(k);
+      pressed.push_back({of(0), of(1), Eigen::Map<const Points>(of.data() + 2, rest.vertices_m.rows(), 3)});
+    }
+  }
+  void keep(const Store& store) const {
+    if (!store.keep) return;
+    MatrixX kept(Eigen::Index(pressed.size()) + 1, 2 + rest.vertices_m.size());
+    kept.row(0) = row({0, 0, rest.vertices_m});
+    for (std::size_t k = 0; k < pressed.size(); ++k) kept.row(Eigen::Index(k) + 1) = row(pressed[k]);
+    store.keep(name, kept);
+  }
+
+ private:
+  static Eigen::RowVectorXd row(const State& state) {
+    Eigen::RowVectorXd out(2 + state.vertices_m.size());
+    out << state.force_n, state.travel_m, Eigen::Map<const Eigen::RowVectorXd>(state.vertices_m.data(), state.vertices_m.size());
+    return out;
+  }
 };
 
 namespace {
@@ -34,12 +59,14 @@ double rounded(double value) {
 
 class Remembered : public Pressed {
  public:
-  Remembered(std::shared_ptr<PressedMemory::States> states, double young_modulus_pa, const PushSite& at, PressedMemory::Make make)
-      : states_(std::move(states)), young_modulus_pa_(young_modulus_pa), at_(at), make_(std::move(make)) {
+  Remembered(std::shared_ptr<PressedMemory::States> states, PressedMemory::Store store, double young_modulus_pa, const PushSite& at,
+             PressedMemory::Make make)
+      : states_(std::move(states)), store_(std::move(store)), young_modulus_pa_(young_modulus_pa), at_(at), make_(std::move(make)) {
     if (states_->rest.vertices_m.rows() > 0) return;
     object_ = make_(one_pa, at_);
     states_->rest = object_->surface();
     states_->nodes = object_->nodes();
+    states_->load(store_);
   }
 
   void press(double force_n) override {
@@ -51,6 +78,7 @@ class Remembered : public Pressed {
       solve(one_n);
       known.resize(next_);  // what was pressed otherwise
       known.push_back(now_);
+      states_->keep(store_);
     }
     ++next_;
     force_n_ = force_n;
@@ -79,6 +107,7 @@ class Remembered : public Pressed {
   }
 
   std::shared_ptr<PressedMemory::States> states_;
+  PressedMemory::Store store_;
   double young_modulus_pa_;
   PushSite at_;
   PressedMemory::Make make_;
@@ -93,9 +122,14 @@ class Remembered : public Pressed {
 
 std::unique_ptr<Pressed> PressedMemory::at(const std::string& what, double young_modulus_pa, const PushSite& at, Make make) {
   const auto& [c, d] = std::pair(at.contact_m, at.direction);
-  auto& states = known_[fmt::format("{} at {:.9f} {:.9f} {:.9f} along {:.9f} {:.9f} {:.9f}", what, c.x(), c.y(), c.z(), d.x(), d.y(), d.z())];
-  if (!states) states = std::make_shared<States>();
-  return std::make_unique<Remembered>(states, young_modulus_pa, at, std::move(make));
+  const std::string name =
+      fmt::format("{} at {:.9f} {:.9f} {:.9f} along {:.9f} {:.9f} {:.9f}", what, c.x(), c.y(), c.z(), d.x(), d.y(), d.z());
+  auto& states = known_[name];
+  if (!states) {
+    states = std::make_shared<States>();
+    states->name = name;
+  }
+  return std::make_unique<Remembered>(states, store_, young_modulus_pa, at, std::move(make));
 }
 
 int PressedMemory::solved() const {

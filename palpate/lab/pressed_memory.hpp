@@ -6,8 +6,11 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
+#include "palpate/core/math.hpp"
 #include "palpate/lab/object.hpp"
 #include "palpate/lab/pressed.hpp"
 
@@ -18,6 +21,16 @@ class PressedMemory {
   struct States;
   /// What presses the object as it is made with the given E.
   using Make = std::function<std::unique_ptr<Pressed>(double young_modulus_pa, const PushSite& at)>;
+  /// Where states outlive the program. A row a state, the first one at rest: newton of an object of 10 kPa, m of travel, then x, y, z
+  /// of every vertex of the surface, m.
+  struct Store {
+    std::function<std::optional<MatrixX>(const std::string& name)> load;
+    std::function<void(const std::string& name, const MatrixX& states)> keep;  ///< after every search for equilibrium
+  };
+
+  PressedMemory() = default;
+  /// @param store  what it has for an object with another surface at rest is not used, and written over
+  explicit PressedMemory(Store store) : store_(std::move(store)) {}
 
   /// An object at rest that takes from here what is here, and leaves here what it solves for. Its states are those of one E for
   /// all, to the last digit, whoever has solved for them.
@@ -27,6 +40,7 @@ class PressedMemory {
   int solved() const;
 
  private:
+  Store store_;
   std::map<std::string, std::shared_ptr<States>> known_;
 };
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs of `palpate paper` with work that takes no time: what is stopped goes on, pieces make the whole, what fails is a row.
 #include "cli/paper_run.hpp"
+#include "cli/paper_truths.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -179,6 +180,21 @@ TEST(PaperRun, SeedsKeptALineEachAreTheSame) {
   std::ofstream(kept) << lines.substr(0, lines.size() - 100);
   EXPECT_THAT(message_of([&] { SeedFolder(files / "cut").take_from(files / "kept"); }), HasSubstr("all.jsonl, line 9: is no seed"));
   EXPECT_FALSE(fs::exists(files / "cut"));
+}
+
+TEST(PaperRun, TrueStatesAreFilesThatMayBeDamaged) {
+  const test::TemporaryFolder files("paper_truths");
+  const lab::PressedMemory::Store store = truths_in(files / "truths");
+  EXPECT_FALSE(store.load("block 0.1"));
+  const MatrixX states = MatrixX::Random(3, 8) / 3;
+  store.keep("block 0.1", states);
+  EXPECT_EQ(store.load("block 0.1").value(), states) << "to the last digit";
+  EXPECT_FALSE(store.load("block 0.2"));
+  const fs::path file = files / "truths" / "block_0.1.npy";
+  fs::resize_file(file, fs::file_size(file) - 8);
+  EXPECT_FALSE(store.load("block 0.1")) << "cut off";
+  store.keep("block 0.1", states);
+  EXPECT_TRUE(store.load("block 0.1"));
 }
 
 TEST(PaperRun, AFailedSeedIsARowAndTheRunGoesOn) {

@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "palpate/lab/paper_scenes.hpp"
@@ -59,6 +62,43 @@ TEST(PressedMemory, GoesOnWhereTheOneBeforeEndedAndTakesAnotherWay) {
     EXPECT_EQ(one->travel_m(), same->travel_m()) << "to the last digit";
     EXPECT_EQ(one->surface().vertices_m, same->surface().vertices_m);
   }
+}
+
+TEST(PressedMemory, WhatIsKeptElsewhereOutlivesIt) {
+  const PushSite top{"top", Vec3(0, 0, 0.1), -Vec3::UnitZ(), 1};
+  std::map<std::string, MatrixX> kept;
+  const PressedMemory::Store store{[&](const std::string& name) { return kept.contains(name) ? std::optional(kept[name]) : std::nullopt; },
+                                   [&](const std::string& name, const MatrixX& states) { kept[name] = states; }};
+  const auto pressed = [&](PressedMemory& by, const PressedMemory::Make& make, std::size_t times) {
+    auto object = by.at("block", 17e3, top, make);
+    for (const double share : std::vector{3e-5, 1e-4, 2e-4}) {
+      if (times-- == 0) break;
+      object->press(share * 17e3);
+    }
+    return object;
+  };
+  PressedMemory first(store), second(store), alone;
+  pressed(first, block, 2);  // stopped before the third
+  ASSERT_EQ(kept.size(), 1u);
+  EXPECT_EQ(kept.begin()->second.rows(), 3) << "at rest and two";
+  const auto on = pressed(second, block, 3), whole = pressed(alone, block, 3);
+  EXPECT_EQ(second.solved(), 3) << "the third, and the way to it";
+  EXPECT_EQ(on->travel_m(), whole->travel_m()) << "to the last digit";
+  EXPECT_EQ(on->surface().vertices_m, whole->surface().vertices_m);
+  PressedMemory third(store);
+  EXPECT_EQ(pressed(third, block, 3)->surface().vertices_m, whole->surface().vertices_m);
+  EXPECT_EQ(third.solved(), 0);
+
+  PressedMemory other(store);  // on a finer mesh
+  const auto finer = [](double young_modulus_pa, const PushSite&) {
+    PressedBlockOptions block;
+    block.cells_in_radius = 3;
+    block.cell_share = 2;
+    block.young_modulus_pa = young_modulus_pa;
+    return std::make_unique<PressedBlock>(block);
+  };
+  pressed(other, finer, 3);
+  EXPECT_EQ(other.solved(), 3) << "states of another surface are not taken";
 }
 
 TEST(PressedMemory, ARecordingIsTheSameWithAndWithoutIt) {
