@@ -66,7 +66,7 @@ std::string camera_as_found(const Recording& recording, const Pose& correction) 
 
 int run(const Options& given, Session& session) {
   if (given.rigid == (given.stiffness_n_per_m > 0))
-    throw Error("say what was pushed: --stiffness N_PER_M of a spring, or --rigid", "check");
+    throw Error("say what was pushed: --stiffness N_PER_M of a spring, or --rigid", "--stiffness");
   const Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
   estimation::SelfCheckOptions options = given.check;
   if (!given.rigid) options.stiffness_n_per_m = given.stiffness_n_per_m;

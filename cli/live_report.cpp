@@ -44,11 +44,12 @@ bool only_this_machine(const std::string& address) { return address.starts_with(
 }  // namespace
 
 void LiveOptions::add_to(CLI::App& app) {
-  app.add_option("--serve", port, "show the report while it comes into being, in a browser on this machine; 0: any free port")
+  CLI::Option* serve = app.add_option("--serve", port, "show the report while it comes into being, in a browser on this machine; 0: any free port")
       ->type_name("PORT")
       ->check(CLI::Range(0, 65535).description(""));
   app.add_option("--serve-address", address, "with --serve: listen here instead; 0.0.0.0 lets other machines look")
       ->type_name("IP")
+      ->needs(serve)
       ->capture_default_str();
 }
 

@@ -47,11 +47,8 @@ const std::string* first_word(const std::vector<std::string>& arguments) {
   return nullptr;
 }
 
-/// Whether what is wrong is the command and not a file: the error names an option alone, or the verb.
-bool is_usage(const std::string& where) {
-  const std::vector<std::string> names = verb_names();
-  return (where.starts_with("--") && where.find(' ') == std::string::npos) || std::find(names.begin(), names.end(), where) != names.end();
-}
+/// Whether what is wrong is the command and not a file: the error names an option alone.
+bool is_usage(const std::string& where) { return where.starts_with("--") && where.find(' ') == std::string::npos; }
 
 std::string hint(const std::string& word, const std::vector<std::string>& candidates) {
   const auto meant = did_you_mean(word, candidates);

@@ -7,6 +7,7 @@
 #include "palpate/core/recording_values.hpp"
 #include "palpate/estimation/contacts_on_surface.hpp"
 #include "palpate/estimation/finer_model.hpp"
+#include "palpate/estimation/moved_balls.hpp"
 #include "palpate/estimation/slips.hpp"
 
 namespace palpate {
@@ -46,9 +47,30 @@ Step without_surfaces(Step step) {
   return step;
 }
 
+bool is_moved(const Push& push) {
+  for (const Step& step : push.steps)
+    if (std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) { return load.travel_m.has_value(); })) return true;
+  return false;
+}
+
+/// Whether a tool is moved now whose force acted before, or the other way round: another model. With some steps a travel may be lacking.
+bool moves_otherwise(const std::vector<Push>& before, const std::vector<Push>& now) {
+  for (std::size_t p = 0; p < now.size(); ++p)
+    if (is_moved(now[p]) != (p < before.size() && is_moved(before[p]))) return true;
+  return false;
+}
+
 Push without_surfaces(Push push) {
   for (Step& step : push.steps) step = without_surfaces(std::move(step));
   return push;
+}
+
+/// What was seen otherwise of the same steps, and the surfaces as they were.
+estimation::Inputs with_surfaces_of(const estimation::Inputs& all, estimation::Inputs others) {
+  for (std::size_t s = 0; s < all.size(); ++s)
+    for (const estimation::TermInput& one : all[s])
+      if (std::holds_alternative<estimation::RayObservation>(one) || std::holds_alternative<PointCloud>(one)) others[s].push_back(one);
+  return others;
 }
 
 }  // namespace
@@ -134,7 +156,7 @@ bool OnlineEstimator::new_contact(const Step& step) const {
 
 void OnlineEstimator::build(const OnProgress& progress) {
   const bool out_of_views = !recording_.rest.volume && !recording_.rest.surface;
-  simulated_ = out_of_views ? recording_ : light_;
+  simulated_ = estimation::with_balls_moved(out_of_views ? recording_ : light_);
   object_ = build_simulated_object(simulated_, progress);
   if (simulated_.model.refine == "auto") {
     if (auto better = estimation::refined_within(simulated_, *object_, options_.mesh_tolerance)) {
@@ -155,7 +177,7 @@ const Identification& OnlineEstimator::add(const Step& step, const OnProgress& p
   Recording alone = light_;
   alone.pushes = {light_.pushes.back()};
   alone.pushes.back().steps = {step};
-  const bool rebuild = !object_ || new_contact(step);
+  bool rebuild = !object_ || new_contact(step);
   const std::size_t cameras = cameras_.size();
   take_in(alone);
   recording_.pushes.back().steps.push_back(step);
@@ -166,12 +188,15 @@ const Identification& OnlineEstimator::add(const Step& step, const OnProgress& p
       object_.reset();
       return estimate_;
     }
+    Recording moved = estimation::with_balls_moved(light_);
+    const bool balls_move = moved.warnings.size() > light_.warnings.size();
+    rebuild = rebuild || moves_otherwise(simulated_.pushes, moved.pushes);
     if (rebuild) build(progress);
     // As the object was built with them: the step may touch beside the surface, or be the first after a slip.
-    simulated_.pushes = light_.pushes;
+    simulated_.pushes = std::move(moved.pushes);
     estimation::put_contacts_on_surface(simulated_, object_->mesh);
     estimation::free_contacts_after_slips(simulated_);
-    estimate_ = fit_.update(simulated_, *object_, inputs_, progress);
+    estimate_ = fit_.update(simulated_, *object_, balls_move ? with_surfaces_of(inputs_, observe(simulated_)) : inputs_, progress);
   } catch (...) {
     recording_.pushes.back().steps.pop_back();
     light_.pushes.back().steps.pop_back();

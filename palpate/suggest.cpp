@@ -304,7 +304,15 @@ PushScene prepare_pushes(const Recording& recording, const SuggestOptions& optio
   if (options.only.empty()) {
     scene.candidates = space.sample(&scene.refused);
   } else {
+    const geometry::TriangleTree surface(scene.simulated.surface.rest());
     for (estimation::PushCandidate candidate : options.only) {
+      const geometry::ClosestPoint foot = surface.closest(candidate.contact_m);
+      const double off_m = std::sqrt(foot.squared_distance_m2);
+      if (off_m > std::max(0.5 * tool->radius_m, 1e-3))
+        throw Error(fmt::format("the contact ({:.4g} {:.4g} {:.4g}) lies {} away from the object's surface; the nearest place on it is {:.4g} {:.4g} {:.4g}",
+                                candidate.contact_m.x(), candidate.contact_m.y(), candidate.contact_m.z(), quantity(off_m, "m"), foot.point_m.x(),
+                                foot.point_m.y(), foot.point_m.z()),
+                    "candidates");
       const std::string word = space.refusal(candidate);
       if (word.empty())
         scene.candidates.push_back(candidate);

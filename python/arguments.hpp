@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "cli/mistyped.hpp"
 #include "palpate/suggest.hpp"
 #include "python/nouns_answer.hpp"
 
@@ -26,10 +27,16 @@ class Options {
   /// @throws Error for an option that nobody took
   void all_taken() const {
     for (const auto& [key, value] : given_)
-      if (!taken_.contains(key.cast<std::string>())) throw Error("is no option", key.cast<std::string>());
+      if (const std::string name = key.cast<std::string>(); !taken_.contains(name)) throw Error("is no option" + meant(name), name);
   }
 
  private:
+  std::string meant(const std::string& name) const {
+    for (const std::string& known : taken_)
+      if (known.starts_with(name)) return "; did you mean '" + known + "'?";  // its unit was left out
+    const auto near = cli::did_you_mean(name, {taken_.begin(), taken_.end()});
+    return near ? "; did you mean '" + *near + "'?" : "";
+  }
   template <typename T>
   std::optional<T> taken(const char* name) {
     taken_.insert(name);

@@ -204,7 +204,7 @@ struct Noun<Load> {
     field("force_rate_n_s", &Load::force_rate_n_s, "how fast force_n was changing when the step was seen; zero once it has settled");
     field("travel_m", &Load::travel_m, "motion imposed along the direction");
     field("contact_m", &Load::contact_m, "on the surface at rest (tools that are not 'vertices' or 'platen')");
-    field("direction", &Load::direction, "unit vector of the push, into the object");
+    field("direction", &Load::direction, "unit vector of the push, into the object; not given: that of force_n as it was when this was made, down where there is none");
     field("contact_std_m", &Load::contact_std_m, "prior on the contact point, tangential");
     field("contact_found_m", &Load::contact_found_m, "from contact_m, across the push: a fit's own");
   }
@@ -230,7 +230,7 @@ struct Noun<Push> {
   static constexpr const char *name = "Push", *about = "Steps of one push, in order.";
   static void fields(auto&& field) {
     field("name", &Push::name, "");
-    field("site", &Push::site, "e.g. 'head'; '': one site");
+    field("site", &Push::site, "e.g. 'head'; '': by where it presses");
     field("force_tare_std_n", &Push::force_tare_std_n, "prior of a constant force error in this push, per axis (0: none)");
     field("travel_offset_std_m", &Push::travel_offset_std_m, "prior of the travel's zero: where contact really began (0: exactly known)");
     field("torque_tare_std_nm", &Push::torque_tare_std_nm, "prior of a constant torque error in this push, per axis (0: none)");

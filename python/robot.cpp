@@ -85,9 +85,23 @@ acquisition::PushOptions push_options(Options& from) {
   from.take("push_speed_m_s", options.push_speed_m_s);
   from.take("sample_period_s", options.sample_period_s);
   from.take("free_air_samples", options.free_air_samples);
+  from.take("look_every_m", options.look_every_m);
+  from.take("blind_retreat_m", options.blind_retreat_m);
+  from.take("obstacle_threshold_n", options.obstacle_threshold_n);
+  from.take("settling_rate_n_s", options.settling.rate_n_s);
+  from.take("settling_relative_rate_s", options.settling.relative_rate_s);
+  from.take("settling_window_s", options.settling.window_s);
   from.take("settling_timeout_s", options.settling_timeout_s);
   from.take("contact_std_m", options.contact_std_m);
   from.take("contact_threshold_n", options.contact.threshold_n);
+  from.take("contact_noise_factor", options.contact.noise_factor);
+  from.take("contact_samples", options.contact.confirm_samples);
+  from.take("slip_sideways_m", options.slip.tangential_m);
+  from.take("slip_friction", options.slip.friction_limit);
+  from.take("slip_force_drop", options.slip.force_drop);
+  from.take("slip_deeper_m", options.slip.deeper_m);
+  from.take("slip_least_force_n", options.slip.least_force_n);
+  from.take("changed_share", options.changed_share);
   return options;
 }
 

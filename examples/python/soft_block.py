@@ -103,6 +103,8 @@ def block_on_a_table():
 
 if __name__ == "__main__":
     out = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "soft_block")
+    if (out / "recording").exists():
+        sys.exit(f"{out} is there already: give another folder, or remove it")
 
     def told(name, young_moduli, poisson_ratio):
         young = young_moduli[0]

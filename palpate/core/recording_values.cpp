@@ -43,6 +43,7 @@ class ValueChecker {
       for (std::size_t s = 0; s < push.steps.size(); ++s) {
         const std::string step = at + "steps[" + std::to_string(s) + "].";
         check(push.steps[s], recording.tools, step);
+        one_place(push, push.steps[s], recording.tools, step);
         if (s > 0 && push.steps[s].time_s < push.steps[s - 1].time_s) add(step + "time_s", "goes back, from that of the step before; order steps by time");
       }
     }
@@ -157,9 +158,29 @@ class ValueChecker {
     if (finite(at + "direction", load.direction) && !(load.direction.norm() > 1e-9)) add(at + "direction", "has no length; it is the unit vector of the push");
   }
 
+  /// A body that is moved starts from one place, along one line.
+  void one_place(const Push& push, const Step& step, const std::vector<Tool>& tools, const std::string& at) {
+    constexpr double same_m = 1e-4, of_radius = 0.05, same_rad = 0.02;
+    for (std::size_t l = 0; l < step.loads.size(); ++l) {
+      const Load& load = step.loads[l];
+      const auto tool = std::find_if(tools.begin(), tools.end(), [&](const Tool& one) { return one.name == load.tool; });
+      if (!load.travel_m || tool == tools.end() || tool->shape == ToolShape::vertices || tool->shape == ToolShape::platen) continue;
+      const Load* first = nullptr;
+      for (const Step& before : push.steps)
+        for (const Load& one : before.loads)
+          if (first == nullptr && one.travel_m && one.tool == load.tool) first = &one;
+      const std::string place = at + "loads[" + std::to_string(l) + "].";
+      const std::string cure = "than where push '" + push.name + "' moved '" + load.tool + "' first; a tool that is moved goes along one line a push: make another push of it";
+      if ((load.contact_m - first->contact_m).norm() > std::max(same_m, of_radius * tool->radius_m)) add(place + "contact_m", "is elsewhere " + cure);
+      if ((load.direction.normalized() - first->direction.normalized()).norm() > same_rad) add(place + "direction", "is another one " + cure);
+    }
+  }
+
   /// A force needs a patch that it is spread over; said here, and not once a mesh was made.
   void can_press(const std::string& where, const Load& load) {
     for (const Tool& tool : *tools_) {
+      if (tool.name == load.tool && (tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc) && tool.radius_m == 0)
+        add(where, "acts on '" + tool.name + "', whose radius_m is " + fmt::format("{:g}", tool.radius_m) + "; give the radius of what it presses, in metres");
       if (tool.name != load.tool || (tool.shape != ToolShape::platen && tool.shape != ToolShape::mesh)) continue;
       add(where, "acts on '" + tool.name + "', which has no patch that a force is spread over: give its motion (travel_m), and the force as what was observed (a wrench)" +
                      (tool.shape == ToolShape::mesh ? "; or describe the patch that it presses by a disc" : ""));

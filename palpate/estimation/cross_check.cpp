@@ -111,7 +111,14 @@ class CrossCheck {
       while (last < model_.step_count() && model_.index(last).push == model_.index(first).push) {
         largest = std::max(largest, load_of(model_.step(last++)));
       }
-      for (std::size_t s = first; s < last; ++s) {
+      const auto is_between = [&](double least, double most) {
+        for (std::size_t s = first; s < last; ++s)
+          if (const double load = load_of(model_.step(s)); load > least && load <= most) return true;
+        return false;
+      };
+      // A push of one level would make of two places two loads.
+      const bool has_both = is_between(0, 0.55 * largest) && is_between(0.55 * largest, largest);
+      for (std::size_t s = first; s < last && has_both; ++s) {
         const double load = load_of(model_.step(s));
         // What the unloaded frame says of pose and shape serves both.
         low[s] = load <= 0.55 * largest;

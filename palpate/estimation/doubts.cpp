@@ -11,6 +11,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/error_budget.hpp"
 #include "palpate/estimation/exact_inputs.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
@@ -235,8 +236,8 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
     doubt.size_m = count == 1 ? asked(0) : asked.norm();
     doubt.p_value = std::min(1.0, chi_square_tail(doubt.chi2, static_cast<int>(count)) * static_cast<double>(more.asked.size()));
     const VectorX change = step->move.head(as_fitted->move.size()) - as_fitted->move;
+    doubt.log_young = log_young_of_regions(unknowns, moving) * change;
     for (std::size_t k = 0; k < moving.size(); ++k) {
-      if (moving[k] == log_young) doubt.log_young = change(static_cast<Index>(k));
       if (moving[k] == poisson) doubt.poisson = change(static_cast<Index>(k));
     }
     out.all.push_back(doubt);

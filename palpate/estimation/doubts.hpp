@@ -30,7 +30,8 @@ struct Doubt {
   double scale_m = 0;  ///< contact and tool: the tool's radius; support: radius of its rim; compliance: as stated, m/N
   double chi2 = 0;     ///< by how much it would fall
   double p_value = 1;  ///< chance of asking for as much where everything is as stated, over all that was asked
-  double log_young = 0, poisson = 0;  ///< what it would do to log E and nu
+  VectorX log_young = VectorX::Zero(1);  ///< what it would do to log E, of every region
+  double poisson = 0;                    ///< and to nu
 };
 
 struct Doubts {

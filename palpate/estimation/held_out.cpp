@@ -95,15 +95,21 @@ struct Sums {
   }
 };
 
-/// Forces that an imposed motion was predicted to ask for.
-void add_reactions(const Step& step, const StepPrediction& now, Sums& out) {
+/// Squares of what an imposed motion was predicted to ask for too much, and of what was read.
+struct Reactions {
+  double error2_n2 = 0, read2_n2 = 0;
+};
+
+void add_reactions(const Step& step, const StepPrediction& now, Reactions& out) {
   for (std::size_t l = 0; l < step.loads.size(); ++l) {
     const Load& load = step.loads[l];
     if (!load.travel_m) continue;
     for (const auto& observation : step.observations) {
       const auto* wrench = std::get_if<Wrench>(&observation);
       if (wrench == nullptr || wrench->force_n.norm() == 0 || (!wrench->tool.empty() && wrench->tool != load.tool)) continue;
-      out.add_force((now.force_n[l] - wrench->force_n).squaredNorm() / wrench->force_n.squaredNorm());
+      const Vec3 off_n = now.force_n[l] - wrench->force_n;
+      out.error2_n2 += wrench->along.norm() > 0 ? std::pow(wrench->along.dot(off_n), 2) : off_n.squaredNorm();
+      out.read2_n2 += wrench->force_n.squaredNorm();
     }
   }
 }
@@ -179,6 +185,7 @@ HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<P
     if (learned != nullptr) learned->push_back(others);
     const StepFlags loaded = loaded_steps(fits, held, as_good_as_none);
     bool force_driven = false;
+    Reactions reactions;
     for (std::size_t s = 0; s < held.size(); ++s) {
       if (loaded[s] == 0) continue;
       const StepPrediction now = model.predict(s, others.unknowns);
@@ -189,9 +196,11 @@ HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<P
       add_distance(fits, s, still, others.unknowns, sums.undeformed);
       add_distance(fits, s, before_m != nullptr ? with_surface(now, *before_m) : still, others.unknowns, sums.as_before);
       add_distance(fits, s, fits.joint_prediction(s), fits.optimum().unknowns, sums.fitted);
-      add_reactions(model.step(s), now, sums);
+      add_reactions(model.step(s), now, reactions);
       force_driven = force_driven || is_force_driven(model.step(s));
     }
+    // Light steps, of which noise is a large share, weigh as they should.
+    if (reactions.read2_n2 > 0) sums.add_force(reactions.error2_n2 / reactions.read2_n2);
     if (!force_driven) continue;
     // Statics depend on F / E: the force that would bend the object as seen is the measured one times E of the others over E
     // of this part alone. What the push's unloaded steps say of pose and shape serves both.

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/estimation/moved_balls.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
+#include "palpate/core/error.hpp"
 #include "palpate/core/observed_travel.hpp"
 
 namespace palpate::estimation {
@@ -31,15 +34,51 @@ void observe_force(Step& step, const Load& load, const Vec3& force_n) {
   step.observations = std::move(seen);
 }
 
+bool presses(const Load& load) { return load.force_n && load.force_n->norm() > 0; }
+
+/// As it presses hardest: of a light step sensor noise turns a direction that is that of the force.
+const Load& hardest(const Tool& ball, const Push& push) {
+  const Load* found = nullptr;
+  for (const Step& step : push.steps)
+    for (const Load& load : step.loads)
+      if (load.tool == ball.name && presses(load) && (found == nullptr || load.force_n->norm() > found->force_n->norm())) found = &load;
+  return *found;
+}
+
+/// The ball is not there: nothing it does says where it stands or what it weighs.
+void take_away(const Tool& ball, Step& step) {
+  const bool alone = step.loads.size() == 1;
+  const auto of_ball = [&](const std::string& tool) { return tool == ball.name || (tool.empty() && alone); };
+  std::erase_if(step.observations, [&](const Observation& one) {
+    const auto* wrench = std::get_if<Wrench>(&one);
+    const auto* travel = std::get_if<ToolTravel>(&one);
+    return (wrench != nullptr && of_ball(wrench->tool)) || (travel != nullptr && of_ball(travel->tool));
+  });
+  std::erase_if(step.loads, [&](const Load& load) { return load.tool == ball.name; });
+}
+
 void move(const Tool& ball, Push& push) {
+  constexpr double same_place = 0.05;  // of the radius
+  const Load line = hardest(ball, push);
   for (Step& step : push.steps) {
+    const auto own = std::find_if(step.loads.begin(), step.loads.end(), [&](const Load& load) { return load.tool == ball.name; });
+    if (own == step.loads.end()) continue;
+    if (!presses(*own)) {
+      take_away(ball, step);
+      continue;
+    }
+    if ((own->contact_m - line.contact_m).norm() > same_place * ball.radius_m)
+      throw Error(fmt::format("'{}' presses at another place than in other steps of push '{}'; a rigid tool touches at one place a push: make a push of each "
+                              "place, or say where it slid (slipped)",
+                              ball.name, push.name),
+                  (step.source.empty() ? "push '" + push.name + "'" : step.source) + ": loads.contact_m");
     for (Load& load : step.loads) {
       if (load.tool != ball.name) continue;
       const ToolTravel* travel = observed_travel(step, load);
-      const Vec3 force_n = load.force_n.value_or(Vec3::Zero());
-      const bool presses = force_n.norm() > 0;
-      if (presses) observe_force(step, load, force_n);
-      load.travel_m = presses ? travel->travel_m : 0;
+      load.direction = line.direction;
+      load.contact_m = line.contact_m;
+      load.travel_m = travel->travel_m;
+      observe_force(step, load, *load.force_n);
       load.force_n.reset();
       load.force_std_n = load.force_relative_std = 0;
       load.force_rate_n_s.setZero();

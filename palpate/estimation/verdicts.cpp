@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "palpate/core/quantity.hpp"
 #include "palpate/estimation/deep_loads.hpp"
@@ -116,7 +117,12 @@ void judge_fit(const VerdictInput& in, std::vector<Verdict>& out) {
 }
 
 /// One verdict for all of them: the farthest in full, others by name.
+/// Of very many some are far off by chance: beyond three standard deviations, and farther than any of them is once in twenty times.
 void judge_nuisances(const VerdictInput& in, std::vector<Verdict>& out) {
+  constexpr double by_chance = 0.05;
+  double farthest_pull = 0;
+  for (const auto& nuisance : in.answer.nuisances) farthest_pull = std::max(farthest_pull, std::abs(nuisance.pull));
+  if (static_cast<double>(in.answer.nuisances.size()) * std::erfc(farthest_pull / std::numbers::sqrt2) > by_chance) return;
   std::vector<const Nuisance*> beyond;
   for (const auto& nuisance : in.answer.nuisances)
     if (std::abs(nuisance.pull) > 3) beyond.push_back(&nuisance);
@@ -228,21 +234,31 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
 void judge_doubts(const VerdictInput& in, bool slipped, std::vector<Verdict>& out) {
   constexpr double least_share = 0.1;  // of a tool's radius: less is within what a patch of even pressure means
   constexpr double matters = 0.5;      // standard deviations of E or nu
-  double young_std = 0, poisson_std = 0;
+  std::vector<const Parameter*> young;
+  double poisson_std = 0;
   for (const auto& parameter : in.answer.parameters) {
-    if (parameter.name == "young_modulus" && young_std == 0) young_std = parameter.std / parameter.value;
+    if (parameter.name == "young_modulus") young.push_back(&parameter);
     if (parameter.name == "poisson_ratio") poisson_std = parameter.std;
   }
   for (const Doubt& doubt : in.doubts.all) {
     if (doubt.p_value >= very_rare || (slipped && doubt.about == Doubt::About::contact)) continue;
-    if (std::abs(doubt.log_young) < matters * young_std && std::abs(doubt.poisson) < matters * poisson_std) continue;
+    // Of the regions the one whose E would change most, in what it is known to.
+    double most = 0, log_young = 0;
+    std::string of_region;
+    for (std::size_t r = 0; r < std::min(young.size(), static_cast<std::size_t>(doubt.log_young.size())); ++r) {
+      const double change = doubt.log_young(static_cast<Index>(r)), in_std = std::abs(change) * young[r]->value / young[r]->std;
+      if (!(in_std > most)) continue;
+      most = in_std, log_young = change;
+      if (young.size() > 1) of_region = " of region '" + young[r]->region + "'";
+    }
+    if (most <= matters && std::abs(doubt.poisson) <= matters * poisson_std) continue;
     const bool of_foot = doubt.about == Doubt::About::support || doubt.about == Doubt::About::support_compliance;
     if (doubt.about == Doubt::About::support_compliance && doubt.scale_m + doubt.size_m < 0) continue;  // nothing comes towards a push
     if (!of_foot && std::abs(doubt.size_m) < least_share * doubt.scale_m) continue;
     const std::string size = number(1e3 * std::abs(doubt.size_m), "{:.2g}") + " mm";
     // One linear step says how far off the answer is only where that is not far.
-    const bool near = std::abs(doubt.log_young) < 0.5 && std::abs(doubt.poisson) < 0.25;
-    const std::string change = near ? "; E would then be " + number(100 * std::expm1(doubt.log_young), "{:+.2g}") +
+    const bool near = std::abs(log_young) < 0.5 && std::abs(doubt.poisson) < 0.25;
+    const std::string change = near ? "; E" + of_region + " would then be " + number(100 * std::expm1(log_young), "{:+.2g}") +
                                           " %, and nu " + number(doubt.poisson, "{:+.2g}") + ", from here"
                                     : "; E and nu would then be quite different";
     switch (doubt.about) {

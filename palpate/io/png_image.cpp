@@ -16,6 +16,7 @@ struct Source {
   std::string_view bytes;
   std::size_t at = 0;
   char message[120] = "";
+  bool is_colour = false;
 };
 
 // libpng reports by a long jump: what lies between must have no destructor. It must not print either.
@@ -43,8 +44,10 @@ bool read_header(png_structp png, png_infop info, Source& source, GreyImage& ima
   const png_uint_32 width = png_get_image_width(png, info), height = png_get_image_height(png, info);
   if (width > largest_side || height > largest_side) png_error(png, "the image is larger than 20000 pixels a side");
   if (png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR) {
-    if (png_get_color_type(png, info) != PNG_COLOR_TYPE_PALETTE)
-      png_error(png, "the image is in colour, a grey one is needed");
+    if (png_get_color_type(png, info) != PNG_COLOR_TYPE_PALETTE) {
+      source.is_colour = true;
+      png_error(png, "colour");
+    }
     png_set_packing(png);  // palette indices stand for themselves: a mask
   } else if (png_get_bit_depth(png, info) < 8) {
     png_set_expand_gray_1_2_4_to_8(png);
@@ -98,6 +101,7 @@ GreyImage parse_png(std::string_view bytes, const std::string& name) {
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = raw.data() + i * row_bytes;
   good = good && read_rows(png, info, rows.data());
   png_destroy_read_struct(&png, &info, nullptr);
+  if (source.is_colour) throw Error("is a colour image, a grey one is needed (depth: 16 bits); was the colour camera's stream taken?", name);
   if (!good)
     throw Error("the PNG image is cut off or damaged (" + std::string(source.message) + "); copy or record it again", name);
 

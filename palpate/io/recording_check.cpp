@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "palpate/core/recording_values.hpp"
+#include "palpate/geometry/mesh_checks.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_reader.hpp"
 
@@ -234,9 +237,21 @@ class Checker {
       if (distance > box_.diagonal()) {
         add(step.source, fmt::format("contact_m [{}] is {} from the object; it is a point on the rest surface, in metres",
                                      point(load.contact_m), length(distance)));
+      } else if (load.force_n && (tool->shape == ToolShape::sphere || tool->shape == ToolShape::disc)) {
+        check_contact(load, tool->radius_m, step);
       }
     }
     return acts;
+  }
+
+  /// A fit takes the nearest place on the surface, as far away as the patch is wide.
+  void check_contact(const Load& load, double radius_m, const Step& step) {
+    if (!surface_) surface_.emplace(recording_.rest.volume ? geometry::boundary_surface(*recording_.rest.volume).surface : *recording_.rest.surface);
+    const double off_m = std::sqrt(surface_->closest(load.contact_m).squared_distance_m2);
+    if (off_m > radius_m)
+      add(step.source, fmt::format("contact_m [{}] is {} from the object's surface, further than '{}' is wide ({}); is it in the object's frame, and the "
+                                   "tool's length right?",
+                                   point(load.contact_m), length(off_m), load.tool, length(radius_m)));
   }
 
   void check_loads(bool loaded) {
@@ -342,6 +357,7 @@ class Checker {
   Points nodes_;
   Box box_;
   bool has_mesh_ = false;
+  std::optional<geometry::TriangleTree> surface_;  // made when a contact asks for it
   std::vector<Problem> problems_;
 };
 

@@ -199,8 +199,12 @@ class OddNumbers {
       if (tool.shape == ToolShape::sphere && tool.radius_m > 0 && tool.radius_std_m == 0) look_at_ball(tool);
     }
     const double usual_n = usual_force();
+    constexpr double strong_arm_n = 500;
+    if (usual_n > strong_arm_n)
+      say(fmt::format("most forces are above {:.3g} N, more than arms that push soft objects have; are they in newtons?", strong_arm_n), recording_.source);
     for (const Push& push : recording_.pushes) {
       look_at_signs(push);
+      look_at_directions(push);
       if (usual_n > 0 && push.force_tare_std_n > usual_n && !push.steps.empty())
         say(fmt::format("force_tare_std_n of {:.3g} N is more than most forces ({:.3g} N)", push.force_tare_std_n, usual_n),
             push.steps.front().source);
@@ -309,6 +313,22 @@ class OddNumbers {
     if (pulls != nullptr && presses > 0)
       say(fmt::format("force_n pulls, against 'direction', where other steps of push '{}' press; is its sign right?", push.name),
           pulls->source);
+  }
+
+  /// A tool that neither slides nor sticks badly is pushed along its way, within what friction carries sideways.
+  void look_at_directions(const Push& push) {
+    constexpr double sideways_rad = EIGEN_PI / 3;
+    for (const Step& step : push.steps) {
+      for (const Load& load : step.loads) {
+        if (!load.force_n || load.force_n->norm() <= 5 * (load.force_std_n + push.force_tare_std_n)) continue;
+        const double angle_rad = std::acos(std::clamp(load.force_n->normalized().dot(load.direction.normalized()), -1.0, 1.0));
+        if (angle_rad < sideways_rad || angle_rad > EIGEN_PI - sideways_rad) continue;  // what pulls is said elsewhere
+        return say(fmt::format("force_n of push '{}' points {:.0f} degrees away from 'direction', aside of the push; is one of them in another frame, or "
+                               "along another axis?",
+                               push.name, angle_rad * 180 / EIGEN_PI),
+                   step.source);
+      }
+    }
   }
 
   /// A measured force acts on a patch of the tool's radius; a ball's patch grows with its depth (Hertz 1882). Where its travel was

@@ -133,8 +133,9 @@ Recording read_recording_unchecked(const fs::path& given) {
                 given.string());
   }
   if (!fs::exists(index, code)) {
-    throw Error("holds no recording.yaml; a recording is a folder with that file in it (docs/recording-format.md)",
-                given.string());
+    const fs::path below = given / "recording";  // as `palpate demo` and `explore` leave it
+    const std::string meant = fs::exists(below / index_name, code) ? "; did you mean " + below.string() + "?" : "";
+    throw Error("holds no recording.yaml; a recording is a folder with that file in it (docs/recording-format.md)" + meant, given.string());
   }
   RecordingContext context{RecordingFolder(root), {}, {}, {}, {}, 0, {}};
   Recording& recording = context.recording;

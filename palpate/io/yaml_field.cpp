@@ -152,7 +152,7 @@ Vec3 YamlField::vector3() const {
 
 Vec3 YamlField::unit_vector() const {
   const Vec3 value = vector3();
-  if (std::abs(value.norm() - 1) > 0.01) fail("is a direction: its length must be 1");
+  if (std::abs(value.norm() - 1) > 0.01) fail(fmt::format("is a direction: its length must be 1, is {:.4g}", value.norm()));
   return value.normalized();
 }
 

@@ -110,7 +110,7 @@ class OnlineEstimator:
 
         estimator = palpate.OnlineEstimator(scene)        # object, supports, tools, priors: a Recording without pushes
         estimator.begin(palpate.Push(name="top"))
-        so_far = estimator.add(step)                      # an Identification without figures
+        so_far = estimator.add(step)                      # an Identification; without parameters until something presses
         found = estimator.answer()                        # what identify says of all so far
 
     Options are those of `identify`. Raises Error where identify would; a step that is refused is not taken in.

@@ -49,11 +49,23 @@ class _Identification(_Noun):
         return self.parameter("poisson_ratio")
 
 
-_bases = {"Identification": _Identification}
+class _Load(_Noun):
+    __slots__ = ()
+
+    def __post_init__(self):
+        """As in a file: a direction that is not given is that of the force."""
+        if self.direction is None:
+            length = numpy.linalg.norm(self.force_n) if numpy.shape(self.force_n) == (3,) else 0.0
+            self.direction = numpy.asarray(self.force_n, float) / length if length > 0 else numpy.array([0.0, 0.0, -1.0])
+
+
+_bases = {"Identification": _Identification, "Load": _Load}
+_not_given = {("Load", "direction")}
 
 
 def _made(name, about, fields):
-    made = dataclasses.make_dataclass(name, [(field, kind, dataclasses.field(default_factory=default)) for field, kind, _, default in fields],
+    made = dataclasses.make_dataclass(name, [(field, kind, dataclasses.field(default_factory=(lambda: None) if (name, field) in _not_given else default))
+                                             for field, kind, _, default in fields],
                                       bases=(_bases.get(name, _Noun),), kw_only=True, slots=True, eq=False, repr=False)
     made.__module__ = "palpate"
     made.__doc__ = about + "\n\n" + "".join(f"    {field}: {kind}" + (f"\n        {words}" if words else "") + "\n"

@@ -30,19 +30,19 @@ class Robot:
 
     def read(self) -> RobotState:
         """A RobotState. force_n is of the tool on the object, base frame; a constant bias is allowed."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__}.read: say how your arm does it")
 
     def move(self, T_base_tip: NDArray[Any], speed_m_s: float) -> bool | None:
         """Moves the tip on a straight line and returns when it stands. False: refused (a limit, a collision), and it did not move."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__}.move: say how your arm does it")
 
     def stop(self) -> None:
         """Brings the arm to rest where it is."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__}.stop: say how your arm does it")
 
     def take_depth_image(self) -> DepthFrame:
         """A DepthFrame, with camera, pose of the camera, noise and, where the robot is in view, its mask."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__}.take_depth_image: say how your arm does it")
 
     def wait(self, duration_s: float) -> None:
         """Lets time pass."""
@@ -64,9 +64,14 @@ _protocol = """
     start_distance_m, search_distance_m: before the expected contact, where the approach starts; beyond it, how far to look
     increment_m:         of the tip between two looks at the force
     clearance_m, tool_length_m: of the way around the object between pushes
-    approach_speed_m_s, push_speed_m_s, sample_period_s, free_air_samples, settling_timeout_s
+    look_every_m, blind_retreat_m, obstacle_threshold_n: of that way: looks at the force, where nobody knows the object's size, what is hit
+    approach_speed_m_s, push_speed_m_s, sample_period_s, free_air_samples
+    settling_rate_n_s, settling_relative_rate_s, settling_window_s, settling_timeout_s: when a step is recorded
     contact_std_m:       prior on the contact point that the recording will state
-    contact_threshold_n: change of the force that means contact, at least
+    contact_threshold_n, contact_noise_factor, contact_samples: change of the force that means contact
+    slip_sideways_m, slip_friction, slip_force_drop, slip_deeper_m, slip_least_force_n: what means that the tool slid
+    changed_share:       of the picture's pixels after a push, beyond which the object did not come back
+    As the options of `palpate push --help`.
 """
 
 

@@ -82,6 +82,33 @@ TEST(RecordingValues, WhatAnalysesWouldStumbleOverIsNamed) {
   EXPECT_THAT(wrong([&](Recording& r) { r.density_kg_m3 = 1.1; }), HasSubstr("density_kg_m3: is outside 5 to 30000 kg/m3; is it in g/cm3?"));
 }
 
+/// A force has nothing to be spread over; a body that is moved from two places was taken to go from the first.
+TEST(RecordingValues, WhereAToolPressesIsNamed) {
+  const auto wrong = [](const std::function<void(Recording&)>& spoil) {
+    Recording recording = right();
+    spoil(recording);
+    std::string all;
+    for (const WrongValue& one : wrong_values(recording)) all += one.where + ": " + one.what + "\n";
+    return all;
+  };
+  EXPECT_THAT(wrong([](Recording& r) { r.tools[0].radius_m = 0; }), HasSubstr("pushes[0].steps[1].loads[0].force_n: acts on 'stick', whose radius_m is 0"));
+  const auto moved = [&](const Vec3& aside_m, const Vec3& direction) {
+    return wrong([&](Recording& r) {
+      for (Step& step : r.pushes[0].steps) {
+        step.loads[0].force_n.reset();
+        step.loads[0].travel_m = 0.001 * step.time_s;
+      }
+      Load& last = r.pushes[0].steps[1].loads[0];
+      last.contact_m += aside_m;
+      last.direction = direction;
+    });
+  };
+  EXPECT_EQ(moved(Vec3::Zero(), -Vec3::UnitZ()), "");
+  EXPECT_EQ(moved(Vec3(1e-4, 0, 0), Vec3(0.01, 0, -1)), "") << "as encoders repeat";
+  EXPECT_THAT(moved(Vec3(0.004, 0, 0), -Vec3::UnitZ()), HasSubstr("pushes[0].steps[1].loads[0].contact_m: is elsewhere than where push 'push 1' moved 'stick' first"));
+  EXPECT_THAT(moved(Vec3::Zero(), -Vec3::UnitX()), HasSubstr("pushes[0].steps[1].loads[0].direction: is another one"));
+}
+
 /// As files refuse them: the likely slip is named.
 TEST(RecordingValues, AWrongUnitIsNamedWithWhatIsPossible) {
   const auto wrong = [](const std::function<void(Recording&)>& spoil) {

@@ -167,6 +167,21 @@ TEST(CrossCheck, MaterialThatStiffensBeyondItsLawIsCalledSo) {
   EXPECT_TRUE(says(answer, "not_linear"));
 }
 
+TEST(CrossCheck, APushOfOneLoadAtAStifferPlaceIsNoMaterialThatStiffens) {
+  Recording recording = pushed_block_recording();
+  recording.pushes.push_back(recording.pushes[0]);
+  recording.pushes[1].name = "once";
+  recording.pushes[1].steps.erase(recording.pushes[1].steps.begin());
+  PushedBlock soft, stiff;
+  stiff.young_pa = 1.5 * soft.young_pa;
+  stiff.seed = 8;
+  Inputs inputs = clouds_of(soft);
+  inputs.push_back(clouds_of(stiff).back());
+  const Identification answer = fit(recording, coarse_block(), inputs, {});
+  EXPECT_TRUE(says(answer, "not_homogeneous"));
+  EXPECT_FALSE(says(answer, "not_linear"));
+}
+
 TEST(CochranQ, IsTheChiSquareTestOfWeightedMeans) {
   // Upper tails from tables of the chi-square distribution.
   EXPECT_NEAR(chi_square_tail(3.841, 1), 0.05, 1e-4);

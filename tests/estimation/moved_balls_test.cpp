@@ -12,7 +12,9 @@
 
 #include "palpate/core/observed_travel.hpp"
 #include "palpate/identify.hpp"
+#include "palpate/online.hpp"
 #include "pushed_block.hpp"
+#include "refusals.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -124,10 +126,46 @@ TEST(MovedBalls, TheForceIsWhatWasObservedAlongThePush) {
   EXPECT_EQ(read.force_n, Vec3(0, 0, -2));
   EXPECT_EQ(read.along, Vec3(0, 0, -1));
   EXPECT_NEAR(read.force_sigma_n, std::hypot(sigma_n, 0.02 * Vec3(0.3, 0, -2).norm()), 1e-12);
-  EXPECT_EQ(*moved.pushes[0].steps.front().loads[0].travel_m, 0) << "not yet touching";
-  EXPECT_EQ(moved.pushes[0].steps.front().observations.size(), 1U) << "and no force to see";
+  EXPECT_TRUE(moved.pushes[0].steps.front().loads.empty()) << "not yet touching: it is not there";
+  EXPECT_TRUE(moved.pushes[0].steps.front().observations.empty()) << "and says nothing of where it stands";
   const Recording again = with_balls_moved(moved);
   EXPECT_EQ(again.warnings.size(), moved.warnings.size());
+}
+
+// As files give them: where only a force is given its direction is that of the push, and of no force there is none.
+TEST(MovedBalls, TheyGoAlongTheLineOfTheHardestStep) {
+  Recording recording = pressed_block(4);
+  std::vector<Step>& steps = recording.pushes[0].steps;
+  steps[0].loads[0].direction = Vec3::UnitX();
+  steps[1].loads[0].direction = Vec3(0.2, 0, -1).normalized();
+  steps[1].loads[0].contact_m += Vec3(3e-4, 0, 0);
+  const Recording moved = with_balls_moved(recording);
+  for (std::size_t s = 1; s < steps.size(); ++s) {
+    EXPECT_EQ(moved.pushes[0].steps[s].loads.at(0).direction, -Vec3::UnitZ()) << s;
+    EXPECT_EQ(moved.pushes[0].steps[s].loads.at(0).contact_m, Vec3(0.04, 0.04, 0.05)) << s;
+  }
+  IdentifyOptions options;
+  options.fit.cross_checks = false;
+  EXPECT_NEAR(identify(recording, options).answer.parameters[0].value / young_pa, 1, 0.05);
+
+  steps[1].loads[0].contact_m += Vec3(4e-3, 0, 0);
+  EXPECT_THAT(message_of([&] { with_balls_moved(recording); }), HasSubstr("presses at another place than in other steps of push"));
+}
+
+TEST(MovedBalls, StepByStepTheyAreMovedToo) {
+  Recording recording = pressed_block(5);
+  IdentifyOptions options;
+  options.fit.cross_checks = false;
+  const double at_once_pa = identify(recording, options).answer.parameters[0].value;
+  const Push push = recording.pushes[0];
+  recording.pushes.clear();
+  OnlineEstimator estimator(recording, options);
+  Push begun = push;
+  begun.steps.clear();
+  estimator.begin(begun);
+  for (const Step& step : push.steps) estimator.add(step);
+  ASSERT_FALSE(estimator.estimate().parameters.empty());
+  EXPECT_NEAR(estimator.estimate().parameters[0].value / at_once_pa, 1, 0.01);
 }
 
 TEST(MovedBalls, OthersKeepTheirForces) {

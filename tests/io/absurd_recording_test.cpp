@@ -110,6 +110,8 @@ TEST_F(AbsurdRecording, WhatCannotBeIsRefusedByFieldValueAndLikelyMistake) {
        "every node lies in the box of 'grip'"},
       {"normal: [0, 0, 1]", "normal: [0, 0, -1]", "environment.planes[0]", "behind this plane"},
       {"point_m: [0, 0, 0]", "point_m: [0, 0, -750]", "environment.planes[0]", "750 m from the object"},
+      {"contact_m: [0.05, 0.05, 0.1], force_std_n: 0.02", "contact_m: [0.05, 0.05, 0.13]", "recording.yaml:15",
+       "contact_m [0.05, 0.05, 0.13] is 30 mm from the object's surface, further than 'ball' is wide (20 mm)"},
   };
   for (const Slip& slip : slips) {
     const std::string said = refusal_with(slip.from, slip.to);
@@ -150,6 +152,8 @@ TEST_F(AbsurdRecording, WhatIsOnlyOddIsSaidAndRead) {
   EXPECT_THAT(warnings_with("time_s: 1.1", "time_s: 900"), ElementsAre(HasSubstr("of one clock?")));
   EXPECT_THAT(warnings_with("force_n: [0, 0, -1]", "direction: [0, 0, -1], force_n: [0, 0, 1]"),
               ElementsAre(HasSubstr("pulls, against 'direction'")));
+  EXPECT_THAT(warnings_with("force_n: [0, 0, -1]", "direction: [1, 0, 0], force_n: [0.2, 0, -1]"), ElementsAre(HasSubstr("points 79 degrees away from 'direction'")));
+  EXPECT_THAT(warnings_with("force_n: [0, 0, -1]", "direction: [0.5, 0, -0.8660254], force_n: [0, 0, -1]"), IsEmpty());
   EXPECT_THAT(warnings_with("force_n: [0, 0, -1]", "force_n: [0, 0, -999]"), ElementsAre(HasSubstr("hundred times")));
   EXPECT_THAT(warnings_with("environment: {", "density_kg_m3: 30\nenvironment: {gravity_m_s2: [0, 0, -98.1], "),
               ElementsAre(HasSubstr("gravity_m_s2")));

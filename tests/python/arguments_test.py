@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the Python module is given: what is left out, mistyped or cannot be. Run by ctest like module_test.py."""
+import unittest
+
+import numpy as np
+
+import palpate
+from soft_block import Gantry, block_on_a_table
+
+
+class LoadDirection(unittest.TestCase):
+    def test_is_that_of_the_force_where_it_is_not_given(self):
+        np.testing.assert_allclose(palpate.Load(tool="stick", force_n=[2, 0, 0]).direction, [1, 0, 0])
+        np.testing.assert_allclose(palpate.Load(tool="stick", force_n=[0, 0, 0]).direction, [0, 0, -1])
+        np.testing.assert_allclose(palpate.Load(tool="stick", travel_m=0.001).direction, [0, 0, -1])
+        np.testing.assert_allclose(palpate.Load(tool="stick", force_n=[2, 0, 0], direction=[0, 1, 0]).direction, [0, 1, 0])
+
+
+class Options(unittest.TestCase):
+    def test_of_the_protocol_are_those_of_the_command_line(self):
+        for option in ("settling_rate_n_s", "settling_window_s", "look_every_m", "blind_retreat_m", "obstacle_threshold_n", "contact_samples",
+                       "contact_noise_factor", "slip_sideways_m", "slip_friction", "slip_force_drop", "slip_least_force_n"):
+            with self.assertRaises(palpate.Error) as raised:  # taken, and refused for its value
+                palpate.push(Gantry(), block_on_a_table(), [0.5, 0, 0.05], **{option: -1})
+            self.assertNotIn("is no option", str(raised.exception), option)
+
+    def test_mistyped_ones_name_the_nearest(self):
+        for wrong, right in (("force_limit", "force_limit_n"), ("push_sped_m_s", "push_speed_m_s")):
+            with self.assertRaisesRegex(palpate.Error, f"{wrong}: is no option; did you mean '{right}'"):
+                palpate.push(Gantry(), block_on_a_table(), [0.5, 0, 0.05], **{wrong: 1})
+
+
+class Refusals(unittest.TestCase):
+    def test_a_robot_that_lacks_a_call_says_which(self):
+        class Half(palpate.Robot):
+            pass
+
+        with self.assertRaisesRegex(NotImplementedError, "Half.read"):
+            palpate.push(Half(), block_on_a_table(), [0.5, 0, 0.05])
+
+    def test_a_patch_without_a_size(self):
+        scene = block_on_a_table()
+        scene.tools[0].radius_m = 0
+        scene.pushes = [palpate.Push(name="top", steps=[palpate.Step(loads=[palpate.Load(tool="stick", force_n=[0, 0, -1], contact_m=[0.5, 0, 0.05])])])]
+        where, what = palpate.check_recording(scene)[0]
+        self.assertEqual(where, "pushes[0].steps[0].loads[0].force_n")
+        self.assertIn("radius_m is 0", what)
+
+
+if __name__ == "__main__":
+    unittest.main()
