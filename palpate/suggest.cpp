@@ -309,7 +309,7 @@ PushScene prepare_pushes(const Recording& recording, const SuggestOptions& optio
       const geometry::ClosestPoint foot = surface.closest(candidate.contact_m);
       const double off_m = std::sqrt(foot.squared_distance_m2);
       if (off_m > std::max(0.5 * tool->radius_m, 1e-3))
-        throw Error(fmt::format("the contact ({:.4g} {:.4g} {:.4g}) lies {} away from the object's surface; the nearest place on it is {:.4g} {:.4g} {:.4g}",
+        throw Error(fmt::format("the contact ({:.4f} {:.4f} {:.4f}) lies {} away from the object's surface; the nearest place on it is ({:.4f} {:.4f} {:.4f})",
                                 candidate.contact_m.x(), candidate.contact_m.y(), candidate.contact_m.z(), quantity(off_m, "m"), foot.point_m.x(),
                                 foot.point_m.y(), foot.point_m.z()),
                     "candidates");

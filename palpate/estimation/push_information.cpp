@@ -12,7 +12,7 @@
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/estimation/load_columns.hpp"
 #include "palpate/estimation/push_visibility.hpp"
-#include "palpate/fem/regions.hpp"
+#include "palpate/estimation/region_at.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
@@ -98,18 +98,6 @@ VectorX compliances_m_per_n(const Recording& scene, const SimulatedObject& objec
       compliance(static_cast<Index>(c)) = -1;
   }
   return compliance;
-}
-
-/// The nearest element's.
-int region_at(const SimulatedObject& object, const Vec3& place_m) {
-  if (object.region.empty()) return 0;
-  Index nearest = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (Index e = 0; e < object.mesh.tetrahedra.rows(); ++e) {
-    const double d2 = (fem::element_centre(object.mesh, e) - place_m).squaredNorm();
-    if (d2 < least) least = d2, nearest = e;
-  }
-  return object.region[static_cast<std::size_t>(nearest)];
 }
 
 /// What one step adds, before nuisances are integrated out.

@@ -10,6 +10,7 @@
 
 #include "palpate/estimation/cell_sums.hpp"
 #include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/region_at.hpp"
 #include "palpate/estimation/slips.hpp"
 
 namespace palpate::estimation {
@@ -219,7 +220,9 @@ PatchPressure highest_pressure(const Objective& objective, const Optimum& optimu
       const bool round = tool.shape == ToolShape::sphere || tool.shape == ToolShape::disc;
       if (!round || !load.force_n || !(tool.radius_m > 0)) continue;
       const double pressure_pa = std::abs(load.force_n->dot(load.direction.normalized())) / (EIGEN_PI * tool.radius_m * tool.radius_m);
-      const double over_young = pressure_pa / std::exp(optimum.unknowns(log_young));
+      const int region = region_at(model.object(), load.contact_m);
+      const double log_ratio = region > 0 ? optimum.unknowns(first_ratio + region - 1) : 0;
+      const double over_young = pressure_pa / std::exp(optimum.unknowns(log_young) + log_ratio);
       if (over_young > highest.over_young) highest = {over_young, s};
     }
   }

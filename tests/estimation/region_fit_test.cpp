@@ -71,6 +71,21 @@ TEST(RegionFit, CovarianceIsThatOfTheParameters) {
   EXPECT_GT(determinant, 0);
 }
 
+// The free half is pressed; what the other one is made of says nothing of how deep that is.
+TEST(RegionFit, APressureIsJudgedByTheRegionThatIsPressed) {
+  const auto is_beyond = [](double young_pa, double free_half) {
+    Recording sharp = pushed_block_recording();
+    sharp.tools[0].radius_m = 0.0025;
+    SimulatedObject object = coarse_block();
+    put_two_halves(object);
+    PushedBlock truth;
+    truth.young_pa = young_pa, truth.free_half = free_half;
+    return says(fit(sharp, object, clouds_of(truth, sharp), {}), "pressure_beyond_model");
+  };
+  EXPECT_TRUE(is_beyond(2e4, 0.6)) << "half of E there, 0.3 of the other";
+  EXPECT_FALSE(is_beyond(1.2e4, 2)) << "a quarter, half of the other";
+}
+
 TEST(RegionFit, OneStiffnessForEqualHalvesAgreesWithTwo) {
   const Identification two = fit_halves({}), one = fit_halves({}, false);
   EXPECT_NEAR(two.parameters[2].value / two.parameters[0].value, 1, 0.25);
