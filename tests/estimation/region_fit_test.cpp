@@ -83,7 +83,7 @@ TEST(RegionFit, APressureIsJudgedByTheRegionThatIsPressed) {
     return says(fit(sharp, object, clouds_of(truth, sharp), {}), "pressure_beyond_model");
   };
   EXPECT_TRUE(is_beyond(2e4, 0.6)) << "half of E there, 0.3 of the other";
-  EXPECT_FALSE(is_beyond(1.2e4, 2)) << "a quarter, half of the other";
+  EXPECT_FALSE(is_beyond(1.2e4, 4)) << "an eighth, half of the other";
 }
 
 TEST(RegionFit, OneStiffnessForEqualHalvesAgreesWithTwo) {
