@@ -59,19 +59,21 @@ Recording right() {
   return recording;
 }
 
+/// What is said of a right recording that was spoilt, a line each.
+std::string wrong(const std::function<void(Recording&)>& spoil) {
+  Recording recording = right();
+  spoil(recording);
+  std::string all;
+  for (const WrongValue& one : wrong_values(recording)) all += one.where + ": " + one.what + "\n";
+  return all;
+}
+
 TEST(RecordingValues, WhatIsRightIsRight) {
   EXPECT_TRUE(wrong_values(right()).empty());
   EXPECT_NO_THROW(demand_right_values({}));
 }
 
 TEST(RecordingValues, WhatAnalysesWouldStumbleOverIsNamed) {
-  const auto wrong = [](const std::function<void(Recording&)>& spoil) {
-    Recording recording = right();
-    spoil(recording);
-    std::string all;
-    for (const WrongValue& one : wrong_values(recording)) all += one.where + ": " + one.what + "\n";
-    return all;
-  };
   const auto cloud = [](Recording& recording) -> PointCloud& { return std::get<PointCloud>(recording.pushes[0].steps[1].observations[1]); };
   const auto markers = [](Recording& recording) -> Markers& { return std::get<Markers>(recording.pushes[0].steps[1].observations[2]); };
   EXPECT_THAT(wrong([&](Recording& r) { cloud(r).points_m.resize(0, 3); }), HasSubstr("steps[1].observations[1].points_m: is empty"));
@@ -84,13 +86,6 @@ TEST(RecordingValues, WhatAnalysesWouldStumbleOverIsNamed) {
 
 /// A force has nothing to be spread over; a body that is moved from two places was taken to go from the first.
 TEST(RecordingValues, WhereAToolPressesIsNamed) {
-  const auto wrong = [](const std::function<void(Recording&)>& spoil) {
-    Recording recording = right();
-    spoil(recording);
-    std::string all;
-    for (const WrongValue& one : wrong_values(recording)) all += one.where + ": " + one.what + "\n";
-    return all;
-  };
   EXPECT_THAT(wrong([](Recording& r) { r.tools[0].radius_m = 0; }), HasSubstr("pushes[0].steps[1].loads[0].force_n: acts on 'stick', whose radius_m is 0"));
   const auto moved = [&](const Vec3& aside_m, const Vec3& direction) {
     return wrong([&](Recording& r) {
