@@ -55,8 +55,12 @@ class _Load(_Noun):
     def __post_init__(self):
         """As in a file: a direction that is not given is that of the force."""
         if self.direction is None:
-            length = numpy.linalg.norm(self.force_n) if numpy.shape(self.force_n) == (3,) else 0.0
-            self.direction = numpy.asarray(self.force_n, float) / length if length > 0 else numpy.array([0.0, 0.0, -1.0])
+            try:
+                force_n = numpy.asarray(self.force_n, float)
+            except (TypeError, ValueError):  # said by its place when the recording is used
+                force_n = numpy.zeros(3)
+            length = numpy.linalg.norm(force_n) if force_n.shape == (3,) else 0.0
+            self.direction = force_n / length if length > 0 else numpy.array([0.0, 0.0, -1.0])
 
 
 _bases = {"Identification": _Identification, "Load": _Load}

@@ -71,7 +71,7 @@ _protocol = """
     contact_threshold_n, contact_noise_factor, contact_samples: change of the force that means contact
     slip_sideways_m, slip_friction, slip_force_drop, slip_deeper_m, slip_least_force_n: what means that the tool slid
     changed_share:       of the picture's pixels after a push, beyond which the object did not come back
-    As the options of `palpate push --help`.
+    As the options of `palpate record --help`.
 """
 
 
