@@ -14,8 +14,8 @@ constexpr double nearby_m = 1e-3;           // contacts of tools without a radiu
 
 class CrossCheck {
  public:
-  CrossCheck(Objective& objective, const Optimum& optimum, const Loss& loss, double factor, const OnProgress& progress)
-      : objective_(objective), model_(objective.model()), optimum_(optimum), loss_(loss), progress_(progress),
+  CrossCheck(Objective& objective, const Optimum& optimum, const Loss& loss, double factor, double poisson_std, const OnProgress& progress)
+      : poisson_std_(poisson_std), objective_(objective), model_(objective.model()), optimum_(optimum), loss_(loss), progress_(progress),
         fits_(objective, optimum, loss_, factor, progress) {}
 
   CrossChecks run() {
@@ -37,6 +37,7 @@ class CrossCheck {
     std::erase_if(pushes, [](const StepFlags& steps) { return std::find(steps.begin(), steps.end(), 1) == steps.end(); });
     if (pushes.size() > 1) {
       for (std::size_t p = 0; p < pushes.size() && !fits_.cancelled(); ++p) out.pushes.push_back(fits_.young_of(pushes[p], name_of(pushes[p])));
+      if (!fits_.cancelled()) out.chance_of_pushes = fits_.chance_of_one_young(out.pushes, poisson_std_);
     }
     if (!fits_.cancelled()) compare_sites(pushes, out);
     compare_levels(out);
@@ -131,8 +132,7 @@ class CrossCheck {
     if (!any_low || !any_high || fits_.cancelled()) return;
     out.low_loads = fits_.young_of(low, "low loads");
     if (!fits_.cancelled()) out.high_loads = fits_.young_of(high, "high loads");
-    out.low_steps = std::move(low);
-    out.high_steps = std::move(high);
+    if (!fits_.cancelled()) out.chance_of_loads = fits_.chance_of_one_young({out.low_loads, out.high_loads}, poisson_std_);
   }
 
   void compare_ways(CrossChecks& out) {
@@ -148,8 +148,10 @@ class CrossCheck {
     if (!any || fits_.cancelled()) return;
     out.loading = fits_.young_of(forth, "loading");
     if (!fits_.cancelled()) out.unloading = fits_.young_of(back, "unloading");
+    if (!fits_.cancelled()) out.chance_of_ways = fits_.chance_of_one_young({out.loading, out.unloading}, poisson_std_);
   }
 
+  double poisson_std_;
   Objective& objective_;
   ForwardModel& model_;
   const Optimum& optimum_;
@@ -160,46 +162,9 @@ class CrossCheck {
 
 }  // namespace
 
-CrossChecks cross_check(Objective& objective, const Optimum& optimum, const Loss& loss, double factor, const OnProgress& progress) {
-  return CrossCheck(objective, optimum, loss, factor, progress).run();
-}
-
-double homogeneity_p_value(const std::vector<PartialYoung>& parts, double poisson_std) {
-  double weight_sum = 0, slope = 0;
-  int count = 0;
-  for (const auto& part : parts) {
-    if (!part.usable) continue;
-    const double weight = 1 / (part.std * part.std + contact_model_std * contact_model_std);
-    weight_sum += weight;
-    slope += weight * part.slope;
-    ++count;
-  }
-  if (count < 2) return 1;
-  slope /= weight_sum;
-  double sum = 0, mean = 0, squares = 0;
-  for (const auto& part : parts) {
-    if (!part.usable) continue;
-    const double by_poisson = (part.slope - slope) * poisson_std;
-    const double weight = 1 / (part.std * part.std + contact_model_std * contact_model_std + by_poisson * by_poisson);
-    sum += weight;
-    mean += weight * part.log_young;
-    squares += weight * part.log_young * part.log_young;
-  }
-  return chi_square_tail(std::max(0.0, squares - mean * mean / sum), count - 1);
-}
-
-double chi_square_tail(double value, int degrees_of_freedom) {
-  if (!(value > 0)) return 1;
-  // Regularised incomplete gamma function Q(k/2, x/2): recurrence upwards from k = 1 or 2 (Abramowitz and Stegun 26.4.6-7).
-  const double half = 0.5 * value;
-  const bool odd = degrees_of_freedom % 2 == 1;
-  double tail = odd ? std::erfc(std::sqrt(half)) : std::exp(-half);
-  double term = odd ? 2 * std::sqrt(half / EIGEN_PI) * std::exp(-half) : half * std::exp(-half);
-  for (int k = odd ? 3 : 4; k <= degrees_of_freedom; k += 2) {
-    tail += term;
-    term *= half / (0.5 * k);
-  }
-  return std::min(tail, 1.0);
+CrossChecks cross_check(Objective& objective, const Optimum& optimum, const Loss& loss, double factor, double poisson_std,
+                        const OnProgress& progress) {
+  return CrossCheck(objective, optimum, loss, factor, poisson_std, progress).run();
 }
 
 }  // namespace palpate::estimation

@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "palpate/core/error.hpp"
-#include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/homogeneity.hpp"
 #include "palpate/estimation/error_budget.hpp"
 #include "palpate/estimation/exact_inputs.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"

@@ -43,6 +43,15 @@ double largest_share(const BudgetEntry& entry) {
 
 }  // namespace
 
+MatrixX with_bounded_poisson(MatrixX information, const std::vector<int>& moving, double poisson_std) {
+  const auto nu = std::find(moving.begin(), moving.end(), static_cast<int>(poisson));
+  if (nu == moving.end() || !(poisson_std > 0)) return information;
+  const Index at = static_cast<Index>(nu - moving.begin());
+  const double unbounded = information.ldlt().solve(VectorX::Unit(information.rows(), at))(at), bounded = poisson_std * poisson_std;
+  if (bounded < unbounded) information(at, at) += 1 / bounded - 1 / unbounded;
+  return information;
+}
+
 void sort_by_share(std::vector<BudgetEntry>& budget) {
   std::stable_sort(budget.begin(), budget.end(), [](const auto& a, const auto& b) { return largest_share(a) > largest_share(b); });
 }

@@ -16,6 +16,11 @@ namespace palpate::estimation {
 std::vector<BudgetEntry> error_budget(const Unknowns& unknowns, const MatrixX& hessian, const std::vector<int>& moving,
                                       const std::vector<std::string>& regions);
 
+/// The same information where nu's bounds cut its distribution: nu's standard deviation is what is left of it, so that no entry of
+/// the budget can be larger than the interval that it is a part of.
+/// @param information  of the unknowns `moving`
+MatrixX with_bounded_poisson(MatrixX information, const std::vector<int>& moving, double poisson_std);
+
 /// The largest share in any region's E first.
 void sort_by_share(std::vector<BudgetEntry>& budget);
 

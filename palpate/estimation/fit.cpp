@@ -337,9 +337,10 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   answer.fit.chi2_per_dof = summary.chi2_per_dof;
   answer.steps = step_fits(objective);
   add_bands(answer.steps, objective, covariance, moving);
-  answer.budget = error_budget(unknowns, hessian, moving, object.region_names);
 
   const Posterior posterior = explore_posterior(objective, optimum, loss, factor, progress);
+  answer.budget = error_budget(unknowns, posterior.cancelled ? hessian : with_bounded_poisson(hessian, moving, posterior.poisson_std()), moving,
+                               object.region_names);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;
     answer.message = "stopped by the caller";
@@ -406,7 +407,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     if (doubts.unrecorded_slip && doubts.unrecorded_slip->p_value < very_rare) answer.slip = doubts.unrecorded_slip;
   }
   if (options.cross_checks && optimum.termination == Termination::converged) {
-    checks = cross_check(objective, optimum, loss, factor, progress);
+    checks = cross_check(objective, optimum, loss, factor, answer.parameters[1].std, progress);
     if (checks.cancelled) return stopped();
     certificate = model.certify(optimum.unknowns);
     answer.budget_if = doubts.budget_if;
@@ -419,7 +420,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
     // Six more fits of non-linear laws: unasked only where they take about as long as the answer did.
     constexpr Index most_nodes_solved = 40000;
     const bool cheap = object.mesh.nodes_m.rows() * static_cast<Index>(model.step_count()) <= most_nodes_solved;
-    if (options.compare_laws || (cheap && drifts_with_load(checks, answer.parameters[1].std))) {
+    if (options.compare_laws || (cheap && drifts_with_load(checks))) {
       LawComparison compared = compare_laws(recording, object, inputs, options, unknowns, optimum, progress);
       if (compared.cancelled) return stopped();
       answer.laws = std::move(compared.laws);

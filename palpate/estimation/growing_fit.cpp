@@ -139,7 +139,6 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   const MatrixX hessian = information(moving, moving);
   const MatrixX covariance = hessian.ldlt().solve(MatrixX::Identity(hessian.rows(), hessian.cols()));
   answer.nuisances = nuisances_from(objective, optimum, covariance, moving);
-  answer.budget = error_budget(unknowns, hessian, moving, object.region_names);
   const FitSummary summary = summary_of(unknowns, optimum, residuals);
   answer.fit.points_used = summary.points_used;
   answer.fit.rms_m = summary.rms_m;
@@ -156,6 +155,8 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
 
   objective.set_reuse(search_reuse, false);
   const Posterior posterior = explore_posterior(objective, optimum, optimum.loss, factor, progress);
+  answer.budget = error_budget(unknowns, posterior.cancelled ? hessian : with_bounded_poisson(hessian, moving, posterior.poisson_std()), moving,
+                               object.region_names);
   if (posterior.cancelled) {
     answer.termination = Termination::cancelled;
     answer.message = "stopped by the caller";

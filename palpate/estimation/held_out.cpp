@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/region_at.hpp"
+
 namespace palpate::estimation {
 namespace {
 
@@ -118,6 +120,14 @@ bool is_force_driven(const Step& step) {
   return std::any_of(step.loads.begin(), step.loads.end(), [](const Load& load) { return load.force_n && load.force_n->norm() > 0; });
 }
 
+/// log E of the region that the first load of some steps presses.
+double log_young_where(const ForwardModel& model, const StepFlags& some, const VectorX& unknowns) {
+  int region = 0;
+  for (std::size_t s = some.size(); s-- > 0;)
+    if (some[s] != 0 && is_force_driven(model.step(s))) region = region_at(model.object(), model.step(s).loads.front().contact_m);
+  return unknowns(log_young) + (region > 0 ? unknowns(first_ratio + region - 1) : 0);
+}
+
 /// And the unloaded steps of the same pushes.
 StepFlags with_unloaded_steps(const ForwardModel& model, const StepFlags& some) {
   StepFlags out = some;
@@ -203,13 +213,17 @@ HeldOut hold_out(PartialFits& fits, const LeftOut& left_out, const std::vector<P
     if (reactions.read2_n2 > 0) sums.add_force(reactions.error2_n2 / reactions.read2_n2);
     if (!force_driven) continue;
     // Statics depend on F / E: the force that would bend the object as seen is the measured one times E of the others over E
-    // of this part alone. What the push's unloaded steps say of pose and shape serves both.
+    // of this part alone, both at the others' nu and where it is pressed. What the push's unloaded steps say of pose and shape serves both.
     const bool known = left_out.whole_pushes && left_out.push[k] < pushes.size();
     fits.objective().hold_ratios(true);  // of regions: the part's E is the factor on all of them
     const PartialYoung young = known ? pushes[left_out.push[k]] : fits.young_of(with_unloaded_steps(model, held), "");
     fits.objective().hold_ratios(false);
     if (fits.cancelled()) return out;
-    if (young.usable) sums.add_force(std::pow(std::exp(others.unknowns(log_young) - young.log_young) - 1, 2));
+    if (!young.usable) continue;
+    const double there = log_young_where(model, held, others.unknowns), here = log_young_where(model, held, fits.optimum().unknowns);
+    const double own = here + young.log_young - fits.optimum().unknowns(log_young) +
+                       young.slope * (others.unknowns(poisson) - fits.optimum().unknowns(poisson));
+    sums.add_force(std::pow(std::exp(there - own) - 1, 2));
   }
   out.available = sums.predicted.count > 0 || sums.forces > 0;
   out.surface_rms_m = sums.predicted.rms_m();

@@ -17,14 +17,14 @@ double extent_m(const Points& vertices_m, const Vec3& direction) {
   return along.maxCoeff() - along.minCoeff();
 }
 
-YoungAtLoad at_farthest(const PartialYoung& young, const StepFlags& some, const ForwardModel& model, const std::vector<StepFit>& steps) {
+YoungAtLoad at_farthest(const PartialYoung& young, const ForwardModel& model, const std::vector<StepFit>& steps) {
   YoungAtLoad out;
   out.young = parameter_of(young);
   const auto raise = [](double& to, double value) {
     if (std::isfinite(value) && !(to >= value)) to = value;
   };
-  for (std::size_t s = 0; s < std::min(some.size(), steps.size()); ++s) {
-    if (some[s] == 0 || load_of(model.step(s)) == 0) continue;
+  for (std::size_t s = 0; s < std::min(young.steps.size(), steps.size()); ++s) {
+    if (young.steps[s] == 0 || load_of(model.step(s)) == 0) continue;
     const Load& load = model.step(s).loads.front();
     const double travel_m = load.travel_m ? *load.travel_m : steps[s].travel_predicted_m;
     raise(out.force_n, load.force_n ? load.force_n->norm() : std::abs(steps[s].force_predicted_n));
@@ -37,14 +37,13 @@ YoungAtLoad at_farthest(const PartialYoung& young, const StepFlags& some, const 
 
 }  // namespace
 
-bool drifts_with_load(const CrossChecks& checks, double poisson_std) {
-  return checks.low_loads.usable && checks.high_loads.usable &&
-         homogeneity_p_value({checks.low_loads, checks.high_loads}, poisson_std) < rare;
+bool drifts_with_load(const CrossChecks& checks) {
+  return checks.low_loads.usable && checks.high_loads.usable && checks.chance_of_loads < rare;
 }
 
 std::vector<YoungAtLoad> young_by_load(const CrossChecks& checks, const ForwardModel& model, const std::vector<StepFit>& steps) {
   if (!checks.low_loads.usable || !checks.high_loads.usable) return {};
-  return {at_farthest(checks.low_loads, checks.low_steps, model, steps), at_farthest(checks.high_loads, checks.high_steps, model, steps)};
+  return {at_farthest(checks.low_loads, model, steps), at_farthest(checks.high_loads, model, steps)};
 }
 
 }  // namespace palpate::estimation

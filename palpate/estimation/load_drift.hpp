@@ -9,7 +9,7 @@
 namespace palpate::estimation {
 
 /// Low and high loads ask for different E, beyond what their intervals allow.
-bool drifts_with_load(const CrossChecks& checks, double poisson_std);
+bool drifts_with_load(const CrossChecks& checks);
 
 /// E of the low and of the high loads, and how far these deform the object; empty where pushes have one level only.
 /// @param steps  of the answer

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/homogeneity.hpp"
+
 namespace palpate::estimation {
 namespace {
 
@@ -61,6 +63,7 @@ Optimum PartialFits::refit(const StepFlags& steps, bool hold_poisson) {
 PartialYoung PartialFits::young_of(const StepFlags& steps, const std::string& name) {
   PartialYoung out;
   out.name = name;
+  out.steps = steps;
   const Optimum part = refit(steps, true);
   if (cancelled_ || !part.evaluation.usable || part.termination == Termination::failed) return out;
   const MatrixX information = part.evaluation.information(factor_);
@@ -69,14 +72,41 @@ PartialYoung PartialFits::young_of(const StepFlags& steps, const std::string& na
     if (k != poisson) others.push_back(k);
   }
   const Eigen::LDLT<MatrixX> factorised(information(others, others));
-  const VectorX unit = VectorX::Unit(static_cast<Index>(others.size()), 0);
-  const double variance = factorised.solve(unit)(0);
+  out.gain = VectorX::Zero(information.rows());
+  const VectorX gain = factorised.solve(VectorX::Unit(static_cast<Index>(others.size()), 0));
+  out.gain(others) = gain;
+  const double variance = out.gain(log_young);
   out.log_young = part.unknowns(log_young);
   out.std = std::sqrt(std::max(variance, 0.0));
   out.slope = -factorised.solve(VectorX(information.col(poisson)(others)))(0);
   // A part that says nothing about E leaves it where it was: no evidence either way.
   out.usable = std::isfinite(variance) && variance > 0 && out.std < 0.5;
   return out;
+}
+
+double PartialFits::chance_of_one_young(const std::vector<PartialYoung>& all, double poisson_std) {
+  std::vector<const PartialYoung*> parts;
+  for (const PartialYoung& part : all)
+    if (part.usable) parts.push_back(&part);
+  const Index count = static_cast<Index>(parts.size());
+  if (count < 2) return 1;
+  VectorX young(count);
+  MatrixX covariance(count, count);
+  for (Index p = 0; p < count; ++p) {
+    const PartialYoung& one = *parts[static_cast<std::size_t>(p)];
+    young(p) = one.log_young;
+    for (Index q = 0; q <= p; ++q) {
+      const PartialYoung& other = *parts[static_cast<std::size_t>(q)];
+      StepFlags common(one.steps.size());
+      for (std::size_t s = 0; s < common.size(); ++s) common[s] = one.steps[s] != 0 && other.steps[s] != 0;
+      Loss loss = loss_;
+      loss.steps = std::move(common);
+      const MatrixX shared = objective_.assemble(joint_rows_, optimum_.unknowns, loss).information(factor_);  // priors included
+      covariance(p, q) = (p == q ? one.std * one.std : one.gain.dot(shared * other.gain)) + one.slope * other.slope * poisson_std * poisson_std;
+      covariance(q, p) = covariance(p, q);
+    }
+  }
+  return homogeneity_p_value(young, covariance);
 }
 
 }  // namespace palpate::estimation

@@ -9,20 +9,22 @@
 
 namespace palpate::estimation {
 
+/// Steps that count, one flag each.
+using StepFlags = std::vector<char>;
+
 /// log E of some steps alone, everything else but nu free under its prior.
 struct PartialYoung {
   std::string name;
+  StepFlags steps;
   double log_young = 0, std = 0;  ///< std: nu known
   double slope = 0;               ///< d log E / d nu
+  VectorX gain;                   ///< d log E / d what the data say of each unknown: log E's covariance with all of them
   bool usable = false;
   bool cancelled = false;
 };
 
 /// As answers list it: the part's name is the region.
 Parameter parameter_of(const PartialYoung& young);
-
-/// Steps that count, one flag each.
-using StepFlags = std::vector<char>;
 
 class PartialFits {
  public:
@@ -33,6 +35,9 @@ class PartialFits {
   /// Where the fit of some steps alone ends.
   Optimum refit(const StepFlags& steps, bool hold_poisson);
   PartialYoung young_of(const StepFlags& steps, const std::string& name);
+  /// Chance that parts which have one E differ at least as much as these do. What they share errs in all of them together: priors
+  /// (of the scale of a force, a density), unloaded steps, and nu, which is known to `poisson_std`.
+  double chance_of_one_young(const std::vector<PartialYoung>& parts, double poisson_std);
   bool cancelled() const { return cancelled_; }
 
   Objective& objective() { return objective_; }

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/homogeneity.hpp"
 
 namespace palpate::estimation {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "palpate/core/quantity.hpp"
-#include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/homogeneity.hpp"
 
 namespace palpate::estimation {
 namespace {

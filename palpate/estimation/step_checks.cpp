@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "palpate/estimation/cell_sums.hpp"
-#include "palpate/estimation/cross_check.hpp"
+#include "palpate/estimation/held_out.hpp"
+#include "palpate/estimation/homogeneity.hpp"
 #include "palpate/estimation/region_at.hpp"
 #include "palpate/estimation/slips.hpp"
 
@@ -117,6 +118,18 @@ std::optional<int> unknown_named(const Unknowns& unknowns, const std::string& na
   return std::nullopt;
 }
 
+/// Whether tools go on with what they did: the same force, or the same motion where that is imposed.
+bool is_held(const std::vector<Load>& before, const std::vector<Load>& after) {
+  constexpr double same = 0.01;
+  const auto same_load = [](const Load& one, const Load& other) {
+    const bool forced = one.force_n.has_value();
+    if (one.tool != other.tool || forced != other.force_n.has_value() || (!forced && one.travel_m.has_value() != other.travel_m.has_value())) return false;
+    if (forced) return (*other.force_n - *one.force_n).norm() <= same * one.force_n->norm();
+    return !one.travel_m || std::abs(*other.travel_m - *one.travel_m) <= same * std::abs(*one.travel_m);
+  };
+  return std::equal(before.begin(), before.end(), after.begin(), after.end(), same_load);
+}
+
 bool concerns(const std::vector<TermRows>& rows, int unknown) {
   return std::any_of(rows.begin(), rows.end(), [&](const TermRows& term) {
     return std::find(term.unknowns.begin(), term.unknowns.end(), unknown) != term.unknowns.end();
@@ -155,20 +168,13 @@ std::optional<StepChange> object_motion(const Objective& objective, const Optimu
 }
 
 std::optional<StepChange> settling(const Objective& objective, const Optimum& optimum, double factor) {
-  constexpr double same_load = 0.01;
   const ForwardModel& model = objective.model();
-  const auto force_n = [&](std::size_t s) {
-    Vec3 sum = Vec3::Zero();
-    for (const Load& load : model.step(s).loads) sum += load.force_n.value_or(Vec3::Zero());
-    return sum;
-  };
   Rarest rarest;
   for (std::size_t from = 0; from < model.step_count(); ++from) {
-    const Vec3 held_n = force_n(from);
-    if (held_n.norm() == 0 || !has_rows(objective, from)) continue;
+    if (load_of(model.step(from)) == 0 || !has_rows(objective, from)) continue;
     std::size_t last = from;
     while (last + 1 < model.step_count() && model.index(last + 1).push == model.index(from).push && has_rows(objective, last + 1) &&
-           (force_n(last + 1) - held_n).norm() < same_load * held_n.norm()) {
+           is_held(model.step(from).loads, model.step(last + 1).loads)) {
       ++last;
     }
     if (last == from) continue;
@@ -223,7 +229,7 @@ PatchPressure highest_pressure(const Objective& objective, const Optimum& optimu
       const int region = region_at(model.object(), load.contact_m);
       const double log_ratio = region > 0 ? optimum.unknowns(first_ratio + region - 1) : 0;
       const double over_young = pressure_pa / std::exp(optimum.unknowns(log_young) + log_ratio);
-      if (over_young > highest.over_young) highest = {over_young, s};
+      if (over_young > highest.over_young) highest = {over_young, s, region};
     }
   }
   return highest;

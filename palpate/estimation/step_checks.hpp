@@ -43,6 +43,7 @@ Pattern residual_pattern(const Objective& objective, const Loss& loss);
 struct PatchPressure {
   double over_young = 0;
   std::size_t step = 0;
+  int region = 0;  ///< that is pressed
 };
 PatchPressure highest_pressure(const Objective& objective, const Optimum& optimum);
 

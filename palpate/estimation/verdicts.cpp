@@ -81,9 +81,18 @@ void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
                          "pushes by how much they would narrow it."});
     }
   }
-  if (determined && (in.optimum.poisson_at_lower || in.optimum.poisson_at_upper)) {
-    out.push_back({"nu_at_bound", "The best Poisson ratio lies at the end of its allowed range (" +
-                                      number(in.optimum.poisson_at_lower ? nu.lower : nu.upper, "{:.4g}") +
+  std::optional<double> end;
+  std::string of_region;
+  if (in.optimum.poisson_at_lower || in.optimum.poisson_at_upper) end = in.optimum.poisson_at_lower ? nu.lower : nu.upper;
+  const Unknowns& unknowns = in.objective.unknowns();
+  for (int k = unknowns.first_own_poisson(); k < unknowns.parameter_count() && !end; ++k) {
+    const double own = in.optimum.unknowns(k);
+    if (own > unknowns[k].lower && own < unknowns[k].upper) continue;
+    end = own;
+    of_region = " of region '" + in.objective.model().object().region_names.at(static_cast<std::size_t>(1 + k - unknowns.first_own_poisson())) + "'";
+  }
+  if (determined && end) {
+    out.push_back({"nu_at_bound", "The best Poisson ratio" + of_region + " lies at the end of its allowed range (" + number(*end, "{:.4g}") +
                                       "). If the material is not known to be like that, the model or the supports are "
                                       "likely wrong."});
   }
@@ -142,15 +151,15 @@ void judge_nuisances(const VerdictInput& in, std::vector<Verdict>& out) {
 }
 
 void judge_state(const VerdictInput& in, std::vector<Verdict>& out) {
-  int inverted = 0;
+  int inverted = 0;  // of the step that has most of them
   const auto& predictions = in.objective.last_predictions();
   for (std::size_t s = 0; s < predictions.size(); ++s) {
     const int known = predictions[s].inverted_elements;
-    inverted += known >= 0 ? known : in.objective.model().inverted_elements(s, in.optimum.unknowns);
+    inverted = std::max(inverted, known >= 0 ? known : in.objective.model().inverted_elements(s, in.optimum.unknowns));
   }
   if (inverted > 0 && in.answer.material == "linear") {
     out.push_back({"beyond_small_strain",
-                   "In the largest steps " + std::to_string(inverted) +
+                   "In the hardest step " + std::to_string(inverted) +
                        " elements are strained beyond what small-strain elasticity can describe. Unless the object is known "
                        "to be linear, fit neo_hookean, or use smaller forces."});
   } else if (inverted > 0) {
@@ -171,7 +180,8 @@ std::string better_law(const Identification& answer) {
   if (best == nullptr) return "try another law (foam softens; `palpate estimate --compare-laws` fits them all, which takes its time on this mesh)";
   std::string others;
   for (const LawFit& each : answer.laws)
-    if (each.law != answer.material) others += (others.empty() ? "`" : ", `") + each.law + "`";
+    if (each.law != answer.material && each.usable) others += (others.empty() ? "`" : ", `") + each.law + "`";
+  if (others.empty()) return "no other law could be fitted to these data";
   if (best->law == answer.material) return "of the laws " + others + " none predicts the highest loads better from the lower ones";
   return "of the laws that were fitted to the same data (`" + answer.material + "`, " + others + ") `" + best->law +
          "` predicts the highest loads best from the lower ones, with E " + quantity(best->young_modulus_pa, "Pa") + " and nu " +
@@ -179,12 +189,8 @@ std::string better_law(const Identification& answer) {
 }
 
 void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
-  double poisson_std = 0;
-  for (const auto& parameter : in.answer.parameters) {
-    if (parameter.name == "poisson_ratio") poisson_std = parameter.std;
-  }
-  const bool regions = in.objective.unknowns().ratio_count() > 0;
-  if (regions && homogeneity_p_value(in.checks.pushes, poisson_std) < rare) {
+  const bool regions = in.objective.unknowns().ratio_count() > 0, pushes_differ = in.checks.chance_of_pushes < rare;
+  if (regions && pushes_differ) {
     out.push_back({"not_homogeneous",
                    "The pushes disagree even with a stiffness for each region: a region is not the same everywhere, its border "
                    "lies elsewhere, or a contact point or support is wrong."});
@@ -197,24 +203,21 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
                    "One E does not explain all places that were pushed: the residuals ask for about " + around +
                        ". The object is not the same everywhere (fit each part its own E: give the regions, or `--regions by-site`), or a "
                        "contact point or support is wrong."});
-  } else if (homogeneity_p_value(in.checks.pushes, poisson_std) < rare) {
+  } else if (pushes_differ) {
     const PartialYoung *softest = nullptr, *stiffest = nullptr;
     for (const auto& part : in.checks.pushes) {
       if (!part.usable) continue;
       if (softest == nullptr || part.log_young < softest->log_young) softest = &part;
       if (stiffest == nullptr || part.log_young > stiffest->log_young) stiffest = &part;
     }
+    const auto at = [](const PartialYoung& part) { return quantity(std::exp(part.log_young), "Pa") + " (" + part.name + ")"; };
     out.push_back({"not_homogeneous",
-                   "The pushes do not agree on one E: from " + quantity(std::exp(softest->log_young), "Pa") + " (" + softest->name +
-                       ") to " + quantity(std::exp(stiffest->log_young), "Pa") + " (" + stiffest->name +
-                       "), more than their intervals allow. The object is not the same everywhere, or a contact point or "
-                       "support is wrong; look at E by push."});
+                   std::string("The pushes do not agree on one E") +
+                       (softest != stiffest ? ": from " + at(*softest) + " to " + at(*stiffest) + ", more than noise allows" : "") +
+                       ". The object is not the same everywhere, or a contact point or support is wrong; look at E by push."});
   }
-  const auto differ = [&](const PartialYoung& a, const PartialYoung& b) {
-    return a.usable && b.usable && homogeneity_p_value({a, b}, poisson_std) < rare;
-  };
   const auto ratio = [](const PartialYoung& a, const PartialYoung& b) { return number(std::exp(a.log_young - b.log_young)); };
-  if (drifts_with_load(in.checks, poisson_std)) {
+  if (drifts_with_load(in.checks)) {
     const bool softens = in.checks.high_loads.log_young < in.checks.low_loads.log_young;
     out.push_back({"not_linear",
                    "E drifts with the load: the higher half of the loads gives " + ratio(in.checks.high_loads, in.checks.low_loads) +
@@ -222,7 +225,7 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
                        " beyond what the law `" + in.answer.material +
                        "` describes. For small strains believe the lower loads; " + better_law(in.answer) + "."});
   }
-  if (differ(in.checks.loading, in.checks.unloading)) {
+  if (in.checks.loading.usable && in.checks.unloading.usable && in.checks.chance_of_ways < rare) {
     out.push_back({"hysteresis", "Unloading gives " + ratio(in.checks.unloading, in.checks.loading) +
                                      " times the E of loading: the object creeps, or the tool slipped. Wait longer at each "
                                      "step, or press more slowly."});
@@ -293,6 +296,12 @@ void judge_doubts(const VerdictInput& in, bool slipped, std::vector<Verdict>& ou
   }
 }
 
+bool young_is_determined(const Identification& answer, int region) {
+  for (const auto& parameter : answer.parameters)
+    if (parameter.name == "young_modulus" && region-- == 0) return parameter.determined;
+  return false;
+}
+
 void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
   const ForwardModel& model = in.objective.model();
   const double factor = in.residuals.points > 0 ? tukey_information_factor(in.optimum.loss.tukey) : 1;
@@ -321,7 +330,11 @@ void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
   judge_doubts(in, slipped, out);  // a slip looks like a contact elsewhere
   const auto settled = settling(in.objective, in.optimum, factor);
   if (settled && settled->p_value < very_rare && settled->size > least_settling) {
-    out.push_back({"not_settled", "While the load stayed the same up to " + where(settled->step) + ", the object went on giving way: E fell by " +
+    const auto& loads = model.step(settled->step).loads;
+    const bool moved_only = std::none_of(loads.begin(), loads.end(), [](const Load& load) { return load.force_n.has_value(); });
+    out.push_back({"not_settled", (moved_only ? "While the tool stayed where it was up to " + where(settled->step) + ", the force went on falling"
+                                              : "While the load stayed the same up to " + where(settled->step) + ", the object went on giving way") +
+                                      ": E fell by " +
                                       number(100 * settled->size, "{:.2g}") + " %. Wait longer at each step, until it stands still."});
   }
   const Pattern pattern = residual_pattern(in.objective, in.optimum.loss);
@@ -332,7 +345,7 @@ void judge_steps(const VerdictInput& in, std::vector<Verdict>& out) {
                        "where it follows the object's shape, the rest shape, a support or the material is not as modelled."});
   }
   const PatchPressure pressure = highest_pressure(in.objective, in.optimum);
-  if (pressure.over_young > largest_pressure) {
+  if (pressure.over_young > largest_pressure && young_is_determined(in.answer, pressure.region)) {
     out.push_back({"pressure_beyond_model", "At " + where(pressure.step) + " the mean pressure under the tool is " +
                                                 number(pressure.over_young, "{:.2g}") +
                                                 " times E: a patch of even pressure is then no picture of how the tool touches. Believe "

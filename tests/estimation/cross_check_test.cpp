@@ -8,6 +8,8 @@
 
 #include <cmath>
 
+#include "palpate/estimation/homogeneity.hpp"
+
 #include "pushed_block.hpp"
 
 namespace palpate::estimation {
@@ -157,6 +159,34 @@ TEST(CrossCheck, SitesHoldAllTheirPushes) {
   EXPECT_TRUE(fit(recording, coarse_block(), inputs, {}).per_site.empty());
 }
 
+/// A sensor whose scale is hardly known is wrong by the same share at low and at high loads, in one push and the next.
+class CrossCheckOfScale : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(KnownTo, CrossCheckOfScale, testing::Values(0.0, 0.05, 0.3));
+
+TEST_P(CrossCheckOfScale, HidesNoMaterialThatStiffens) {
+  Recording recording = pushed_block_recording();
+  recording.force_scale_std = GetParam();
+  PushedBlock soft, stiff;
+  stiff.young_pa = 1.25 * soft.young_pa;
+  Inputs inputs = clouds_of(soft);
+  inputs[1] = clouds_of(stiff)[1];
+  EXPECT_TRUE(says(fit(recording, coarse_block(), inputs, {}), "not_linear"));
+  EXPECT_FALSE(says(fit(recording, coarse_block(), clouds_of(soft), {}), "not_linear"));
+}
+
+TEST_P(CrossCheckOfScale, HidesNoBodyThatDiffers) {
+  Recording recording = pushed_block_recording();
+  recording.force_scale_std = GetParam();
+  recording.pushes.push_back(recording.pushes[0]);
+  recording.pushes[1].name = "again";
+  PushedBlock soft, stiff;
+  stiff.young_pa = 1.25 * soft.young_pa;
+  stiff.seed = 8;
+  Inputs inputs = clouds_of(soft);
+  for (auto& step : clouds_of(stiff)) inputs.push_back(step);
+  EXPECT_TRUE(says(fit(recording, coarse_block(), inputs, {}), "not_homogeneous"));
+}
+
 TEST(CrossCheck, MaterialThatStiffensBeyondItsLawIsCalledSo) {
   Recording recording = pushed_block_recording();
   PushedBlock soft, stiff;
@@ -191,14 +221,14 @@ TEST(CochranQ, IsTheChiSquareTestOfWeightedMeans) {
   EXPECT_NEAR(chi_square_tail(24.725, 11), 0.01, 1e-4);
   EXPECT_EQ(chi_square_tail(0, 3), 1);
 
-  PartialYoung a{"a", std::log(1.0), 0.05, 0, true}, b{"b", std::log(1.1), 0.05, 0, true};
-  const double difference = std::log(1.1) / std::sqrt(2 * (0.05 * 0.05 + 0.02 * 0.02));
-  EXPECT_NEAR(homogeneity_p_value({a, b}, 0), std::erfc(difference / std::sqrt(2.0)), 1e-9);
-  // What a common nu would explain is no evidence.
-  b.slope = 2;
-  EXPECT_GT(homogeneity_p_value({a, b}, 0.05), homogeneity_p_value({a, b}, 0));
-  b.usable = false;
-  EXPECT_EQ(homogeneity_p_value({a, b}, 0), 1);
+  const VectorX apart = (VectorX(2) << 0, std::log(1.1)).finished();
+  MatrixX covariance = MatrixX::Identity(2, 2) * 0.05 * 0.05;
+  const auto chance = [&](double of_one) { return std::erfc(std::log(1.1) / std::sqrt(2 * of_one) / std::sqrt(2.0)); };
+  EXPECT_NEAR(homogeneity_p_value(apart, covariance), chance(0.05 * 0.05 + 0.02 * 0.02), 1e-9);
+  // What both are wrong by together is no reason to agree.
+  covariance.array() += 0.3 * 0.3;
+  EXPECT_NEAR(homogeneity_p_value(apart, covariance), chance(0.05 * 0.05 + 0.02 * 0.02), 1e-9);
+  EXPECT_EQ(homogeneity_p_value(apart.head(1), covariance.topLeftCorner(1, 1)), 1);
 }
 
 }  // namespace

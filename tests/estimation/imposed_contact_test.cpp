@@ -220,5 +220,22 @@ TEST(ImposedContact, WhatCannotBeUsedIsSaidByItsField) {
   EXPECT_NE(said->message.find("radius_std_m"), std::string::npos) << said->message;
 }
 
+// A tool that stands still while the object relaxes: the force falls and nothing moves.
+TEST(HeldTool, ThatIsPushedBackLessAndLessHasNotSettled) {
+  Recording held = bent_block(ContactLaw::frictionless);
+  auto& steps = held.pushes[0].steps;
+  steps.assign(4, steps.back());
+  Inputs still = wrenches_of(held), relaxing = still;
+  for (std::size_t s = 0; s < relaxing.size(); ++s) std::get<Wrench>(relaxing[s][0]).force_n *= std::exp(-0.03 * static_cast<double>(s));
+  const auto said = [&](const Inputs& inputs) {
+    std::string message;
+    for (const auto& verdict : fitted(held, inputs, true).verdicts)
+      if (verdict.code == "not_settled") message = verdict.message;
+    return message;
+  };
+  EXPECT_EQ(said(still), "");
+  EXPECT_NE(said(relaxing).find("the force went on falling: E fell by 8.6 %"), std::string::npos) << said(relaxing);
+}
+
 }  // namespace
 }  // namespace palpate::estimation

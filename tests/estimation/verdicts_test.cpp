@@ -137,6 +137,17 @@ TEST(PoissonAtBound, IsSaidAtEitherEnd) {
   EXPECT_NE(message(nu_within(0.25, 0.45, 0.05), "nu_at_bound").find("(0.25)"), std::string::npos);
 }
 
+TEST(PoissonAtBound, NoPartOfTheBudgetIsLargerThanTheWhole) {
+  const Identification answer = nu_within(0.24, 0.25, 0.42);
+  const Parameter& young = parameter(answer, "young_modulus");
+  const Parameter& nu = parameter(answer, "poisson_ratio");
+  ASSERT_FALSE(answer.budget.empty());
+  for (const auto& entry : answer.budget) {
+    EXPECT_LE(entry.young_modulus_percent, 105 * young.std / young.value) << entry.input;
+    EXPECT_LE(entry.poisson_shift, 1.05 * nu.std) << entry.input;
+  }
+}
+
 TEST(PoissonAtBound, IsNotSaidInside) {
   const Identification answer = nu_within(0.05, 0.45, 0.3);
   EXPECT_TRUE(parameter(answer, "poisson_ratio").determined);
