@@ -63,6 +63,9 @@ IdentifyOptions identify_options(const Options& given, const Session& session) {
   if (!given.material.empty()) options.material = given.material;
   if (!given.element.empty()) options.element = given.element;
   if (!given.refine.empty()) options.refine = given.refine;
+  if (given.poisson_range.size() == 2 && !(0 <= given.poisson_range[0] && given.poisson_range[0] < given.poisson_range[1]))
+    throw Error(fmt::format("must be a range within 0 and 0.4995, the lower end first, is {:g} to {:g}", given.poisson_range[0], given.poisson_range[1]),
+                "--poisson-range");
   if (given.poisson_range.size() == 2) options.poisson_range = {given.poisson_range[0], given.poisson_range[1]};
   if (given.poisson_ratio) options.poisson_fixed = *given.poisson_ratio;
   options.poisson_by_region = given.poisson_by_region;

@@ -80,8 +80,16 @@ double difference_to_calculix(io::ExportModel model, const std::string& law, con
   return (theirs - ours).cwiseAbs().maxCoeff() / ours.cwiseAbs().maxCoeff();
 }
 
+const io::Exporter& exporter_of(const std::string& simulator) {
+  try {
+    return io::exporter_named(simulator);
+  } catch (const Error& error) {
+    throw Error("'" + simulator + "' " + error.message(), "--to");
+  }
+}
+
 int run(const Options& given, Session& session) {
-  const io::Exporter& exporter = io::exporter_named(given.to);
+  const io::Exporter& exporter = exporter_of(given.to);
   must_take_files(given.out);
   const LearnedObject learned = load_learned_object(given.result);
   ExportChoice choice;

@@ -296,7 +296,7 @@ int look(Session& session, const Arguments& given) {
   tell(session, recording, all);
   if (problems.empty()) tell_scatter(session, recording, all);
   for (const std::string& warning : recording.warnings) session.warn(warning);
-  for (const io::Problem& problem : problems) session.warn(fmt::format("wrong      {}: {}", problem.where, problem.what));
+  for (const io::Problem& problem : problems) session.announce(fmt::format("wrong: {}: {}", problem.where, problem.what));
   const std::size_t left_out = all.contains("bag") ? all["bag"]["left_out"].size() : 0;
   if (problems.empty())
     session.say(left_out == 0 ? recording.warnings.empty() ? "nothing is wrong with it" : "it can be used as it is; mind the warnings"

@@ -44,6 +44,8 @@ class ValueChecker {
         const std::string step = at + "steps[" + std::to_string(s) + "].";
         check(push.steps[s], recording.tools, step);
         one_place(push, push.steps[s], recording.tools, step);
+        if (s > 0 && push.steps[s].time_s != 0 && push.steps[s].time_s == push.steps[s - 1].time_s)
+          add(step + "time_s", "is that of the step before; a step counts once");
         if (s > 0 && push.steps[s].time_s < push.steps[s - 1].time_s) add(step + "time_s", "goes back, from that of the step before; order steps by time");
       }
     }
@@ -113,6 +115,7 @@ class ValueChecker {
   }
 
   void check(const Rest& rest) {
+    if (!rest.volume && !rest.surface && rest.views.empty()) add("rest", "has no shape; give a surface, a volume, or views of the object");
     if (rest.volume) {
       finite("rest.volume.nodes_m", rest.volume->nodes_m);
       indices("rest.volume.tetrahedra", rest.volume->tetrahedra, rest.volume->nodes_m.rows());
@@ -238,9 +241,15 @@ class ValueChecker {
     sigma(at + "torque_sigma_nm", wrench.torque_sigma_nm, ranges::torque_sigma);
   }
 
+  static std::string names_of(const std::vector<Tool>& tools) {
+    std::string names;
+    for (const Tool& tool : tools) names += (names.empty() ? "" : ", ") + tool.name;
+    return names;
+  }
   void known(const std::string& where, const std::string& name) {
     const auto is_it = [&](const Tool& tool) { return tool.name == name; };
-    if (std::none_of(tools_->begin(), tools_->end(), is_it)) add(where, "'" + name + "' is no tool of this recording; name one of its tools");
+    if (std::none_of(tools_->begin(), tools_->end(), is_it)) 
+      add(where, fmt::format("'{}' is no tool of this recording; {}", name, tools_->empty() ? "it has none" : "they are " + names_of(*tools_)));
   }
 
   const std::vector<Tool>* tools_ = nullptr;

@@ -142,11 +142,7 @@ void read_push_keys(YamlKeys& keys, const Recording& recording, PlannedPush& pus
     push.tool = tool->text();
     std::vector<std::string> known;
     for (const Tool& one : recording.tools) known.push_back(one.name);
-    if (std::find(known.begin(), known.end(), push.tool) == known.end()) {
-      const auto near = nearest_word(push.tool, known);
-      tool->fail("there is no tool '" + push.tool.substr(0, 60) + "' in 'tools'" +
-                 (near ? "; did you mean '" + *near + "'?" : ""));
-    }
+    if (std::find(known.begin(), known.end(), push.tool) == known.end()) tool->fail_name("tool", "tools", known);
   }
   push.site = keys.text_or("site", push.site);
   if (const auto contact = keys.optional("contact_m")) push.contact_m = contact->vector3();

@@ -25,10 +25,16 @@ const Tool* find_tool(const Recording& recording, const std::string& name) {
   return nullptr;
 }
 
+std::vector<std::string> tool_names(const Recording& recording) {
+  std::vector<std::string> names;
+  for (const Tool& tool : recording.tools) names.push_back(tool.name);
+  return names;
+}
+
 std::string tool_of(YamlKeys& keys, const Step& step, const RecordingContext& context) {
   if (const auto field = keys.optional("tool")) {
     const std::string name = field->text();
-    if (find_tool(context.recording, name) == nullptr) field->fail("there is no tool '" + name + "' in 'tools'");
+    if (find_tool(context.recording, name) == nullptr) field->fail_name("tool", "tools", tool_names(context.recording));
     return name;
   }
   return step.loads.size() == 1 ? step.loads.front().tool : "";
@@ -294,7 +300,11 @@ bool TableRow::is_empty(const std::string& column) const {
 DepthFrame read_depth_frame(YamlKeys& keys, const TableRow* row, const std::string& prefix, RecordingContext& context) {
   const YamlField name = keys.required("camera");
   const auto camera = context.cameras.find(name.text());
-  if (camera == context.cameras.end()) name.fail("there is no camera '" + name.text() + "' in 'cameras'");
+  if (camera == context.cameras.end()) {
+    std::vector<std::string> known;
+    for (const auto& [each, entry] : context.cameras) known.push_back(each);
+    name.fail_name("camera", "cameras", known);
+  }
   const CameraEntry& entry = camera->second;
   DepthFrame frame = entry.frame;
   frame.pose_std_m = keys.within_or("pose_std_m", frame.pose_std_m, ranges::length_std);
@@ -329,13 +339,7 @@ Load read_load(const YamlField& field, const TableRow* row, bool alone, const Re
   const YamlField name = keys.required("tool");
   load.tool = name.text();
   const Tool* tool = find_tool(context.recording, load.tool);
-  if (tool == nullptr) {
-    std::vector<std::string> known;
-    for (const Tool& one : context.recording.tools) known.push_back(one.name);
-    const auto near = nearest_word(load.tool, known);
-    name.fail("there is no tool '" + load.tool.substr(0, 60) + "' in 'tools'" +
-              (near ? "; did you mean '" + *near + "'?" : ""));
-  }
+  if (tool == nullptr) name.fail_name("tool", "tools", tool_names(context.recording));
   const auto number = [&](const char* column) {
     return row != nullptr ? row->number(column_of(*row, load.tool, alone, column)) : std::nullopt;
   };

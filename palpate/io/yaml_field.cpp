@@ -86,6 +86,12 @@ void YamlField::fail_choice(const std::string& word, const std::vector<std::stri
        listed(known));
 }
 
+void YamlField::fail_name(const std::string& kind, const std::string& list, const std::vector<std::string>& known) const {
+  const auto near = nearest_word(text(), known);
+  fail("there is no " + kind + " '" + shortened(text()) + "' in '" + list + "'" +
+       (near ? "; did you mean '" + *near + "'?" : known.empty() ? ", which has none" : "; there are " + listed(known)));
+}
+
 std::string YamlField::text() const {
   if (!node_.IsScalar()) fail("a single word is expected");
   return node_.Scalar();

@@ -62,6 +62,9 @@ class YamlField {
     fail_choice(word, known);
   }
 
+  /// Of a word that is no name in `list` ("tools"), of which each is a `kind` ("tool").
+  [[noreturn]] void fail_name(const std::string& kind, const std::string& list, const std::vector<std::string>& known) const;
+
  private:
   friend class YamlKeys;
   YamlField(YAML::Node node, std::string path, std::shared_ptr<const std::string> file)

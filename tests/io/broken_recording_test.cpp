@@ -417,5 +417,13 @@ TEST_F(BrokenRecording, WindowsLineEndsAreFine) {
   expect_accepted();
 }
 
+TEST_F(BrokenRecording, ANameThatIsNoneSaysWhichThereAre) {
+  const std::string with_camera = index_text.substr(0, index_text.find("pushes:")) + camera_text;
+  folder.put("recording.yaml", replaced(with_camera, "camera: top", "camera: left"));
+  expect_refused("observations[0].camera", "no camera 'left' in 'cameras'; there are top");
+  folder.put("recording.yaml", replaced(with_camera, "tool: tip", "tool: hammer"));
+  expect_refused("loads[0].tool", "no tool 'hammer' in 'tools'; there are tip");
+}
+
 }  // namespace
 }  // namespace palpate::io
