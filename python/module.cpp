@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The functions behind `import palpate`. What users see, with its documentation, is python/palpate/__init__.py.
+#include <algorithm>
 #include <filesystem>
 
 #include "cli/bag_recording.hpp"
@@ -72,8 +73,16 @@ py::list problems(const py::object& given) {
   return list;
 }
 
+/// What is odd and does not stand in `known`, where Python's caller called.
+void warn_of(const std::vector<std::string>& odd, const std::vector<std::string>& known) {
+  const py::object warn = py::module_::import("warnings").attr("warn");
+  for (const std::string& text : odd)
+    if (std::find(known.begin(), known.end(), text) == known.end()) warn(text, py::arg("stacklevel") = 2);
+}
+
 py::object identify_recording(const py::object& given, const py::dict& options, const py::object& progress) {
   Recording recording = recording_of(given);
+  const std::vector<std::string> known = recording.warnings;
   Options from(options);
   const IdentifyOptions asked = identify_options(from);
   from.all_taken();
@@ -83,6 +92,10 @@ py::object identify_recording(const py::object& given, const py::dict& options, 
     if (answer.answer.termination != Termination::cancelled) name_push_for_poisson(recording, answer, asked.fit.threads, told);
     return answer;
   });
+  warn_of(recording.warnings, known);
+  std::vector<std::string> said = known;
+  said.insert(said.end(), recording.warnings.begin(), recording.warnings.end());
+  warn_of(found.object.warnings, said);  // of the shape, once it was filled
   return to_python(found);
 }
 
@@ -145,8 +158,7 @@ py::object export_to(const py::object& found, const std::string& to, const py::o
     io::write_file(out / name, bytes);
     if (name != exporter.main_file) names.push_back(name);
   }
-  const py::object warn = py::module_::import("warnings").attr("warn");
-  for (const std::string& text : exported.warnings) warn(text, py::arg("stacklevel") = 2);  // where export was called
+  warn_of(exported.warnings, {});
   return to_python(names);
 }
 

@@ -96,6 +96,7 @@ def identify(recording: Recording, *, method="palpate", material=None, element=N
     threads:           0: as many as the machine has
     progress:          called with (stage, share done); where it returns False the work stops and `answer.termination` is 'cancelled'
 
+    What is odd (nothing masks the arm, the shape had holes) and does not stand in the recording's `warnings` is said by `warnings.warn`.
     Raises Error where no answer can exist, KeyboardInterrupt on Ctrl-C. Other Python threads go on meanwhile.
     """
     options = dict(method=method, material=material, element=element, refine=refine, regions=regions, poisson_range=poisson_range,

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the Python module is given: what is left out, mistyped or cannot be. Run by ctest like module_test.py."""
 import unittest
+import warnings
 
 import numpy as np
 
@@ -28,6 +29,23 @@ class Options(unittest.TestCase):
         for wrong, right in (("force_limit", "force_limit_n"), ("push_sped_m_s", "push_speed_m_s")):
             with self.assertRaisesRegex(palpate.Error, f"{wrong}: is no option; did you mean '{right}'"):
                 palpate.push(Gantry(), block_on_a_table(), [0.5, 0, 0.05], **{wrong: 1})
+
+
+class Warnings(unittest.TestCase):
+    def test_what_is_odd_is_said_once(self):
+        scene = block_on_a_table()
+        scene.tools[0].shape = "sphere"
+        seen = palpate.Markers(names=["m"], rest_m=[[0.54, 0, 0.5]], observed_m=[[0.54, 0, 0.499]], sigma_m=1e-4)
+        load = palpate.Load(tool="stick", force_n=[0, 0, -10], contact_m=[0.5, 0, 0.5])
+        scene.pushes = [palpate.Push(name="top", steps=[palpate.Step(time_s=1, loads=[load], observations=[seen])])]
+        quick = dict(refine="none", element="tet4", cross_checks=False, poisson_ratio=0.3)
+        with self.assertWarnsRegex(UserWarning, "taken to press all of its radius") as caught:
+            palpate.identify(scene, **quick)
+        self.assertEqual(caught.filename, __file__)
+        scene.warnings = [str(caught.warning)]
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            palpate.identify(scene, **quick)
 
 
 class Refusals(unittest.TestCase):
