@@ -90,20 +90,25 @@ double PartialFits::chance_of_one_young(const std::vector<PartialYoung>& all, do
     if (part.usable) parts.push_back(&part);
   const Index count = static_cast<Index>(parts.size());
   if (count < 2) return 1;
+  const auto known_of = [&](StepFlags steps) {  // priors included
+    Loss loss = loss_;
+    loss.steps = std::move(steps);
+    return objective_.assemble(joint_rows_, optimum_.unknowns, loss).information(factor_);
+  };
+  const MatrixX priors = known_of(StepFlags(joint_rows_.size(), 0));
   VectorX young(count);
   MatrixX covariance(count, count);
   for (Index p = 0; p < count; ++p) {
     const PartialYoung& one = *parts[static_cast<std::size_t>(p)];
     young(p) = one.log_young;
-    for (Index q = 0; q <= p; ++q) {
+    covariance(p, p) = one.std * one.std + std::pow(one.slope * poisson_std, 2);
+    for (Index q = 0; q < p; ++q) {
       const PartialYoung& other = *parts[static_cast<std::size_t>(q)];
       StepFlags common(one.steps.size());
       for (std::size_t s = 0; s < common.size(); ++s) common[s] = one.steps[s] != 0 && other.steps[s] != 0;
-      Loss loss = loss_;
-      loss.steps = std::move(common);
-      const MatrixX shared = objective_.assemble(joint_rows_, optimum_.unknowns, loss).information(factor_);  // priors included
-      covariance(p, q) = (p == q ? one.std * one.std : one.gain.dot(shared * other.gain)) + one.slope * other.slope * poisson_std * poisson_std;
-      covariance(q, p) = covariance(p, q);
+      const bool any = std::find(common.begin(), common.end(), 1) != common.end();
+      const VectorX shared = any ? VectorX(known_of(std::move(common)) * other.gain) : VectorX(priors * other.gain);
+      covariance(p, q) = covariance(q, p) = one.gain.dot(shared) + one.slope * other.slope * poisson_std * poisson_std;
     }
   }
   return homogeneity_p_value(young, covariance);
