@@ -248,7 +248,7 @@ class ValueChecker {
   }
   void known(const std::string& where, const std::string& name) {
     const auto is_it = [&](const Tool& tool) { return tool.name == name; };
-    if (std::none_of(tools_->begin(), tools_->end(), is_it)) 
+    if (std::none_of(tools_->begin(), tools_->end(), is_it))
       add(where, fmt::format("'{}' is no tool of this recording; {}", name, tools_->empty() ? "it has none" : "they are " + names_of(*tools_)));
   }
 
