@@ -93,9 +93,7 @@ py::object identify_recording(const py::object& given, const py::dict& options, 
     return answer;
   });
   warn_of(recording.warnings, known);
-  std::vector<std::string> said = known;
-  said.insert(said.end(), recording.warnings.begin(), recording.warnings.end());
-  warn_of(found.object.warnings, said);  // of the shape, once it was filled
+  warn_of(found.object.warnings, recording.warnings);  // of the shape, once it was filled
   return to_python(found);
 }
 

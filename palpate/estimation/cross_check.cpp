@@ -2,7 +2,6 @@
 #include "palpate/estimation/cross_check.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "palpate/estimation/held_out.hpp"
 
