@@ -118,21 +118,28 @@ std::optional<std::string> unmasked(const Recording& recording) {
   return std::nullopt;
 }
 
-/// Images of a pressed object in which nothing says what is arm.
+/// Images of a pressed object in which nothing says what is arm, or what beside the stick is.
 std::optional<std::string> nothing_masked(const Recording& recording) {
-  if (recording.robot && sensing::has_shapes(*recording.robot)) return std::nullopt;
-  std::size_t images = 0;
+  const bool has_robot = recording.robot && sensing::has_shapes(*recording.robot);
+  std::size_t bare = 0, stick_only = 0;
   for (const Push& push : recording.pushes)
     for (const Step& step : push.steps) {
-      if (step.loads.empty() || !sensing::sticks_of(recording, push, step).empty()) continue;
+      if (step.loads.empty() || (has_robot && !step.joints_rad.empty())) continue;
+      std::size_t& count = sensing::sticks_of(recording, push, step).empty() ? bare : stick_only;
       for (const Observation& one : step.observations)
-        if (const auto* frame = std::get_if<DepthFrame>(&one)) images += frame->mask.size() == 0 && !frame->robot_is_masked;
+        if (const auto* frame = std::get_if<DepthFrame>(&one)) count += frame->mask.size() == 0 && !frame->robot_is_masked;
     }
-  if (images == 0) return std::nullopt;
+  if (has_robot && bare + stick_only > 0)
+    return fmt::format("robot '{}': {} images of the pressed object are of steps without joints_rad, and its description masks nothing in them, {}; "
+                       "what is not masked is taken for the object: record the joints, or give 'mask'; where no arm is in the picture, say "
+                       "robot_is_masked: true",
+                       recording.robot->name, bare + stick_only,
+                       bare == 0 ? std::string("only the stick is masked") : fmt::format("nor is the stick masked in {}", bare));
+  if (bare == 0) return std::nullopt;
   return fmt::format("nothing masks the arm in {} images of the pressed object, and what is not masked is taken for the object: give 'mask', or "
                      "the robot's description with joints, or for a ball or disc the step's T_base_tip; where no arm is in the picture, say "
                      "robot_is_masked: true",
-                     images);
+                     bare);
 }
 
 }  // namespace

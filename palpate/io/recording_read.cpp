@@ -62,7 +62,7 @@ void read_robot(const YamlField& field, RecordingContext& context) {
   const YamlField urdf = keys.required("urdf");
   context.recording.robot = parse_named(urdf.where(), [&] {
     return parse_urdf(context.folder.read(urdf.text(), urdf.where()), context.folder.path_of(urdf.text()),
-                      context.folder.root());
+                      context.folder.root(), &context.recording.warnings);
   });
   if (const auto joints = keys.optional("joints")) {
     for (const YamlField& joint : joints->items()) {

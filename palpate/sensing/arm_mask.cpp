@@ -24,10 +24,7 @@ ArmMask::ArmMask(const Recording& recording) : recording_(recording) {
 
 DepthFrame ArmMask::without_arm(const DepthFrame& frame, const Push& push, const Step& step) const {
   if (frame.robot_is_masked) return frame;
-  if (robot_) {
-    if (step.joints_rad.empty()) return frame;
-    return with_mask(frame, robot_->mask_known(frame, recording_.joint_names, step.joints_rad));
-  }
+  if (robot_ && !step.joints_rad.empty()) return with_mask(frame, robot_->mask_known(frame, recording_.joint_names, step.joints_rad));
   return frame.mask.size() == 0 ? with_mask(frame, mask_sticks(frame, sticks_of(recording_, push, step))) : frame;
 }
 

@@ -22,7 +22,7 @@ class ArmMask {
   explicit ArmMask(const Recording& recording);
 
   /// Pixels that show the robot by its description and the step's joints; where nobody has masked anything and no shape of a
-  /// robot is known, those of the stick. An image that says robot_is_masked stays as it is.
+  /// robot or no joints are known, those of the stick. An image that says robot_is_masked stays as it is.
   DepthFrame without_arm(const DepthFrame& frame, const Push& push, const Step& step) const;
 
   /// Of a cloud the stick: the robot was left out by who recorded it.

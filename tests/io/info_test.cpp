@@ -233,6 +233,15 @@ TEST_F(Info, SaysWhereNothingMasksTheArm) {
   }
   folder.put("recording.yaml", told);
   EXPECT_EQ(info_of(folder).err.find("nothing masks"), std::string::npos) << "the stick is masked by its radius";
+  folder.put("arm.urdf",
+             "<robot name='arm'><link name='arm'><visual><geometry><sphere radius='0.1'/></geometry></visual>"
+             "<visual><geometry><mesh filename='package://arm/hand.dae'/></geometry></visual></link></robot>");
+  folder.put("recording.yaml", told + "\nrobot: {urdf: arm.urdf}\n");
+  const Outcome outcome = info_of(folder);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("2 images of the pressed object are of steps without joints_rad"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("only the stick is masked"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("hand.dae"), std::string::npos) << "a shape that cannot be read is said: " << outcome.err;
 }
 
 // A bag of ours has images with masks, and clouds: the mapping to start from names them all.
