@@ -6,6 +6,7 @@
 
 #include <regex>
 
+#include "geometry/shapes.hpp"
 #include "io/broken_bytes.hpp"
 #include "io/recording_folder.hpp"
 #include "palpate/io/depth_file.hpp"
@@ -425,7 +426,44 @@ TEST(ReadRecording, EveryExampleOfTheDocumentationIsUnderstood) {
       EXPECT_NE(error.message().find("there is no file"), std::string::npos) << error.what();
     }
   }
-  EXPECT_GE(examples, 4);
+  EXPECT_GE(examples, 5);
+}
+
+/// The page's block that starts with `start`.
+std::string block_of(const std::string& page, const std::string& start) {
+  const std::size_t at = page.find("\n" + start);
+  EXPECT_NE(at, std::string::npos) << start;
+  return page.substr(at + 1, page.find("```", at) - at - 1);
+}
+
+TEST(ReadRecording, TheDocumentationsPlainFilesAreReadAsItSays) {
+  const std::string page = read_file(std::string(PALPATE_SOURCE_DIR) + "/docs/recording-format.md");
+  const TemporaryFolder folder("plain_files");
+  folder.put("recording.yaml", block_of(page, "format: palpate-recording/1\nname: my_foam"));
+  folder.put("steps.csv", block_of(page, "time_s,force_x_n,force_y_n,force_z_n,observed_travel_m,depth,tip_x_m"));
+  const TriMesh box = shapes::box({0.15, 0.15, 0.15}, {0.425, -0.075, 0});
+  MeshData scan;
+  scan.points_m = box.vertices_m;
+  scan.triangles = box.triangles;
+  folder.put("scan.ply", mesh_format_named("ply").write(scan));
+  for (const char* file : {"depth/0000.png", "depth/0001.png", "depth/0002.png"})
+    folder.put(file, depth_png(DepthImage::Constant(480, 640, 0.5f), 0.001));
+  const Recording recording = read_recording(folder.path());
+  ASSERT_EQ(recording.pushes.size(), 1u);
+  const auto& steps = recording.pushes[0].steps;
+  ASSERT_EQ(steps.size(), 3u);
+  EXPECT_EQ(steps[0].observations.size(), 1u) << "no travel in free air";
+  for (std::size_t i : {1u, 2u}) {
+    const Load& load = steps[i].loads.at(0);
+    ASSERT_EQ(steps[i].observations.size(), 2u);
+    const auto& travel = std::get<ToolTravel>(steps[i].observations[0]);
+    ASSERT_TRUE(steps[i].T_base_tip);
+    EXPECT_NEAR(travel.travel_m, load.direction.dot(steps[i].T_base_tip->translation() - load.contact_m), 1e-12) << "as the page says";
+    EXPECT_LT(load.force_n->z(), -2);
+    EXPECT_LT((steps[i].T_base_tip->linear() * Vec3::UnitZ() - load.direction).norm(), 1e-12) << "the tool's axis goes along the push";
+    EXPECT_TRUE(std::holds_alternative<DepthFrame>(steps[i].observations[1]));
+  }
+  for (const std::string& warning : recording.warnings) EXPECT_EQ(warning.find("nothing masks"), std::string::npos) << warning;
 }
 
 }  // namespace
