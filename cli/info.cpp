@@ -11,6 +11,7 @@
 
 #include "cli/bag_recording.hpp"
 #include "cli/info_bag.hpp"
+#include "cli/info_stated.hpp"
 #include "cli/material_names.hpp"
 #include "cli/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -148,6 +149,7 @@ json described(const Recording& recording, const std::vector<io::Problem>& probl
   result["force_scale_std"] = recording.force_scale_std;
   result["force_cross_talk_std"] = recording.force_cross_talk_std;
   result["time_offset_std_s"] = recording.time_offset_std_s;
+  result.update(stated_of(recording));
   result["pushes"] = json::array();
   for (const Push& push : recording.pushes) result["pushes"].push_back(push_of(push));
   result["files"] = recording.input_hashes.size();
@@ -238,6 +240,7 @@ void tell(Session& session, const Recording& recording, const json& all) {
                               ? fmt::format("{:.4g}", *model.poisson_fixed)
                               : fmt::format("in [{:.4g}, {:.4g}]", model.poisson_lower, model.poisson_upper),
                           model.poisson_by_region && !model.poisson_fixed ? ", each region its own" : ""));
+  tell_stated(session, all);
   session.say(fmt::format("pushes     {}", recording.pushes.size()));
   for (const json& push : all["pushes"]) tell_push(session, push);
 }

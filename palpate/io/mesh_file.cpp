@@ -36,7 +36,7 @@ const MeshFormat& mesh_format_of(const std::filesystem::path& path) {
   for (const MeshFormat& format : mesh_formats()) {
     for (const std::string& one : format.extensions) {
       if (one == extension) return format;
-      if (known.find(one) == std::string::npos) known += (known.empty() ? "" : ", ") + one;
+      if (known.find(one) == std::string::npos) known += (known.empty() ? "" : ", ") + one + (format.read == nullptr ? " (only written)" : "");
     }
   }
   throw Error("no mesh format has the ending '" + extension + "'; known are " + known, path.string());
@@ -54,7 +54,7 @@ const MeshFormat& mesh_format_named(const std::string& name) {
 MeshData parse_mesh(std::string_view bytes, const std::filesystem::path& path) {
   const MeshFormat& format = mesh_format_of(path);
   const std::string name = path.string();
-  if (format.read == nullptr) throw Error("this format is only written, not read", name);
+  if (format.read == nullptr) throw Error("this format is only written, not read; convert it to .vtu, .vtk or .msh", name);
   if (bytes.empty()) throw Error("the file is empty", name);
   MeshData mesh = format.read(bytes, name);
   if (mesh.points_m.rows() == 0) throw Error("holds no point", name);

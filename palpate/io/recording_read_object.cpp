@@ -402,7 +402,7 @@ void read_model(const YamlField& field, ModelDefaults& model) {
   }
   if (const auto fixed = keys.optional("poisson_fixed")) {
     model.poisson_fixed = fixed->non_negative();
-    if (*model.poisson_fixed >= 0.5) fixed->fail("must be below 0.5; 0.4995 is as good as incompressible");
+    if (*model.poisson_fixed > 0.4995) fixed->fail("must be at most 0.4995, which is as good as incompressible");
   }
   model.poisson_by_region = keys.boolean_or("poisson_by_region", model.poisson_by_region);
   keys.finish();

@@ -68,7 +68,7 @@ def read_surface(path: str | PathLike[str]) -> TriMesh:
 
 
 def read_volume(path: str | PathLike[str]) -> TetMesh:
-    """TetMesh from a VTU, VTK, MSH, INP, ... file, in metres."""
+    """TetMesh from a VTU, VTK or MSH file, in metres."""
     return _palpate.read_volume(path)
 
 

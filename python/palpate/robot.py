@@ -24,6 +24,7 @@ class Robot:
     After KeyboardInterrupt (Ctrl-C) and SystemExit it stands where it was stopped.
 
     travel_sigma_m: standard deviation of the encoders' tip position along a push; positive
+    limits:         a RobotLimits, what the arm itself bears (force, travel, speed); may be left out. The lower of these and the options bounds a push
     """
 
     travel_sigma_m = 0.0005

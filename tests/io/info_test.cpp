@@ -216,6 +216,23 @@ TEST_F(Info, ComparesTheScatterOfUnloadedStepsWithWhatIsStated) {
   EXPECT_TRUE(nlohmann::json::parse(outcome.out)["static_scatter"][0]["doubtful"].get<bool>());
 }
 
+// What was forgotten counts as exact: whoever reads it here can still say it.
+TEST_F(Info, SaysHowWellEverythingIsKnown) {
+  put_still_life(folder, {});
+  Outcome outcome = info_of(folder);
+  const nlohmann::json all = nlohmann::json::parse(outcome.out);
+  ASSERT_EQ(all["cameras"].size(), 1u) << outcome.out;
+  EXPECT_EQ(all["cameras"][0]["noise_sigma_m"], 2e-3);
+  EXPECT_EQ(all["stated"]["force_scale_std"], (nlohmann::json{0, 0}));
+  EXPECT_NE(outcome.err.find("its scale exact"), std::string::npos) << outcome.err;
+  folder.put("recording.yaml", replaced(folder.get("recording.yaml"), "force_scale_std: 0\n", "force_scale_std: 0.02\n") +
+                                   "\nregions:\n  - {name: low, kind: box, min_m: [-1, -1, -1], max_m: [1, 1, 0.65]}\n  - {name: high, kind: rest}\n");
+  outcome = info_of(folder);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("its scale 2 %"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("regions    low (box), high (rest)"), std::string::npos) << outcome.err;
+}
+
 TEST_F(Info, SaysWhereNothingMasksTheArm) {
   put_still_life(folder, {});
   EXPECT_NE(info_of(folder).err.find("nothing masks the arm in 2 images"), std::string::npos);
