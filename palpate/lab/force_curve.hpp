@@ -30,7 +30,7 @@ class ForceCurve {
   };
   Place at(double travel_m) {
     while (travels_.back() < travel_m && !(proportional_ && travels_.size() > 1)) {
-      object_->press(forces_.back() + step_n_);
+      press_on();
       forces_.push_back(object_->force_n());
       travels_.push_back(object_->travel_m());
       surfaces_.push_back(object_->surface());
@@ -53,6 +53,19 @@ class ForceCurve {
   }
 
  private:
+  // Where a fold is near, a whole step may be beyond it: the object is followed in smaller ones, up to the most that it bears.
+  void press_on() {
+    constexpr double least_share = 1e-3;  // of the force
+    for (;;) {
+      try {
+        return object_->press(forces_.back() + step_n_);
+      } catch (const Error&) {
+        if (step_n_ < least_share * forces_.back() || forces_.back() == 0) throw;
+        step_n_ *= 0.5;
+      }
+    }
+  }
+
   std::unique_ptr<Pressed> object_;
   double step_n_, step_m_;
   bool proportional_;

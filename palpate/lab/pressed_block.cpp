@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/lab/pressed_block.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "palpate/core/error.hpp"
@@ -69,23 +71,47 @@ struct PressedBlock::Impl {
     fem::StaticsOptions statics;
     if (options.poisson_ratio > 0.45) statics.dilatation = fem::Dilatation::averaged;
     statics.residual_tolerance = 1e-7;  // five orders below the sensors' errors
+    // The way from rest that a solver goes back to has all the folds of the way so far, and a load beyond the most that the block
+    // bears would be looked for in vain: what does not follow from the state before is taken in smaller steps.
+    statics.max_load_steps = 0;
+    statics.max_newton_steps = 15;
     statics_ = std::make_unique<fem::Statics>(mesh_, options.material, std::move(boundary), statics);
     half_surface_ = fem::boundary_triangles(mesh_);
   }
 
-  /// Deforms the block by a force (newton, on the whole of it). Starts from the last state, extrapolated.
+  /// Deforms the block by a force (newton, on the whole of it). From rest a force that is not reached at once is reached in
+  /// steps; a later one is for the caller to take in smaller ones.
+  /// @throws Error where no equilibrium is found; the block is as it was
   void press(double force_n) {
+    constexpr double least_share = 1e-3;
+    const bool is_at_rest = displacement_m_.size() == 0;
+    std::string reason = reach(force_n);
+    if (reason.empty()) return;
+    for (double step_n = 0.5 * force_n; is_at_rest && step_n > least_share * force_n;) {
+      reason = reach(std::min(force_n, force_n_ + step_n));
+      if (!reason.empty())
+        step_n *= 0.5;
+      else if (force_n_ == force_n)
+        return;
+    }
+    if (is_at_rest) {
+      displacement_m_.resize(0);
+      force_n_ = 0;
+    }
+    throw Error("the true block found no equilibrium under " + std::to_string(force_n) + " N (" + reason + "): press less deep", "PressedBlock");
+  }
+
+  /// By Newton's method from the last state, extrapolated; why it did not get there, or nothing.
+  std::string reach(double force_n) {
     const VectorX coefficient = VectorX::Constant(1, 0.5 * force_n);
     const VectorX start = displacement_m_.size() ? VectorX(force_n / force_n_ * displacement_m_) : VectorX();
     const VectorX extra = Eigen::Map<const VectorX>(options_.extra.data(), Eigen::Index(options_.extra.size()));
     fem::Equilibrium state = statics_->solve(options_.young_modulus_pa, options_.poisson_ratio, coefficient, VectorX(0),
                                              start.size() ? &start : nullptr, extra);
-    if (!state.converged)
-      throw Error("the true block found no equilibrium under " + std::to_string(force_n) + " N (" + state.reason +
-                      "): press less deep",
-                  "PressedBlock");
+    if (!state.converged) return state.reason;
     displacement_m_ = std::move(state.displacement_m);
     force_n_ = force_n;
+    return {};
   }
 
   /// Mean motion of the pad's face into the block.

@@ -18,6 +18,7 @@ out in numbers is a field of the result. The same input, seed and number of thre
 from __future__ import annotations as _annotations
 
 import json as _json
+import operator as _operator
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from palpate import _nouns, _palpate
@@ -202,7 +203,7 @@ def suggest(recording: Recording, so_far: Identified | Identification | None = N
 
 def demo(seed=1, progress: Callable[[str, float], Any] | None = None) -> tuple[Recording, dict[str, float]]:
     """(recording, truth): the built-in recording of a foam cube, made by the lab, and E and nu of the truth."""
-    return _palpate.demo(seed, progress)
+    return _palpate.demo(_operator.index(seed), progress)
 
 
 def materials() -> list[str]:

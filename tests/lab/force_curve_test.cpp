@@ -63,5 +63,46 @@ TEST(ForceCurve, WhatIsNotInProportionIsSolvedForOnItsWay) {
   EXPECT_NEAR(afresh.travel_m(), 0.012, 1e-4);
 }
 
+/// Bears 5 N, and takes no step of more than 1 N: what is beyond a fold is not reached at once.
+class Fragile : public Pressed {
+ public:
+  explicit Fragile(std::vector<double>& borne_n) : borne_n_(borne_n) {}
+  void press(double force_n) override {
+    if (force_n > 5 || force_n > force_n_ + 1) throw Error("no equilibrium", "Fragile");
+    force_n_ = force_n;
+    borne_n_.push_back(force_n);
+  }
+  double force_n() const override { return force_n_; }
+  double travel_m() const override { return 0.001 * force_n_; }
+  TriMesh surface() const override { return {}; }
+  Index nodes() const override { return 0; }
+
+ private:
+  std::vector<double>& borne_n_;
+  double force_n_ = 0;
+};
+
+TEST(ForceCurve, GoesOnInSmallerStepsUpToTheMostThatTheObjectBears) {
+  std::vector<double> borne_n;
+  ForceCurve curve(std::make_unique<Fragile>(borne_n), 0.5, 0.004);
+  EXPECT_NEAR(curve.force_n(curve.at(0.0049)), 4.9, 1e-9);
+  EXPECT_THROW(curve.at(0.006), Error);
+  EXPECT_GT(borne_n.back(), 4.99);
+  EXPECT_NEAR(curve.force_n(curve.at(0.003)), 3, 1e-9) << "what is known stays";
+}
+
+TEST(ForceCurve, ABlockThatBearsNoMoreIsLeftAsItWas) {
+  PressedBlockOptions block = block_of("foam");
+  block.poisson_ratio = 0.1;
+  PressedBlock pressed(block), in_steps(block);
+  pressed.press(16);  // from rest at once
+  for (double force_n = 1; force_n <= 16; ++force_n) in_steps.press(force_n);
+  EXPECT_NEAR(pressed.travel_m(), in_steps.travel_m(), 1e-5 * in_steps.travel_m());
+  const double travel_m = pressed.travel_m();
+  EXPECT_THROW(pressed.press(400), Error);
+  EXPECT_EQ(pressed.travel_m(), travel_m);
+  EXPECT_EQ(pressed.force_n(), 16);
+}
+
 }  // namespace
 }  // namespace palpate::lab

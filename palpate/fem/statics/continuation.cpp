@@ -121,7 +121,7 @@ Equilibrium StaticSystem::solve(double young, double poisson, const VectorX& a, 
   std::string reason =
       usable ? newton(p, s, out, options.max_newton_steps, start != nullptr) : "the start has inverted elements";
   if (!reason.empty() && poisson > kCompressible) reason = by_way_of_compressible(p, start, s, out);
-  if (!reason.empty()) reason = continuation(p, s, out);
+  if (!reason.empty() && options.max_load_steps > 0) reason = continuation(p, s, out);
   out.converged = reason.empty();
   out.reason = reason;
   if (out.converged) say_what_is_odd(p, s, out);
