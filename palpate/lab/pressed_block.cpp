@@ -71,10 +71,13 @@ struct PressedBlock::Impl {
     fem::StaticsOptions statics;
     if (options.poisson_ratio > 0.45) statics.dilatation = fem::Dilatation::averaged;
     statics.residual_tolerance = 1e-7;  // five orders below the sensors' errors
-    // The way from rest that a solver goes back to has all the folds of the way so far, and a load beyond the most that the block
-    // bears would be looked for in vain: what does not follow from the state before is taken in smaller steps.
-    statics.max_load_steps = 0;
-    statics.max_newton_steps = 15;
+    // A Neo-Hookean block that gives way stiffens again, and a solver that goes back to rest finds it there. One that softens has
+    // no state at all beyond the most that it bears, and would be looked for in vain for minutes: what does not follow from the
+    // state before is taken in smaller steps (ForceCurve).
+    if (options.material == "foam") {
+      statics.max_load_steps = 0;
+      statics.max_newton_steps = 15;
+    }
     statics_ = std::make_unique<fem::Statics>(mesh_, options.material, std::move(boundary), statics);
     half_surface_ = fem::boundary_triangles(mesh_);
   }
