@@ -53,17 +53,12 @@ class ForceCurve {
   }
 
  private:
-  // Where a fold is near, a whole step may be beyond it: the object is followed in smaller ones, up to the most that it bears.
+  // Where a fold is near, a whole step may be beyond it: the object is followed in smaller ones, and looked for elsewhere last.
   void press_on() {
-    constexpr double least_share = 1e-3;  // of the force
-    for (;;) {
-      try {
-        return object_->press(forces_.back() + step_n_);
-      } catch (const Error&) {
-        if (step_n_ < least_share * forces_.back() || forces_.back() == 0) throw;
-        step_n_ *= 0.5;
-      }
-    }
+    constexpr int most_halvings = 3;
+    for (int halvings = 0; halvings < most_halvings; ++halvings, step_n_ *= 0.5)
+      if (object_->follow(forces_.back() + step_n_)) return;
+    object_->press(forces_.back() + step_n_);
   }
 
   std::unique_ptr<Pressed> object_;

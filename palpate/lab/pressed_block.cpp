@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/lab/pressed_block.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -71,46 +70,42 @@ struct PressedBlock::Impl {
     fem::StaticsOptions statics;
     if (options.poisson_ratio > 0.45) statics.dilatation = fem::Dilatation::averaged;
     statics.residual_tolerance = 1e-7;  // five orders below the sensors' errors
-    // A Neo-Hookean block that gives way stiffens again, and a solver that goes back to rest finds it there. One that softens has
-    // no state at all beyond the most that it bears, and would be looked for in vain for minutes: what does not follow from the
-    // state before is taken in smaller steps (ForceCurve).
-    if (options.material == "foam") {
+    follows_ = options.material == "foam";
+    if (!follows_) {
+      statics_ = std::make_unique<fem::Statics>(mesh_, options.material, std::move(boundary), statics);
+    } else {
+      boundary_ = boundary;
+      options_of_statics_ = statics;
       statics.max_load_steps = 0;
-      statics.max_newton_steps = 15;
+      near_ = std::make_unique<fem::Statics>(mesh_, options.material, std::move(boundary), statics);
     }
-    statics_ = std::make_unique<fem::Statics>(mesh_, options.material, std::move(boundary), statics);
     half_surface_ = fem::boundary_triangles(mesh_);
   }
 
-  /// Deforms the block by a force (newton, on the whole of it). From rest a force that is not reached at once is reached in
-  /// steps; a later one is for the caller to take in smaller ones.
-  /// @throws Error where no equilibrium is found; the block is as it was
   void press(double force_n) {
-    constexpr double least_share = 1e-3;
-    const bool is_at_rest = displacement_m_.size() == 0;
-    std::string reason = reach(force_n);
-    if (reason.empty()) return;
-    for (double step_n = 0.5 * force_n; is_at_rest && step_n > least_share * force_n;) {
-      reason = reach(std::min(force_n, force_n_ + step_n));
-      if (!reason.empty())
-        step_n *= 0.5;
-      else if (force_n_ == force_n)
-        return;
-    }
-    if (is_at_rest) {
-      displacement_m_.resize(0);
-      force_n_ = 0;
-    }
-    throw Error("the true block found no equilibrium under " + std::to_string(force_n) + " N (" + reason + "): press less deep", "PressedBlock");
+    if (follows_ && reach(force_n, *near_).empty()) return;
+    if (!statics_) statics_ = std::make_unique<fem::Statics>(mesh_, options_.material, boundary_, options_of_statics_);
+    const std::string reason = reach(force_n, *statics_);
+    if (!reason.empty())
+      throw Error("the true block found no equilibrium under " + std::to_string(force_n) + " N (" + reason + "): press less deep", "PressedBlock");
   }
 
-  /// By Newton's method from the last state, extrapolated; why it did not get there, or nothing.
-  std::string reach(double force_n) {
+  /// A foam, which softens, has folds all along its way: it is found from rest after minutes, and beyond the most that it bears not
+  /// at all. Other laws stiffen again and are pressed.
+  bool follow(double force_n) {
+    if (follows_) return reach(force_n, *near_).empty();
+    press(force_n);
+    return true;
+  }
+
+  /// Deforms the block by a force (newton, on the whole of it), from the last state, extrapolated; why it did not get there, or
+  /// nothing.
+  std::string reach(double force_n, const fem::Statics& statics) {
     const VectorX coefficient = VectorX::Constant(1, 0.5 * force_n);
     const VectorX start = displacement_m_.size() ? VectorX(force_n / force_n_ * displacement_m_) : VectorX();
     const VectorX extra = Eigen::Map<const VectorX>(options_.extra.data(), Eigen::Index(options_.extra.size()));
-    fem::Equilibrium state = statics_->solve(options_.young_modulus_pa, options_.poisson_ratio, coefficient, VectorX(0),
-                                             start.size() ? &start : nullptr, extra);
+    fem::Equilibrium state = statics.solve(options_.young_modulus_pa, options_.poisson_ratio, coefficient, VectorX(0),
+                                           start.size() ? &start : nullptr, extra);
     if (!state.converged) return state.reason;
     displacement_m_ = std::move(state.displacement_m);
     force_n_ = force_n;
@@ -156,7 +151,10 @@ struct PressedBlock::Impl {
   VectorX share_;           // of the pad's force, a node
   VectorX displacement_m_;  // empty = at rest
   double force_n_ = 0;
-  std::unique_ptr<fem::Statics> statics_;
+  bool follows_ = false;
+  std::unique_ptr<fem::Statics> near_, statics_;  // without and with the way from rest; the latter once it is needed, where both are
+  fem::Boundary boundary_;
+  fem::StaticsOptions options_of_statics_;
 };
 
 PressedBlock::PressedBlock(const PressedBlockOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -164,6 +162,7 @@ PressedBlock::~PressedBlock() = default;
 PressedBlock::PressedBlock(PressedBlock&&) noexcept = default;
 PressedBlock& PressedBlock::operator=(PressedBlock&&) noexcept = default;
 void PressedBlock::press(double force_n) { impl_->press(force_n); }
+bool PressedBlock::follow(double force_n) { return impl_->follow(force_n); }
 double PressedBlock::force_n() const { return impl_->force_n_; }
 double PressedBlock::travel_m() const { return impl_->displacement_m_.size() ? impl_->travel_m() : 0.0; }
 TriMesh PressedBlock::surface() const { return impl_->surface(); }

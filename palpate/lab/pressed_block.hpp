@@ -36,6 +36,7 @@ class PressedBlock : public Pressed {
   PressedBlock& operator=(PressedBlock&&) noexcept;
 
   void press(double force_n) override;
+  bool follow(double force_n) override;
   double force_n() const override;
   double travel_m() const override;
   TriMesh surface() const override;      ///< both halves

@@ -69,20 +69,8 @@ class Remembered : public Pressed {
     states_->load(store_);
   }
 
-  void press(double force_n) override {
-    const double one_n = rounded(force_n / young_modulus_pa_ * one_pa);
-    auto& known = states_->pressed;
-    if (next_ < known.size() && known[next_].force_n == one_n) {
-      now_ = known[next_];
-    } else {
-      solve(one_n);
-      known.resize(next_);  // what was pressed otherwise
-      known.push_back(now_);
-      states_->keep(store_);
-    }
-    ++next_;
-    force_n_ = force_n;
-  }
+  void press(double force_n) override { reach(force_n, false); }
+  bool follow(double force_n) override { return reach(force_n, true); }
   double force_n() const override { return force_n_; }
   double travel_m() const override { return now_.travel_m; }
   TriMesh surface() const override {
@@ -93,17 +81,32 @@ class Remembered : public Pressed {
   Index nodes() const override { return states_->nodes; }
 
  private:
+  bool reach(double force_n, bool by_following) {
+    const double one_n = rounded(force_n / young_modulus_pa_ * one_pa);
+    auto& known = states_->pressed;
+    if (next_ < known.size() && known[next_].force_n == one_n) {
+      now_ = known[next_];
+    } else {
+      if (!solve(one_n, by_following)) return false;
+      known.resize(next_);  // what was pressed otherwise
+      known.push_back(now_);
+      states_->keep(store_);
+    }
+    ++next_;
+    force_n_ = force_n;
+    return true;
+  }
+
   // On from the state before, to which an object that was not needed so far is brought first.
-  void solve(double one_n) {
+  bool solve(double one_n, bool by_following) {
     if (!object_) object_ = make_(one_pa, at_);
-    for (; stands_ < next_; ++stands_) press_object(states_->pressed[stands_].force_n);
-    press_object(one_n);
+    for (; stands_ < next_; ++stands_, ++states_->solved) object_->press(states_->pressed[stands_].force_n);
+    if (by_following && !object_->follow(one_n)) return false;
+    if (!by_following) object_->press(one_n);
+    ++states_->solved;
     stands_ = next_ + 1;
     now_ = {one_n, object_->travel_m(), object_->surface().vertices_m};
-  }
-  void press_object(double one_n) {
-    object_->press(one_n);
-    ++states_->solved;
+    return true;
   }
 
   std::shared_ptr<PressedMemory::States> states_;

@@ -63,14 +63,20 @@ TEST(ForceCurve, WhatIsNotInProportionIsSolvedForOnItsWay) {
   EXPECT_NEAR(afresh.travel_m(), 0.012, 1e-4);
 }
 
-/// Bears 5 N, and takes no step of more than 1 N: what is beyond a fold is not reached at once.
+/// Bears 5 N, and is followed over no step of more than 0.1 N; what is searched for is found.
 class Fragile : public Pressed {
  public:
-  explicit Fragile(std::vector<double>& borne_n) : borne_n_(borne_n) {}
+  Fragile(std::vector<double>& followed_n, int& searches) : followed_n_(followed_n), searches_(searches) {}
   void press(double force_n) override {
-    if (force_n > 5 || force_n > force_n_ + 1) throw Error("no equilibrium", "Fragile");
+    ++searches_;
+    if (force_n > 5) throw Error("no equilibrium", "Fragile");
     force_n_ = force_n;
-    borne_n_.push_back(force_n);
+  }
+  bool follow(double force_n) override {
+    if (force_n > 5 || force_n > force_n_ + 0.1) return false;
+    force_n_ = force_n;
+    followed_n_.push_back(force_n);
+    return true;
   }
   double force_n() const override { return force_n_; }
   double travel_m() const override { return 0.001 * force_n_; }
@@ -78,30 +84,39 @@ class Fragile : public Pressed {
   Index nodes() const override { return 0; }
 
  private:
-  std::vector<double>& borne_n_;
+  std::vector<double>& followed_n_;
+  int& searches_;
   double force_n_ = 0;
 };
 
-TEST(ForceCurve, GoesOnInSmallerStepsUpToTheMostThatTheObjectBears) {
-  std::vector<double> borne_n;
-  ForceCurve curve(std::make_unique<Fragile>(borne_n), 0.5, 0.004);
-  EXPECT_NEAR(curve.force_n(curve.at(0.0049)), 4.9, 1e-9);
-  EXPECT_THROW(curve.at(0.006), Error);
-  EXPECT_GT(borne_n.back(), 4.99);
+TEST(ForceCurve, GoesOnInSmallerStepsWhereAnObjectIsNotFollowedOverAWholeOne) {
+  std::vector<double> followed_n;
+  int searches = 0;
+  ForceCurve curve(std::make_unique<Fragile>(followed_n, searches), 0.35, 0.0002);
+  EXPECT_NEAR(curve.force_n(curve.at(0.0045)), 4.5, 1e-9);
+  EXPECT_GT(followed_n.size(), 40u);
+  EXPECT_EQ(searches, 0);
+  EXPECT_THROW(curve.at(0.006), Error) << "no more than it bears";
+  EXPECT_EQ(searches, 1);
   EXPECT_NEAR(curve.force_n(curve.at(0.003)), 3, 1e-9) << "what is known stays";
+
+  followed_n.clear();
+  ForceCurve far(std::make_unique<Fragile>(followed_n, searches), 4, 0.004);
+  EXPECT_NEAR(far.force_n(far.at(0.0005)), 0.5, 1e-9);
+  EXPECT_EQ(searches, 2) << "a step that stays too long is searched for at last";
 }
 
-TEST(ForceCurve, ABlockThatBearsNoMoreIsLeftAsItWas) {
+TEST(ForceCurve, ABlockThatIsNotFollowedIsLeftAsItWas) {
   PressedBlockOptions block = block_of("foam");
   block.poisson_ratio = 0.1;
   PressedBlock pressed(block), in_steps(block);
-  pressed.press(16);  // from rest at once
-  for (double force_n = 1; force_n <= 16; ++force_n) in_steps.press(force_n);
+  pressed.press(16);
+  for (double force_n = 1; force_n <= 16; ++force_n) ASSERT_TRUE(in_steps.follow(force_n));
   EXPECT_NEAR(pressed.travel_m(), in_steps.travel_m(), 1e-5 * in_steps.travel_m());
-  const double travel_m = pressed.travel_m();
-  EXPECT_THROW(pressed.press(400), Error);
-  EXPECT_EQ(pressed.travel_m(), travel_m);
-  EXPECT_EQ(pressed.force_n(), 16);
+  const double travel_m = in_steps.travel_m();
+  EXPECT_FALSE(in_steps.follow(400));
+  EXPECT_EQ(in_steps.travel_m(), travel_m);
+  EXPECT_EQ(in_steps.force_n(), 16);
 }
 
 }  // namespace
