@@ -10,8 +10,8 @@
 
 namespace palpate::cli {
 
-/// `cameras`, `clouds`, `markers`, `regions` and `stated`: each standard deviation as [least, greatest] of the recording, null
-/// where nothing has one.
+/// `cameras`, `clouds`, `markers`, `regions` and `stated`: each standard deviation as [least, greatest] of the recording; one that
+/// nothing has is not among them.
 nlohmann::json stated_of(const Recording& recording);
 
 void tell_stated(Session& session, const nlohmann::json& stated);
