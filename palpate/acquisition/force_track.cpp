@@ -20,7 +20,7 @@ std::string sensor_frame(const StreamPlan& plan, const SensorStreams& streams) {
 /// A joint that nobody tells, which hides a frame: its own link's, or that of the link that it is mounted on.
 std::optional<std::string> hiding_joint(const FrameTree& tree, const StreamPlan& plan, const SensorStreams& streams,
                                         const std::string& frame) {
-  if (!plan.recording.robot || streams.joints.empty()) return std::nullopt;
+  if (!plan.recording.robot) return std::nullopt;
   const sensing::Kinematics kinematics(*plan.recording.robot);
   const auto& links = kinematics.robot().links;
   const std::string top = tree.root_of(frame);
@@ -41,12 +41,14 @@ void demand_frame(const FrameTree& tree, const StreamPlan& plan, const SensorStr
     throw Error("no transform names the base frame '" + plan.base_frame + "'; frames in the bag: " + known, written(plan.base_where));
   const std::string where = written(frame == plan.tip_frame ? plan.tip_where : "");
   if (const auto joint = hiding_joint(tree, plan, streams, frame))
-    throw Error("the frame '" + frame + "' (" + name + ") hangs on the joint '" + *joint +
-                    "', which the joint states (topics.joints) never tell; record its topic, or name a frame before that joint",
+    throw Error("the frame '" + frame + "' (" + name + ") hangs on the joint '" + *joint + "', " +
+                    (streams.joints.empty() ? "and there are no joint states (topics.joints); map or record them, or the transforms,"
+                                            : "which the joint states (topics.joints) never tell; record its topic,") +
+                    " or name a frame before that joint",
                 where);
   throw Error("the frame '" + frame + "' (" + name + ") is not connected to the base frame '" + plan.base_frame +
                   "' by any transform; frames in the bag: " + (known.empty() ? "none" : known) +
-                  ". A robot description with joint states helps too",
+                  ". A robot description with joint states helps too, and frames.fixed says where a frame is that nothing in the bag tells",
               where);
 }
 
@@ -82,6 +84,35 @@ Track tip_track(const StreamPlan& plan, const FrameTree& tree, double period_s) 
   return track;
 }
 
+/// The streams' frames, and of the links that no transform names those whose joint is fixed or told by the joint states.
+std::vector<FrameLink> with_links_of(const sensing::Kinematics& kinematics, const FrameTree& tree, const SensorStreams& streams) {
+  const auto& joints = kinematics.robot().joints;
+  std::vector<FrameLink> links = streams.frames;
+  std::vector<std::pair<std::size_t, std::size_t>> moving;  // a link, a joint
+  const auto fixed = kinematics.joint_poses({}, {});
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (tree.has_parent(joints[j].child)) continue;
+    if (!fixed[j]) moving.emplace_back(links.size(), j);
+    links.push_back({joints[j].parent, joints[j].child, bool(fixed[j]), {}});
+    if (fixed[j]) links.back().samples.push_back({0, *fixed[j]});
+  }
+  // Joints that the description does not know (of another device on the topic) have no say.
+  std::vector<std::size_t> used;
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < streams.joint_names.size(); ++k) {
+    if (knows(kinematics.robot(), streams.joint_names[k])) used.push_back(k), names.push_back(streams.joint_names[k]);
+  }
+  for (const JointSample& sample : streams.joints) {
+    std::vector<double> positions;
+    for (const std::size_t k : used) positions.push_back(sample.positions[k]);
+    // Of a joint that nobody tells, a gripper's perhaps, only what hangs on it is not known.
+    const auto poses = kinematics.joint_poses(names, positions);
+    for (const auto& [link, joint] : moving)
+      if (poses[joint]) links[link].samples.push_back({sample.time_s, *poses[joint]});
+  }
+  return links;
+}
+
 }  // namespace
 
 FrameTree tree_of(const StreamPlan& plan, const SensorStreams& streams) {
@@ -93,34 +124,7 @@ FrameTree tree_of(const StreamPlan& plan, const SensorStreams& streams) {
   const auto& robot = plan.recording.robot;
   const bool missing =
       std::any_of(wanted.begin(), wanted.end(), [&](const auto& one) { return !tree.connects(plan.base_frame, one); });
-  if (missing && robot && !streams.joints.empty()) {
-    const sensing::Kinematics kinematics(*robot);
-    const std::string root = robot->links[std::size_t(kinematics.root_link())].name;
-    std::vector<FrameLink> links = streams.frames;
-    const std::size_t first = links.size();
-    std::vector<Index> link_of;
-    for (std::size_t i = 0; i < robot->links.size(); ++i) {
-      const std::string& name = robot->links[i].name;
-      if (name == root || tree.has_parent(name)) continue;
-      links.push_back({root, name, false, {}});
-      link_of.push_back(Index(i));
-    }
-    // Joints that the description does not know (of another device on the topic) have no say.
-    std::vector<std::size_t> used;
-    std::vector<std::string> names;
-    for (std::size_t k = 0; k < streams.joint_names.size(); ++k) {
-      if (knows(*robot, streams.joint_names[k])) used.push_back(k), names.push_back(streams.joint_names[k]);
-    }
-    for (const JointSample& sample : streams.joints) {
-      std::vector<double> positions;
-      for (const std::size_t k : used) positions.push_back(sample.positions[k]);
-      // Of a joint that nobody tells, a gripper's perhaps, only what hangs on it is not known.
-      const std::vector<std::optional<Pose>> poses = kinematics.known_link_poses(names, positions);
-      for (std::size_t i = 0; i < link_of.size(); ++i)
-        if (const auto& pose = poses[std::size_t(link_of[i])]) links[first + i].samples.push_back({sample.time_s, *pose});
-    }
-    tree = FrameTree(links);
-  }
+  if (missing && robot) tree = FrameTree(with_links_of(sensing::Kinematics(*robot), tree, streams));
   demand_frame(tree, plan, streams, plan.tip_frame, "tip", "frames.tip");
   if (wanted.size() > 1 && wanted[1] == sensor_frame(plan, streams))
     demand_frame(tree, plan, streams, wanted[1], "wrench", "frames.wrench");

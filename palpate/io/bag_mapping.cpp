@@ -80,14 +80,41 @@ void read_topics(const YamlField& field, BagMapping& mapping) {
   if (clouds) read_clouds(*clouds, mapping);
 }
 
-void read_frames(const YamlField& field, StreamPlan& plan) {
+FixedFrame read_fixed_frame(const YamlField& item, const StreamPlan& plan) {
+  YamlKeys keys(item);
+  const YamlField parent = keys.required("parent", "the frame that the other one is fixed to"),
+                  child = keys.required("child", "the frame that is fixed to the parent"),
+                  pose = keys.required("T_parent_child", "{position_m: [..], quaternion_xyzw: [..]} or 4 rows of 4 numbers");
+  keys.finish();
+  const FixedFrame frame{parent.text(), child.text(), read_pose(pose), item.where(), parent.where()};
+  if (frame.parent.empty()) parent.fail("a frame has a name");
+  if (frame.child.empty()) child.fail("a frame has a name");
+  if (frame.parent == frame.child) child.fail("is the parent itself");
+  if (frame.child == plan.base_frame)
+    child.fail("is the base frame, which hangs on nothing: give the inverse, with '" + frame.child + "' as the parent");
+  return frame;
+}
+
+void read_fixed_frames(const YamlField& list, BagMapping& mapping) {
+  for (const YamlField& item : list.items()) {
+    FixedFrame frame = read_fixed_frame(item, mapping.plan);
+    for (const FixedFrame& other : mapping.fixed_frames)
+      if (other.child == frame.child) item.fail("the frame '" + frame.child + "' is fixed to '" + other.parent + "' already");
+    mapping.fixed_frames.push_back(std::move(frame));
+  }
+}
+
+void read_frames(const YamlField& field, BagMapping& mapping) {
+  StreamPlan& plan = mapping.plan;
   YamlKeys keys(field);
   const YamlField base = keys.required("base", "the frame that meshes, planes and answers are given in"),
                   tip = keys.required("tip", "the frame of the tool's tip, z along the tool and into the object");
   plan.base_frame = base.text(), plan.base_where = base.where();
   plan.tip_frame = tip.text(), plan.tip_where = tip.where();
   plan.wrench_frame = keys.text_or("wrench", "");
+  const auto fixed = keys.optional("fixed");
   keys.finish();
+  if (fixed) read_fixed_frames(*fixed, mapping);
 }
 
 ClockPlan read_clock(YamlKeys& keys, const std::string& key) {
@@ -224,7 +251,7 @@ BagMapping read_mapping(const std::filesystem::path& path) {
   mapping.plan.recording = std::move(context.recording);
   if (mapping.plan.recording.tools.empty()) keys.required("tools", "say what touched the object");
   read_topics(topics, mapping);
-  read_frames(frames, mapping.plan);
+  read_frames(frames, mapping);
   if (clocks) read_clocks(*clocks, mapping);
   if (!wrench) keys.required("wrench", "{reports: force_on_sensor} or {reports: force_on_object}");
   read_wrench(*wrench, mapping.plan);

@@ -34,10 +34,18 @@ struct MappedCloud {
   double sigma_m = 0, pose_std_m = 0, pose_std_rad = 0;
 };
 
+/// A frame whose place on another one no topic tells: the tip of a stick, or a camera by a calibration of one's own.
+struct FixedFrame {
+  std::string parent, child;
+  Pose T_parent_child = Pose::Identity();
+  std::string where, parent_where;  ///< file, line and field
+};
+
 struct BagMapping {
   StreamPlan plan;
   std::optional<MappedTopic> wrench, joints, robot_description, marks;
   std::vector<MappedTopic> transforms;  ///< empty = every topic of TFMessage
+  std::vector<FixedFrame> fixed_frames;  ///< stand in place of what the transforms say of the same child
   std::vector<MappedCamera> cameras;
   std::vector<MappedCloud> clouds;
   bool use_log_time = false;  ///< else the stamps in the messages' headers

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "palpate/core/error.hpp"
+#include "palpate/io/bag_fixed_frames.hpp"
 #include "palpate/io/bag_mapping.hpp"
 #include "palpate/io/ros_messages.hpp"
 #include "palpate/io/urdf.hpp"
@@ -431,6 +432,7 @@ SensorStreams read_streams(const MessageSource& bag, BagMapping& mapping) {
         decode_string(description.messages.front()->data, reader.where(description), description.about->encoding);
     mapping.plan.recording.robot = parse_urdf(urdf, reader.where(description), mapping.root, &streams.warnings);
   }
+  add_fixed_frames(mapping, streams);
   streams.end_s = static_cast<double>(bag.messages.back().log_time_ns - bag.messages.front().log_time_ns) * 1e-9;
   return streams;
 }

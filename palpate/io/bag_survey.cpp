@@ -137,7 +137,8 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
                            : roots.empty()                                                      ? fill_in
                                                                                                 : roots.front();
   text += "frames: {base: " + base +
-          ", tip: " + guess_frame(frames, {"tool_tip", "tip", "tcp", "tool", "ee", "hand", "flange"}) + "}\n";
+          ", tip: " + guess_frame(frames, {"tool_tip", "tip", "tcp", "tool", "ee", "hand", "flange"}) +
+          "}   # check: a tip or camera that no frame of these is: frames.fixed\n";
   text += "wrench: {reports: force_on_sensor}   # check: or force_on_object; the sign shows in one push\n";
   if (!depth.empty()) text += "clocks: {camera_offset_s: estimate}\n";
   return text + "steps: {by: detection, travel_sigma_m: 0.0005}\n";
@@ -247,7 +248,8 @@ BagSurvey survey(const MessageSource& bag) {
   for (const SurveyedTopic& topic : result.topics) {
     if (topic.frame.empty() || topic.use == "camera") continue;
     if (has("transforms") && std::find(frames.begin(), frames.end(), topic.frame) == frames.end())
-      result.missing.push_back("no transform mentions the frame '" + topic.frame + "' of " + topic.name);
+      result.missing.push_back("no transform mentions the frame '" + topic.frame + "' of " + topic.name +
+                               ": say where it is in the mapping's frames.fixed, unless the robot's description knows it");
   }
   result.mapping = skeleton(result, frames, roots);
   return result;

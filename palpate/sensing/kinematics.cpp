@@ -146,6 +146,15 @@ std::vector<std::optional<Pose>> Kinematics::known_link_poses(const std::vector<
   return poses;
 }
 
+std::vector<std::optional<Pose>> Kinematics::joint_poses(const std::vector<std::string>& names,
+                                                         const std::vector<double>& positions) const {
+  const std::vector<double> value = values(names, positions);
+  std::vector<std::optional<Pose>> poses(robot_.joints.size());
+  for (std::size_t j = 0; j < poses.size(); ++j)
+    if (!moves(robot_.joints[j]) || std::isfinite(value[j])) poses[j] = below(Pose::Identity(), j, value[j]);
+  return poses;
+}
+
 std::optional<std::string> Kinematics::missing_joint(Index link, const std::vector<std::string>& names) const {
   std::optional<std::string> missing;
   for (Index at = link; joint_above_[std::size_t(at)] >= 0;) {

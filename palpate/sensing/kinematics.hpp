@@ -34,6 +34,10 @@ class Kinematics {
   /// @throws Error when a name is unknown, or the counts differ.
   std::vector<std::optional<Pose>> known_link_poses(const std::vector<std::string>& names,
                                                     const std::vector<double>& positions) const;
+  /// T_parent_child of every joint, in the order of robot().joints: its two links' frames at these positions; nothing where a
+  /// joint, or the one that it mimics, has no value.
+  /// @throws Error as known_link_poses
+  std::vector<std::optional<Pose>> joint_poses(const std::vector<std::string>& names, const std::vector<double>& positions) const;
   /// The free joint nearest to the root that a link hangs on and that is not among the names; nothing where all are.
   std::optional<std::string> missing_joint(Index link, const std::vector<std::string>& names) const;
 

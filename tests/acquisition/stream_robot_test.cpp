@@ -243,6 +243,31 @@ TEST(FromStreams, AJointThatNobodyTellsHidesOnlyWhatHangsOnIt) {
   EXPECT_THAT(said, HasSubstr("topics.joints"));
 }
 
+/// A driver tells where the flange is; what is bolted to it stands in the robot's description, and no joint is told.
+TEST(FromStreams, WhatIsFixedToAKnownFrameNeedsNoJointStates) {
+  SensorStreams streams = lab();
+  streams.joints.clear(), streams.joint_names.clear();
+  // The carriage by transforms, in place of the tip; the sensor stands on the description's tip.
+  Pose T_carriage_tip = Pose::Identity();
+  T_carriage_tip.linear() = tip_at(0).linear();
+  streams.frames[0].child = "carriage";
+  for (PoseSample& sample : streams.frames[0].samples) sample.T_parent_child = sample.T_parent_child * T_carriage_tip.inverse();
+  StreamPlan described = plan();
+  described.recording.robot = column();
+  const auto made = recording_from(described, streams).recording, expected = recording_from(plan(), lab()).recording;
+  ASSERT_EQ(made.pushes.size(), 1u);
+  ASSERT_EQ(made.pushes[0].steps.size(), expected.pushes[0].steps.size());
+  for (std::size_t i = 1; i + 1 < made.pushes[0].steps.size(); ++i) {
+    EXPECT_NEAR(travel_of(made.pushes[0].steps[i]), travel_of(expected.pushes[0].steps[i]), 1e-9);
+    EXPECT_LT((*made.pushes[0].steps[i].loads[0].force_n - *expected.pushes[0].steps[i].loads[0].force_n).norm(), 1e-9);
+  }
+
+  streams.frames.erase(streams.frames.begin());
+  const std::string said = refusal(described, streams);
+  EXPECT_THAT(said, HasSubstr("frame 'tip'"));
+  EXPECT_THAT(said, HasSubstr("joint 'lift', and there are no joint states (topics.joints)"));
+}
+
 /// A whole arm in the picture would be taken for the object.
 TEST(FromStreams, LinksThatAreKnownAreMaskedWithoutThoseThatAreNot) {
   SensorStreams streams = lab();

@@ -127,6 +127,25 @@ TEST(Kinematics, EveryBrokenTreeIsRefusedByName) {
   EXPECT_THROW(arm.link_poses({"shoulder", "elbow", "extend", "open_a"}, {0, NAN, 0, 0}), Error);
 }
 
+TEST(Kinematics, PosesOfJointsOneAfterAnotherAreThoseOfTheLinks) {
+  const Kinematics arm(planar());
+  const std::vector<std::string> names{"shoulder", "elbow", "extend", "open_a"};
+  const auto links = arm.link_poses(names, {0.3, -0.4, 0.05, 0.01});
+  const auto joints = arm.joint_poses(names, {0.3, -0.4, 0.05, 0.01});
+  ASSERT_EQ(joints.size(), arm.robot().joints.size());
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const RobotJoint& joint = arm.robot().joints[j];
+    ASSERT_TRUE(joints[j]) << joint.name;
+    EXPECT_TRUE((links[std::size_t(arm.link(joint.parent))] * *joints[j]).isApprox(links[std::size_t(arm.link(joint.child))], 1e-12)) << joint.name;
+  }
+  // Of a joint alone nothing is hidden but its own.
+  const auto some = arm.joint_poses({"extend"}, {0.05});
+  for (std::size_t j = 0; j < some.size(); ++j) {
+    const RobotJoint& joint = arm.robot().joints[j];
+    EXPECT_EQ(bool(some[j]), joint.kind == RobotJoint::Kind::fixed || joint.name == "extend") << joint.name;
+  }
+}
+
 /// A gripper that nobody tells anything of, an elbow that is not known: what hangs on it is not, the rest is.
 TEST(Kinematics, AJointWithoutAValueHidesWhatHangsOnIt) {
   const Kinematics arm(planar());
