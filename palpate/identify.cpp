@@ -94,7 +94,7 @@ TriMesh follows_dents(const Recording& recording, double edge_m) {
   constexpr double share = 0.35, growth = 0.5;  // of the elements' edges; with the distance from where facets must be short
   std::vector<geometry::FinerNear> tools;
   if (recording.model.refine == "auto") tools = finer_under_tools(recording);
-  return geometry::subdivided(*recording.rest.surface, [&](const Vec3& at) {
+  return geometry::subdivided(geometry::without_shared_faces(*recording.rest.surface), [&](const Vec3& at) {
     double longest_m = edge_m;
     for (const auto& near : tools)
       longest_m = std::min(longest_m, share * near.edge_m + growth * std::max(0.0, (at - near.point_m).norm() - 0.85 * near.radius_m));
@@ -322,7 +322,7 @@ double drop_unseen_side(const Recording& built, const std::vector<char>& seen, e
 estimation::FillAnew fill_anew(const Recording& given, const Recording& built) {
   constexpr double same_outline = 3e-4;  // of the object's size, rms: a ball of 3000 tetrahedra has 1e-3, boxes up to 2e-4
   if (given.rest.volume || !given.rest.surface || !built.rest.volume) return {};
-  const TriMesh& surface = *given.rest.surface;
+  const TriMesh surface = geometry::without_shared_faces(*given.rest.surface);
   const geometry::TriangleTree outline(geometry::boundary_surface(*built.rest.volume).surface);
   double sum_m4 = 0, area_m2 = 0;
   for (Index t = 0; t < surface.triangles.rows(); ++t) {

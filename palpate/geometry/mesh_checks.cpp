@@ -37,6 +37,27 @@ std::vector<HalfEdge> sorted_half_edges(const Triangles& t, const std::vector<bo
   return edges;
 }
 
+struct SortedTriangle {
+  std::array<Index, 3> key;
+  Index triangle;
+  bool ascending;  ///< goes round its corners in the order of `key`, or of a turn of it
+};
+
+/// Copies stand beside each other.
+std::vector<SortedTriangle> sorted_triangles(const Triangles& t) {
+  std::vector<SortedTriangle> list(t.rows());
+  for (Index i = 0; i < t.rows(); ++i) {
+    std::array<Index, 3> key{t(i, 0), t(i, 1), t(i, 2)};
+    std::sort(key.begin(), key.end());
+    const int first = key[0] == t(i, 0) ? 0 : key[0] == t(i, 1) ? 1 : 2;
+    list[i] = {key, i, t(i, (first + 1) % 3) == key[1]};
+  }
+  std::sort(list.begin(), list.end(), [](const SortedTriangle& a, const SortedTriangle& b) {
+    return std::tie(a.key, a.triangle) < std::tie(b.key, b.triangle);
+  });
+  return list;
+}
+
 struct SurfaceTopology {
   Index boundary = 0, non_manifold = 0, inconsistent = 0, pinched = 0, components = 0;
 };
@@ -157,13 +178,18 @@ SurfaceCheck check_surface(const TriMesh& mesh) {
   const Vec3 middle = 0.5 * (out.min_m + out.max_m);
   double volume = 0;
   std::vector<bool> skip(out.triangles, false);
-  const std::vector<char> again = copies(welded.triangles);
+  const std::vector<char> again = copies(welded.triangles), shared = shared_faces(welded.triangles);
   for (Index i = 0; i < out.triangles; ++i) {
     const Eigen::Matrix<Index, 1, 3> t = welded.triangles.row(i);
     const Vec3 a = welded.vertices_m.row(t[0]).transpose() - middle, b = welded.vertices_m.row(t[1]).transpose() - middle,
                c = welded.vertices_m.row(t[2]).transpose() - middle;
     const double area = 0.5 * (b - a).cross(c - a).norm();
     const double longest2 = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
+    if (shared[i]) {
+      ++out.shared_faces;
+      skip[i] = true;
+      continue;
+    }
     out.area_m2 += area;
     volume += a.dot(b.cross(c)) / 6;
     if (!(area > 1e-12 * longest2)) ++out.degenerate_triangles;
@@ -174,6 +200,7 @@ SurfaceCheck check_surface(const TriMesh& mesh) {
       skip[i] = true;
     }
   }
+  out.shared_faces /= 2;
   const SurfaceTopology topology = topology_of(welded.triangles, static_cast<Index>(welded.vertices_m.rows()), skip);
   out.boundary_edges = topology.boundary;
   out.non_manifold_edges = topology.non_manifold;
@@ -185,6 +212,8 @@ SurfaceCheck check_surface(const TriMesh& mesh) {
   auto& f = out.findings;
   if (out.degenerate_triangles > 0)
     add(f, "degenerate_triangles", plural(out.degenerate_triangles, "triangle has", "triangles have") + " no area");
+  if (out.shared_faces > 0)
+    add(f, "shared_faces", "parts of the surface have " + plural(out.shared_faces, "triangle", "triangles") + " in common: they are taken as one body there");
   if (out.duplicate_triangles > 0)
     add(f, "duplicate_triangles", plural(out.duplicate_triangles, "triangle is", "triangles are") + " there twice");
   if (out.boundary_edges > 0)
@@ -361,19 +390,52 @@ TriMesh weld(const TriMesh& mesh, std::vector<Index>* vertex_of) {
 }
 
 std::vector<char> copies(const Triangles& triangles) {
-  struct Entry {
-    std::array<Index, 3> key;
-    Index triangle;
-  };
-  std::vector<Entry> list(triangles.rows());
-  for (Index i = 0; i < triangles.rows(); ++i) {
-    list[i] = {{triangles(i, 0), triangles(i, 1), triangles(i, 2)}, i};
-    std::sort(list[i].key.begin(), list[i].key.end());
-  }
-  std::sort(list.begin(), list.end(),
-            [](const Entry& a, const Entry& b) { return std::tie(a.key, a.triangle) < std::tie(b.key, b.triangle); });
+  const std::vector<SortedTriangle> list = sorted_triangles(triangles);
   std::vector<char> out(triangles.rows(), 0);
   for (std::size_t i = 1; i < list.size(); ++i) out[list[i].triangle] = list[i].key == list[i - 1].key;
+  return out;
+}
+
+std::vector<char> shared_faces(const Triangles& triangles) {
+  const std::vector<SortedTriangle> list = sorted_triangles(triangles);
+  std::vector<char> shared(triangles.rows(), 0);
+  std::vector<bool> left_out(triangles.rows(), false);
+  bool any = false;
+  for (std::size_t i = 0, j = 0; i < list.size(); i = j) {
+    for (j = i; j < list.size() && list[j].key == list[i].key; ++j) {}
+    if (j - i != 2 || list[i].ascending == list[i + 1].ascending) continue;
+    any = true;
+    for (const std::size_t k : {i, i + 1}) shared[list[k].triangle] = 1, left_out[list[k].triangle] = true;
+  }
+  if (!any) return shared;
+  const std::vector<HalfEdge> edges = sorted_half_edges(triangles, left_out);
+  bool closed = !edges.empty();
+  for (std::size_t i = 0, j = 0; i < edges.size() && closed; i = j) {
+    int balance = 0;
+    for (j = i; j < edges.size() && edges[j].low == edges[i].low && edges[j].high == edges[i].high; ++j) balance += edges[j].ascending ? 1 : -1;
+    closed = balance == 0;
+  }
+  if (!closed) std::fill(shared.begin(), shared.end(), 0);
+  return shared;
+}
+
+TriMesh without_shared_faces(const TriMesh& mesh) {
+  TriMesh welded = weld(mesh);
+  const std::vector<char> shared = shared_faces(welded.triangles);
+  std::vector<Index> kept, vertex_of(static_cast<std::size_t>(welded.vertices_m.rows()), -1), used;
+  for (Index i = 0; i < welded.triangles.rows(); ++i)
+    if (shared[i] == 0) kept.push_back(i);
+  if (kept.size() == shared.size()) return mesh;
+  TriMesh out;
+  out.triangles.resize(static_cast<Eigen::Index>(kept.size()), 3);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const Index v = welded.triangles(kept[i], k);
+      if (vertex_of[v] < 0) vertex_of[v] = static_cast<Index>(used.size()), used.push_back(v);
+      out.triangles(static_cast<Eigen::Index>(i), k) = vertex_of[v];
+    }
+  }
+  out.vertices_m = welded.vertices_m(used, Eigen::all);
   return out;
 }
 

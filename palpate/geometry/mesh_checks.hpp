@@ -22,6 +22,7 @@ struct SurfaceCheck {
   Index unused_vertices = 0;       ///< in no triangle
   Index coincident_vertices = 0;   ///< exact copies of another vertex; topology below is that after welding them
   Index degenerate_triangles = 0;  ///< without area
+  Index shared_faces = 0;          ///< that two closed parts have in common; neither copy counts in what follows
   Index duplicate_triangles = 0;   ///< same three corners as another, in any order
   Index boundary_edges = 0;        ///< in one triangle
   Index non_manifold_edges = 0;    ///< in three or more
@@ -82,5 +83,13 @@ std::pair<double, double> dihedral_range_deg(const Vec3& a, const Vec3& b, const
 
 /// 1 for a triangle whose corners an earlier one has, in whatever order.
 std::vector<char> copies(const Triangles& triangles);
+
+/// 1 for both copies of a face that two closed parts have in common, one facing each way: the parts are one body there. Nothing
+/// where what is left would not be closed: of a sheet whose every triangle is there once for each side, one is the surface.
+/// @param triangles  of welded vertices
+std::vector<char> shared_faces(const Triangles& triangles);
+
+/// What sensors see of a mesh: welded and without shared faces, or the mesh itself where it has none. Their rims would be outlines.
+TriMesh without_shared_faces(const TriMesh& mesh);
 
 }  // namespace palpate::geometry

@@ -30,10 +30,10 @@ std::vector<Side> sorted_sides(const Triangles& t) {
   return s;
 }
 
-/// Drops copies (in either orientation) and triangles without area.
+/// Drops what parts have in common, copies (in either orientation) and triangles without area.
 TriMesh cleaned(const TriMesh& mesh) {
   TriMesh out = weld(mesh);
-  const std::vector<char> again = copies(out.triangles);
+  const std::vector<char> again = copies(out.triangles), shared = shared_faces(out.triangles);
   Index kept = 0;
   for (Index i = 0; i < out.triangles.rows(); ++i) {
     const std::array<Index, 3> key{out.triangles(i, 0), out.triangles(i, 1), out.triangles(i, 2)};
@@ -41,7 +41,7 @@ TriMesh cleaned(const TriMesh& mesh) {
                c = out.vertices_m.row(key[2]).transpose();
     const double longest2 = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
     if (!((b - a).cross(c - a).norm() > 1e-12 * longest2)) continue;
-    if (again[i]) continue;
+    if (again[i] || shared[i]) continue;
     out.triangles.row(kept++) = Eigen::Matrix<Index, 1, 3>(out.triangles.row(i));
   }
   out.triangles.conservativeResize(kept, 3);

@@ -12,11 +12,12 @@
 
 namespace palpate::geometry {
 
-/// A triangle soup with all triangles turned outward: welded, without copies and triangles without area.
+/// A triangle soup with all triangles turned outward: welded, without copies, faces that parts have in common and triangles
+/// without area.
 struct OrientedSurface {
   TriMesh mesh;
   Index flipped = 0;                  ///< triangles that were turned round
-  Index dropped = 0;                  ///< copies and triangles without area
+  Index dropped = 0;                  ///< copies, shared faces, triangles without area
   Index patches = 0;                  ///< pieces across whose edges the orientation could be carried
   bool closed = false;                ///< triangles run along every edge as often in one direction as in the other
   std::vector<double> cover_width_m;  ///< of the mesh's last triangles, which close small holes: the width of the hole

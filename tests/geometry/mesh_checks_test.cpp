@@ -105,6 +105,39 @@ TEST(CheckSurface, a_soup_of_separate_triangles_is_welded_for_the_checks) {
   EXPECT_EQ(weld(stl).vertices_m.rows(), 8);
 }
 
+TEST(CheckSurface, parts_that_have_faces_in_common_are_one_body) {
+  const TriMesh half = shapes::box(Vec3(0.1, 0.2, 0.3));
+  TriMesh other = half;  // beyond x = 0
+  other.vertices_m.col(0) *= -1;
+  other.triangles.col(1).swap(other.triangles.col(2));
+  const TriMesh both = shapes::join(half, other);
+  const auto c = check_surface(both);
+  EXPECT_EQ(c.shared_faces, 2);
+  EXPECT_EQ(c.duplicate_triangles, 0);
+  EXPECT_TRUE(c.watertight());
+  EXPECT_EQ(c.components, 1);
+  EXPECT_NEAR(c.volume_m3.value_or(0), 0.2 * 0.2 * 0.3, 1e-15);
+  EXPECT_NEAR(c.area_m2, 2 * (0.2 * 0.2 + 0.2 * 0.3 + 0.2 * 0.3), 1e-12);
+  EXPECT_THAT(c.findings, testing::ElementsAre(testing::Field(&Finding::code, "shared_faces")));
+
+  const auto seen = check_surface(without_shared_faces(both));
+  EXPECT_TRUE(seen.findings.empty());
+  EXPECT_EQ(seen.triangles, 20);
+  EXPECT_EQ(seen.vertices, 12);
+  EXPECT_NEAR(seen.volume_m3.value_or(0), *c.volume_m3, 1e-15);
+  EXPECT_EQ(without_shared_faces(half).triangles, half.triangles);
+
+  // Every triangle twice, once for each side, is how some programs draw a sheet; and a copy that faces the same way is a copy.
+  TriMesh back = half;
+  back.triangles.col(1).swap(back.triangles.col(2));
+  EXPECT_EQ(check_surface(shapes::join(half, back)).shared_faces, 0);
+  EXPECT_EQ(check_surface(shapes::join(half, back)).duplicate_triangles, 12);
+  EXPECT_EQ(check_surface(shapes::join(half, half)).shared_faces, 0);
+  TriMesh open = both;
+  open.triangles.conservativeResize(open.triangles.rows() - 1, 3);
+  EXPECT_EQ(check_surface(open).shared_faces, 0) << "nobody knows which of them is the surface";
+}
+
 TEST(CheckSurface, guesses_the_unit) {
   EXPECT_THAT(check_surface(shapes::box(Vec3(150, 40, 40))).findings,
               Contains(Field(&Finding::message, HasSubstr("150 m long: millimetres?"))));

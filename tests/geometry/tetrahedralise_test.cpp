@@ -255,6 +255,21 @@ TEST(Tetrahedralise, parts_with_faces_in_one_plane_are_counted_once) {
   EXPECT_LT(std::abs(*r.volume_error), 0.01);
 }
 
+// The face between two halves was a wall, with elements as fine as its triangles, and its rim was no surface for rays.
+TEST(Tetrahedralise, halves_that_share_a_face_are_filled_as_one) {
+  const TriMesh half = lab::box_surface({0, -0.05, 0}, {0.05, 0.05, 0.1}, 8);
+  TriMesh other = half;
+  other.vertices_m.col(0) *= -1;
+  other.triangles.col(1).swap(other.triangles.col(2));
+  const TriMesh both = shapes::join(half, other);
+  EXPECT_EQ(orient(both).mesh.triangles.rows(), 2 * half.triangles.rows() - 2 * 2 * 8 * 8);
+  EXPECT_TRUE(orient(both).closed);
+  const auto r = with(both, 2000);
+  expect_usable(r);
+  EXPECT_NEAR(r.check.volume_m3, 1e-3, 1e-5);
+  EXPECT_LT(std::abs(double(r.mesh.tetrahedra.rows()) / double(with(lab::box_surface({-0.05, -0.05, 0}, {0.05, 0.05, 0.1}, 8), 2000).mesh.tetrahedra.rows()) - 1), 0.2);
+}
+
 /// A ball of 5 cm with a wall.
 TriMesh hollow_ball(double wall) {
   TriMesh inner = shapes::sphere(0.05 - wall, 4);
