@@ -50,14 +50,16 @@ void check_noise(const Recording& recording, const fs::path& path) {
         if (const auto* frame = std::get_if<DepthFrame>(&one)) check_noise(frame->noise.model, file.string() + ": cameras: noise.model");
 }
 
-/// What a bag lost (it was cut off, say) may be why nothing can be made of it.
+/// What a bag lost (it was cut off, say), or what was taken otherwise than it says, may be why nothing can be made of it.
 acquisition::FromStreams recording_of(const io::MessageSource& bag, io::BagMapping& mapping) {
+  std::vector<std::string> warnings = bag.warnings;
   try {
     const SensorStreams streams = io::read_streams(bag, mapping);
+    warnings = streams.warnings;  // the bag's first
     return acquisition::recording_from(mapping.plan, streams);
   } catch (const Error& error) {
-    if (bag.warnings.empty() || error.message().find(bag.warnings.front()) != std::string::npos) throw;
-    throw Error(fmt::format("{}. Of the bag: {}", error.message(), bag.warnings.front()), error.where());
+    if (warnings.empty() || error.message().find(warnings.front()) != std::string::npos) throw;
+    throw Error(fmt::format("{}{} Of the bag: {}", error.message(), error.message().ends_with("?") ? "" : ".", warnings.front()), error.where());
   }
 }
 

@@ -50,7 +50,7 @@ void add_fixed_frames(const BagMapping& mapping, SensorStreams& streams) {
       const auto meant = nearest_word(frame.parent, names);
       std::string list;
       for (const std::string& one : names) list += (list.empty() ? "" : ", ") + one;
-      throw Error("no frame is called '" + frame.parent + "'" + (meant ? "; did you mean '" + *meant + "'?" : "") + " Known are " + list,
+      throw Error("no frame is called '" + frame.parent + "'" + (meant ? "; did you mean '" + *meant + "'?" : ".") + " Known are " + list,
                   frame.parent_where);
     }
     const std::vector<std::string> above = way_up(all, frame.parent);

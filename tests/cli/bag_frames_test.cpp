@@ -145,5 +145,22 @@ TEST(BagsOfALab, ThatAreCutOffSaySoWithTheirMapping) {
   EXPECT_NE(folder.get("err").find("the file is cut off at byte"), std::string::npos) << folder.get("err");
 }
 
+/// A calibration that was written the wrong way round puts the stick on the camera, which stands: then there is no contact.
+TEST(BagsOfALab, InWhichAFixedFrameLeavesNoContactSayWhichOneItIs) {
+  if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";
+  const TemporaryFolder folder("bag_fixed");
+  record(folder, "--seed 5 --young-modulus 20000 --force-limit 2 --unloading-steps 0 --contact 0.6 0 0.15");
+  std::string mapping = folder.get("raw/mapping.yaml");
+  const std::string tip = "tip: tip}";
+  ASSERT_NE(mapping.find(tip), std::string::npos);
+  mapping.replace(mapping.find(tip), tip.size(),
+                  "tip: tip, fixed: [{parent: camera, child: stick, T_parent_child: {position_m: [0, 0, 0.1], quaternion_xyzw: [0, 0, 0, 1]}}]}");
+  folder.put("raw/mapping.yaml", mapping);
+  const std::string command = std::string("'") + PALPATE_CLI + "' info '" + (folder.path() / "raw").string() + "' 2> '" + folder.path().string() + "/err'";
+  EXPECT_NE(std::system(command.c_str()), 0);
+  for (const char* part : {"no contact was found", "Of the bag: the frame 'stick' stands on 'camera' as frames.fixed says"})
+    EXPECT_NE(folder.get("err").find(part), std::string::npos) << folder.get("err");
+}
+
 }  // namespace
 }  // namespace palpate::io
