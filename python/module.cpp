@@ -142,14 +142,16 @@ py::object predict(const py::object& found, const py::dict& options) {
 }
 
 py::object export_to(const py::object& found, const std::string& to, const py::object& folder, double density_kg_m3,
-                     const py::object& gravity_m_s2) {
+                     const py::object& gravity_m_s2, const std::string& elements) {
+  if (elements != "split" && elements != "corners") throw Error("is '" + elements + "'; it is split or corners", "elements");
+  const auto linear = elements == "split" ? io::LinearElements::split : io::LinearElements::corners;
   const io::Exporter& exporter = io::exporter_named(to);
   const fs::path out = path_of(folder);
   cli::must_take_files(out);
   const auto gravity = from_python<std::optional<Vec3>>(gravity_m_s2, Place("gravity_m_s2"));
   const cli::LearnedObject learned = learned_of(found);
   const cli::ExportedObject exported =
-      without_lock(py::none(), [&](const OnProgress&) { return cli::exported_object(learned, exporter, {density_kg_m3, gravity}, threads_of(0)); });
+      without_lock(py::none(), [&](const OnProgress&) { return cli::exported_object(learned, exporter, {density_kg_m3, gravity, linear}, threads_of(0)); });
   fs::create_directories(out);
   std::vector<std::string> names{exporter.main_file};
   for (const auto& [name, bytes] : exported.files) {

@@ -175,11 +175,13 @@ def predict(found: Identified, *, contact_m=None, direction=(0, 0, -1), force_n=
                                         tool=tool, threads=threads))
 
 
-def export(found: Identified, to: str, folder: str | PathLike[str], *, density_kg_m3=0.0, gravity_m_s2=None) -> list[str]:
+def export(found: Identified, to: str, folder: str | PathLike[str], *, density_kg_m3=0.0, gravity_m_s2=None,
+           elements="split") -> list[str]:
     """The learned object for a simulator, one of exporters(). Returns the names of the files, the one to open first.
 
+    elements:  of simulators that take no quadratic tetrahedra: 'split' (each in eight, near to what was fitted) or 'corners' (an eighth of them, stiffer)
     What the files do not hold as it was learned (the law, supports, gravity) is said by `warnings.warn`."""
-    return _palpate.export(found, to, folder, density_kg_m3, gravity_m_s2)
+    return _palpate.export(found, to, folder, density_kg_m3, gravity_m_s2, elements)
 
 
 def suggest(recording: Recording, so_far: Identified | Identification | None = None, *, goal="both", tool=None, tip_link=None, contacts=24, tilts=2, views=0, young_modulus_pa=2e4,

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the Python module is given: what is left out, mistyped or cannot be. Run by ctest like module_test.py."""
+import os
+import tempfile
 import unittest
 import warnings
 
@@ -31,13 +33,33 @@ class Options(unittest.TestCase):
                 palpate.push(Gantry(), block_on_a_table(), [0.5, 0, 0.05], **{wrong: 1})
 
 
+def pushed_block():
+    """A step of one push, seen by a marker."""
+    scene = block_on_a_table()
+    seen = palpate.Markers(names=["m"], rest_m=[[0.54, 0, 0.5]], observed_m=[[0.54, 0, 0.499]], sigma_m=1e-4)
+    load = palpate.Load(tool="stick", force_n=[0, 0, -10], contact_m=[0.5, 0, 0.5])
+    scene.pushes = [palpate.Push(name="top", steps=[palpate.Step(time_s=1, loads=[load], observations=[seen])])]
+    return scene
+
+
+class Export(unittest.TestCase):
+    def test_corners_alone_are_an_eighth_of_the_elements(self):
+        with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+            warnings.simplefilter("ignore")
+            found = palpate.identify(pushed_block(), refine="none", element="tet10", cross_checks=False, poisson_ratio=0.3)
+            size = {}
+            for elements in ("split", "corners"):
+                files = palpate.export(found, "sofa", f"{folder}/{elements}", density_kg_m3=30, elements=elements)
+                size[elements] = sum(os.path.getsize(f"{folder}/{elements}/{name}") for name in files)
+            self.assertLess(size["corners"], 0.3 * size["split"])
+            with self.assertRaisesRegex(palpate.Error, "elements: is 'corner'; it is split or corners"):
+                palpate.export(found, "sofa", folder, elements="corner")
+
+
 class Warnings(unittest.TestCase):
     def test_what_is_odd_is_said_once(self):
-        scene = block_on_a_table()
+        scene = pushed_block()
         scene.tools[0].shape = "sphere"
-        seen = palpate.Markers(names=["m"], rest_m=[[0.54, 0, 0.5]], observed_m=[[0.54, 0, 0.499]], sigma_m=1e-4)
-        load = palpate.Load(tool="stick", force_n=[0, 0, -10], contact_m=[0.5, 0, 0.5])
-        scene.pushes = [palpate.Push(name="top", steps=[palpate.Step(time_s=1, loads=[load], observations=[seen])])]
         quick = dict(refine="none", element="tet4", cross_checks=False, poisson_ratio=0.3)
         with self.assertWarnsRegex(UserWarning, "taken to press all of its radius") as caught:
             palpate.identify(scene, **quick)
