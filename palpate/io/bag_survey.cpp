@@ -138,7 +138,7 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
                                                                                                 : roots.front();
   text += "frames: {base: " + base +
           ", tip: " + guess_frame(frames, {"tool_tip", "tip", "tcp", "tool", "ee", "hand", "flange"}) +
-          "}   # check: a tip or camera that no frame of these is: frames.fixed\n";
+          "}   # check: of a tip or camera that no frame names, frames.fixed says where it is\n";
   text += "wrench: {reports: force_on_sensor}   # check: or force_on_object; the sign shows in one push\n";
   if (!depth.empty()) text += "clocks: {camera_offset_s: estimate}\n";
   return text + "steps: {by: detection, travel_sigma_m: 0.0005}\n";
