@@ -459,11 +459,9 @@ class Assembly {
                                           const std::string& topics) {
     const auto& robot = plan_.recording.robot;
     if (!wanted.value_or(robot && sensing::has_shapes(*robot) && !streams_.joints.empty())) return std::nullopt;
-    if (!robot)
-      throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description", plan_.source + ": " + topics);
+    if (!robot) throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description", plan_.source + ": " + topics);
     if (!mask_) mask_ = std::make_unique<sensing::RobotMask>(*robot);
-    const sensing::Kinematics& kinematics = mask_->kinematics();
-    const std::string root = kinematics.robot().links[std::size_t(kinematics.root_link())].name;
+    const std::string root = mask_->kinematics().robot().links[std::size_t(mask_->kinematics().root_link())].name;
     const auto base = pose_of(root, time_s);
     if (!base) {
       of_steps_.add("the robot is not masked in the " + where, step_s, ": the pose of '" + root + "' is not known");
@@ -493,6 +491,9 @@ class Assembly {
 
 }  // namespace
 
-FromStreams recording_from(const StreamPlan& plan, const SensorStreams& streams) { return Assembly(plan, streams).run(); }
+FromStreams recording_from(const StreamPlan& plan, const SensorStreams& streams) {
+  const auto told = with_joints_of_transforms(plan.recording.robot, streams);
+  return Assembly(plan, told ? *told : streams).run();
+}
 
 }  // namespace palpate::acquisition

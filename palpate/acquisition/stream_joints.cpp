@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/acquisition/frame_tree.hpp"
+#include "palpate/core/joint_motion.hpp"
+
 namespace palpate::acquisition {
 namespace {
 
@@ -16,7 +19,52 @@ bool is_continuous(const std::optional<RobotModel>& robot, const std::string& jo
          });
 }
 
+/// What moves the joint's child to where it stands; nothing where the joint cannot.
+std::optional<double> position_of(const RobotJoint& joint, const Pose& T_parent_child) {
+  constexpr double near = 0.01;  // m, and of a rotation matrix: a description that was calibrated since moves less
+  RobotJoint unit = joint;
+  unit.axis.normalize();
+  const Pose motion = joint.T_parent_joint.inverse() * T_parent_child;
+  const Eigen::Quaterniond turn(motion.linear());
+  const double position = joint.kind == RobotJoint::Kind::prismatic ? unit.axis.dot(motion.translation())
+                                                                    : nearest_turn(0, 2 * std::atan2(unit.axis.dot(turn.vec()), turn.w()));
+  if ((joint_motion(unit, position).matrix() - motion.matrix()).norm() > near) return std::nullopt;
+  return position;
+}
+
 }  // namespace
+
+std::optional<SensorStreams> with_joints_of_transforms(const std::optional<RobotModel>& robot, const SensorStreams& streams) {
+  if (!robot || !streams.joints.empty()) return std::nullopt;
+  const FrameTree tree(streams.frames);
+  std::vector<const RobotJoint*> told;
+  std::vector<double> times_s;
+  for (const RobotJoint& joint : robot->joints) {
+    if (joint.kind == RobotJoint::Kind::fixed || !joint.mimic.empty() || !(joint.axis.norm() > 0)) continue;
+    const auto link = std::find_if(streams.frames.begin(), streams.frames.end(), [&](const FrameLink& one) {
+      return one.parent == joint.parent && one.child == joint.child && !one.samples.empty() && position_of(joint, one.samples.front().T_parent_child);
+    });
+    if (link == streams.frames.end()) continue;
+    told.push_back(&joint);
+    if (times_s.empty() && !link->is_fixed)
+      for (const PoseSample& sample : link->samples) times_s.push_back(sample.time_s);
+  }
+  if (times_s.empty()) return std::nullopt;
+  SensorStreams with = streams;
+  with.joint_names.clear();
+  for (const RobotJoint* joint : told) with.joint_names.push_back(joint->name);
+  for (const double time_s : times_s) {
+    JointSample sample{time_s, {}};
+    for (const RobotJoint* joint : told) {
+      const auto pose = tree.lookup(joint->parent, joint->child, time_s);
+      const auto position = pose ? position_of(*joint, *pose) : std::nullopt;
+      if (!position) break;
+      sample.positions.push_back(*position);
+    }
+    if (sample.positions.size() == told.size()) with.joints.push_back(std::move(sample));
+  }
+  return with.joints.empty() ? std::nullopt : std::optional(std::move(with));
+}
 
 bool knows(const RobotModel& robot, const std::string& joint) {
   return std::any_of(robot.joints.begin(), robot.joints.end(), [&](const RobotJoint& one) { return one.name == joint; });

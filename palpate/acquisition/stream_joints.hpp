@@ -14,6 +14,10 @@ namespace palpate::acquisition {
 /// True when a robot's description has a joint of that name.
 bool knows(const RobotModel& robot, const std::string& joint);
 
+/// The streams with joint states made of their transforms, as `robot_state_publisher` made those of the joints: where there are no joint
+/// states and transforms tell where links stand on each other, as these joints can move them. Nothing elsewhere.
+std::optional<SensorStreams> with_joints_of_transforms(const std::optional<RobotModel>& robot, const SensorStreams& streams);
+
 /// Joints at a time, interpolated, continuous ones of the robot the short way around; nothing away from any sample.
 std::optional<std::vector<double>> joints_at(const SensorStreams& streams, const std::optional<RobotModel>& robot, double time_s);
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "acquisition/pressed_spring.hpp"
+#include "palpate/acquisition/stream_joints.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::acquisition {
@@ -266,6 +267,43 @@ TEST(FromStreams, WhatIsFixedToAKnownFrameNeedsNoJointStates) {
   const std::string said = refusal(described, streams);
   EXPECT_THAT(said, HasSubstr("frame 'tip'"));
   EXPECT_THAT(said, HasSubstr("joint 'lift', and there are no joint states (topics.joints)"));
+}
+
+/// Who records /tf and the description and no joint states has told them all the same.
+TEST(FromStreams, TransformsOfTheLinksTellTheJoints) {
+  SensorStreams streams = lab();
+  streams.joints.clear(), streams.joint_names.clear();
+  const RobotModel robot = column();
+  FrameLink& carriage = streams.frames[0];
+  carriage.child = "carriage";
+  for (PoseSample& sample : carriage.samples) {
+    sample.T_parent_child = robot.joints[0].T_parent_joint;
+    sample.T_parent_child.translation().z() += height_m(sample.time_s);
+  }
+  StreamPlan described = plan();
+  described.recording.robot = robot;
+  const auto made = recording_from(described, streams).recording;
+  ASSERT_EQ(made.joint_names, std::vector<std::string>{"lift"});
+  std::size_t masked = 0;
+  for (const Step& step : made.pushes.at(0).steps) {
+    ASSERT_EQ(step.joints_rad.size(), 1u);
+    EXPECT_NEAR(step.joints_rad[0], height_m(step.time_s), 1e-9);
+    for (const Observation& one : step.observations)
+      if (const auto* frame = std::get_if<DepthFrame>(&one)) masked += frame->robot_is_masked ? 1 : 0;
+  }
+  EXPECT_GT(masked, 0u);
+
+  // A turn, between -pi and pi; and a link that is no such joint's tells nothing.
+  described.recording.robot->joints[0].kind = RobotJoint::Kind::continuous;
+  EXPECT_TRUE(recording_from(described, streams).recording.joint_names.empty());
+  for (PoseSample& sample : carriage.samples) {
+    sample.T_parent_child = robot.joints[0].T_parent_joint;
+    sample.T_parent_child.linear() = Eigen::AngleAxisd(-3 + 0.001 * sample.time_s, Vec3::UnitZ()).toRotationMatrix();
+  }
+  const auto turned = with_joints_of_transforms(described.recording.robot, streams);
+  ASSERT_TRUE(turned);
+  ASSERT_EQ(turned->joints.size(), carriage.samples.size());
+  EXPECT_NEAR(turned->joints.back().positions.at(0), -3 + 0.001 * carriage.samples.back().time_s, 1e-9);
 }
 
 /// A whole arm in the picture would be taken for the object.
