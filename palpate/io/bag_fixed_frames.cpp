@@ -61,17 +61,14 @@ void add_fixed_frames(const BagMapping& mapping, SensorStreams& streams) {
     const auto before = said.find(frame.child);
     if (before == said.end()) continue;
     const std::string& base = mapping.plan.base_frame;
-    const std::string base_root = way_up(all, base).back();
-    if (way_up(said, frame.child).back() == way_up(said, base).back() && above.back() != base_root)
+    if (way_up(said, frame.child).back() == way_up(said, base).back() && above.back() != way_up(all, base).back())
       throw Error("would tear '" + frame.child + "' off '" + before->second + "' and with it off the base frame: '" + frame.parent +
                       "' is not connected to that. Give the inverse, with '" + frame.child + "' as the parent",
                   frame.where);
-    streams.warnings.push_back("the frame '" + frame.child + "' stands on '" + frame.parent + "' as frames.fixed says, not on '" +
-                               before->second + "' as the " +
-                               (std::any_of(streams.frames.begin(), streams.frames.end(),
-                                            [&](const FrameLink& link) { return link.child == frame.child; })
-                                    ? "bag's transforms say"
-                                    : "robot's description says"));
+    const bool by_transforms =
+        std::any_of(streams.frames.begin(), streams.frames.end(), [&](const FrameLink& link) { return link.child == frame.child; });
+    streams.warnings.push_back("the frame '" + frame.child + "' stands on '" + frame.parent + "' as frames.fixed says, not on '" + before->second +
+                               "' as the " + (by_transforms ? "bag's transforms say" : "robot's description says"));
   }
   for (const FixedFrame& frame : mapping.fixed_frames) {
     std::erase_if(streams.frames, [&](const FrameLink& link) { return link.child == frame.child; });
