@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "cli/mistyped.hpp"
 #include "cli/paths.hpp"
@@ -16,6 +17,7 @@
 #include "palpate/io/recording.hpp"
 #include "palpate/sensing/arm_mask.hpp"
 #include "palpate/sensing/depth_noise.hpp"
+#include "palpate/sensing/kinematics.hpp"
 #include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate::cli {
@@ -80,7 +82,7 @@ LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
     if (!given.empty()) throw Error("is a recording; only a bag needs a mapping", path.string());
     Recording recording = io::read_recording_unchecked(path);
     check_noise(recording, path);
-    return {std::move(recording), {}, {}};
+    return {std::move(recording), {}};
   }
   const fs::path file = given.empty() ? mapping_of(path) : given;
   if (file.empty()) {
@@ -89,25 +91,30 @@ LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
   }
   io::BagMapping mapping = io::read_mapping(file);
   for (const io::MappedCamera& camera : mapping.cameras) check_noise(camera.like.noise.model, camera.noise_where);
-  const io::MessageSource bag = io::read_bag(path);
-  acquisition::FromStreams made = recording_of(bag, mapping);
+  acquisition::FromStreams made = recording_of(io::read_bag(path), mapping);  // the bag's bytes are not kept beside those hashed below
+  made.recording.warnings.insert(made.recording.warnings.end(), made.notes.begin(), made.notes.end());
   std::error_code code;
   if (fs::is_regular_file(path, code))
     made.recording.input_hashes[path.filename().string()] = io::sha256_hex(io::read_file(path));
-  return {std::move(made.recording), std::move(made.clocks), std::move(made.notes)};
+  return {std::move(made.recording), std::move(made.clocks)};
 }
 
 namespace {
+
+/// By the robot's description: nobody has done it.
+bool is_to_be_masked(const Step& step) {
+  return std::any_of(step.observations.begin(), step.observations.end(), [](const Observation& one) {
+    const auto* frame = std::get_if<DepthFrame>(&one);
+    return frame != nullptr && !frame->robot_is_masked;
+  });
+}
 
 /// Images in which a part of the robot stays for want of a joint.
 std::optional<std::string> unmasked(const Recording& recording) {
   if (!recording.robot || !sensing::has_shapes(*recording.robot)) return std::nullopt;
   const bool is_asked = std::any_of(recording.pushes.begin(), recording.pushes.end(), [](const Push& push) {
     return std::any_of(push.steps.begin(), push.steps.end(), [](const Step& step) {
-      return !step.joints_rad.empty() && std::any_of(step.observations.begin(), step.observations.end(), [](const Observation& one) {
-        const auto* frame = std::get_if<DepthFrame>(&one);
-        return frame != nullptr && !frame->robot_is_masked;
-      });
+      return !step.joints_rad.empty() && is_to_be_masked(step);
     });
   });
   if (!is_asked) return std::nullopt;
@@ -144,12 +151,67 @@ std::optional<std::string> nothing_masked(const Recording& recording) {
                      bare);
 }
 
+/// A robot whose description does not begin at the base stands elsewhere in the images, where its mask then lies.
+std::optional<std::string> misplaced_robot(const Recording& recording) {
+  if (!recording.robot || !sensing::has_shapes(*recording.robot)) return std::nullopt;
+  constexpr double longest_stick_m = 0.5;
+  const sensing::Kinematics kinematics(*recording.robot);
+  double nearest_m = std::numeric_limits<double>::infinity();
+  bool is_asked = false;
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps) {
+      if (!step.T_base_tip || step.joints_rad.empty() || !is_to_be_masked(step)) continue;
+      is_asked = true;
+      for (const auto& pose : kinematics.known_link_poses(recording.joint_names, step.joints_rad))
+        if (pose) nearest_m = std::min(nearest_m, (pose->translation() - step.T_base_tip->translation()).norm());
+    }
+  if (!is_asked || nearest_m < longest_stick_m) return std::nullopt;
+  return fmt::format("robot '{}': by its description and the joints no link comes nearer to the tip (T_base_tip) than {:.2f} m, so that it is masked where it "
+                     "is not; its root link '{}' must be the base frame of all poses (a UR controller's base is turned by 180 degrees about z from it)",
+                     recording.robot->name, nearest_m, kinematics.robot().links[std::size_t(kinematics.root_link())].name);
+}
+
+/// The middle depth outside the mask; 0 where there is none.
+double median_depth_m(const DepthFrame& frame) {
+  std::vector<float> depths;
+  const bool masked = frame.mask.size() == frame.depth_m.size();
+  for (Eigen::Index i = 0; i < frame.depth_m.size(); ++i)
+    if (frame.depth_m.data()[i] > 0 && !(masked && frame.mask.data()[i] != 0)) depths.push_back(frame.depth_m.data()[i]);
+  if (depths.empty()) return 0;
+  const auto middle = depths.begin() + std::ptrdiff_t(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+/// The D435's model is a parabola with its foot at 0.77 m: nearer, it grows, and the sensor does not.
+std::optional<std::string> noise_of_farther(const Recording& recording) {
+  constexpr double near_m = 0.5;
+  std::size_t count = 0;
+  double nearest_m = near_m;
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps)
+      for (const Observation& one : step.observations) {
+        const auto* frame = std::get_if<DepthFrame>(&one);
+        if (frame == nullptr || frame->noise.model != "realsense_d435") continue;
+        const double depth_m = median_depth_m(*frame);
+        if (depth_m > 0 && depth_m < near_m) ++count, nearest_m = std::min(nearest_m, depth_m);
+      }
+  if (count == 0) return std::nullopt;
+  DepthNoise noise;
+  noise.model = "realsense_d435";
+  return fmt::format("{} depth images are taken from {:.2f} m, where the noise model realsense_d435, which was measured from afar, states too much "
+                     "({:.1f} mm; its least is at 0.77 m): take realsense_stereo, or constant with what `palpate info` measures",
+                     count, nearest_m, 1000 * sensing::axial_sigma_m(noise, {.depth_m = nearest_m}));
+}
+
 }  // namespace
 
 void warn_of_oddities(Recording& recording) {
   for (std::string& odd : io::odd_numbers(recording)) recording.warnings.push_back(std::move(odd));
   if (auto lack = unmasked(recording)) recording.warnings.push_back(std::move(*lack));
   if (auto lack = nothing_masked(recording)) recording.warnings.push_back(std::move(*lack));
+  if (auto elsewhere = misplaced_robot(recording)) recording.warnings.push_back(std::move(*elsewhere));
+  if (auto near = noise_of_farther(recording)) recording.warnings.push_back(std::move(*near));
 }
 
 void check_loaded(Recording& recording, const std::string& lister) {
@@ -167,7 +229,6 @@ Recording load_recording_unchecked(Session& session, const fs::path& path, const
   LoadedRecording loaded = load_recording(path, mapping);
   for (const acquisition::ClockOffset& clock : loaded.clocks)
     if (clock.usable) session.say(fmt::format("clock      {}: {}", clock.sensor, to_words(clock)));
-  for (const std::string& note : loaded.notes) session.warn(note);
   if (clocks != nullptr) *clocks = std::move(loaded.clocks);
   return std::move(loaded.recording);
 }

@@ -13,22 +13,21 @@ namespace palpate::cli {
 
 /// A folder with recording.yaml, or a bag with a mapping (given, or mapping.yaml in the bag's folder).
 struct LoadedRecording {
-  Recording recording;
+  Recording recording;                           ///< its warnings also say what was left out of a bag
   std::vector<acquisition::ClockOffset> clocks;  ///< of a bag
-  std::vector<std::string> notes;                ///< what was left out of it, in words
 };
 
 /// Says nothing, and does not check. @throws Error
 LoadedRecording load_recording(const std::filesystem::path& path, const std::filesystem::path& mapping);
 
-/// Adds to its warnings what is odd. @throws Error for the first of what check_recording finds
 /// What can be, but seldom is meant, as warnings of the recording: odd numbers, a robot's part that cannot be masked.
 void warn_of_oddities(Recording& recording);
 
+/// Adds to its warnings what is odd. @throws Error for the first of what check_recording finds
 /// @param lister  that lists all of it, for the message
 void check_loaded(Recording& recording, const std::string& lister = "`palpate info`");
 
-/// What a verb is given as its recording, checked. Says what was found in a bag: offsets of clocks, steps that were left out. @throws Error; also for
+/// What a verb is given as its recording, checked. Says the offsets of a bag's clocks; its warnings are the verb's to say. @throws Error; also for
 /// what check_recording finds.
 /// @param clocks  if given, the offsets that were estimated between a bag's clocks
 Recording load_recording(Session& session, const std::filesystem::path& path, const std::filesystem::path& mapping,

@@ -70,6 +70,9 @@ void tell_gravity(const LearnedObject& learned, const io::Exporter& exporter, co
                                        sagged && !falls ? ", since " + why : ""));
   else if (sagged && !choice.gravity_m_s2)
     out.notes.push_back("gravity is left out: " + why);
+  else if (exporter.needs_density && !falls && !choice.gravity_m_s2)
+    out.warnings.push_back("gravity is 0 in what is written, as in the recording's environment: nothing falls there; `--gravity 0 0 -9.81` (Python: "
+                           "gravity_m_s2) says otherwise");
   if (sagged && falls) out.warnings.push_back("the shape was measured with its weight on: under gravity it sags once more");
 }
 

@@ -149,7 +149,7 @@ int main(int argc, char** argv) {
                 error.code().message() + "; check that it is there, its permissions and the room on the disk", where);
   } catch (const std::bad_alloc&) {
     return fail(session, exit_internal, "internal",
-                "not enough memory for this problem; use a coarser mesh or fewer points");
+                "not enough memory for this problem; use a coarser mesh or fewer points, or of a bag record only the topics that its mapping names");
   } catch (const std::exception& error) {
     return fail(session, exit_internal, "internal",
                 std::string("internal error: ") + error.what() + " (please report this with the command that you ran)");

@@ -101,7 +101,7 @@ int run(const Options& given, Session& session) {
     data.point_fields["von_mises_pa"] = found.von_mises_pa;
     data.point_fields["von_mises_std_pa"] = found.von_mises_std_pa;
     io::write_mesh(given.out / "prediction.vtu", data);
-    io::write_file(given.out / "prediction.json", json.dump(1) + "\n");
+    io::write_file(given.out / "prediction.json", json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     session.say(fmt::format("written              {}", (given.out / "prediction.vtu").string()));
   }
   session.result(json);

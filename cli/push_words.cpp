@@ -50,6 +50,10 @@ std::vector<std::string> push_warnings(const std::string& name, const acquisitio
     out.push_back(fmt::format("{}: the force passed its limit by {:.3g} N (to {:.3g} N): the object is stiffer than one motion foresees; "
                               "set a smaller --increment or --push-speed",
                               name, report.overshoot_n, report.highest_force_n));
+  if (report.blank_images > 0)
+    out.push_back(fmt::format("{}: {} of the camera's images held no depth at all and are left out; look whether the arm stands before the lens, "
+                              "and at the camera's range",
+                              name, report.blank_images));
   for (const int step : report.unsettled)
     out.push_back(fmt::format("step {} of {} had not settled when it was recorded", step, name));
   if (!report.came_back)

@@ -16,7 +16,7 @@ namespace palpate::cli {
 void write_json_aside(const nlohmann::json& json, const std::filesystem::path& file) {
   std::error_code code;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), code);
-  io::write_file(file, json.dump(2) + "\n");
+  io::write_file(file, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");  // paths need not be UTF-8
 }
 
 void TruthFile::go_on(const std::vector<Push>& recorded) {
@@ -24,6 +24,14 @@ void TruthFile::go_on(const std::vector<Push>& recorded) {
   std::ifstream stream(file_);
   const nlohmann::json before = nlohmann::json::parse(stream, nullptr, false);
   if (!before.is_object()) return;
+  try {
+    go_on_from(before, recorded);
+  } catch (const nlohmann::json::exception&) {
+    throw Error("is damaged; put it aside, or record into another folder", file_.string());
+  }
+}
+
+void TruthFile::go_on_from(const nlohmann::json& before, const std::vector<Push>& recorded) {
   for (const char* field : {"object", "young_modulus_pa", "poisson_ratio", "material", "regions"}) {
     const nlohmann::json then = before.value(field, nlohmann::json()), now = known_->value(field, nlohmann::json());
     if (then != now)

@@ -28,6 +28,8 @@ class TruthFile {
   void add(const nlohmann::json& step);
 
  private:
+  void go_on_from(const nlohmann::json& before, const std::vector<Push>& recorded);
+
   std::filesystem::path file_;
   std::optional<nlohmann::json> known_;
 };

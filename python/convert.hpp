@@ -213,20 +213,15 @@ struct Convert<Eigen::Matrix<Scalar, Rows, Cols, Order, MostRows, MostCols>> {
   }
 };
 
+/// The nearest one, as files have it: who writes few digits means it. @throws Error naming the place, and by how much it is off (poses.cpp)
+Pose rigid_pose(const Eigen::Matrix4d& matrix, const Place& place);
+
 template <>
 struct Convert<Pose> {
   static std::string type() { return "numpy.ndarray, 4 x 4"; }
   static py::object to(const Pose& value) { return Convert<Eigen::Matrix4d>::to(value.matrix()); }
   static Pose from(py::handle given, const Place& place) {
-    const Eigen::Matrix4d matrix = Convert<Eigen::Matrix4d>::from(given, place);
-    const Mat3 turn = matrix.topLeftCorner<3, 3>();
-    constexpr double rounding = 1e-6;
-    const bool rigid = matrix.allFinite() && (turn.transpose() * turn - Mat3::Identity()).cwiseAbs().maxCoeff() < rounding &&
-                       turn.determinant() > 0 && (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() < rounding;
-    if (!rigid) place.refuse("must be a rigid transform: a rotation, a translation in metres, and 0 0 0 1 in the last row");
-    Pose pose;
-    pose.matrix() = matrix;
-    return pose;
+    return rigid_pose(Convert<Eigen::Matrix4d>::from(given, place), place);
   }
 };
 

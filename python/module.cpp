@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The functions behind `import palpate`. What users see, with its documentation, is python/palpate/__init__.py.
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <filesystem>
 
 #include "cli/bag_recording.hpp"
@@ -23,6 +24,8 @@
 #include "palpate/sensing/depth_noise.hpp"
 #include "palpate/suggest.hpp"
 #include "python/arguments.hpp"
+#include "python/check.hpp"
+#include "python/poses.hpp"
 #include "python/python_calls.hpp"
 #include "python/robot.hpp"
 
@@ -38,7 +41,7 @@ void for_each_noun(auto&& each) {
                           Step, Push, Environment, ModelDefaults, Rest, RobotShape, RobotLink, RobotJoint, RobotModel, Region, Recording, Verdict,
                           Parameter, Nuisance, Slip, FitSummary, HeldOut, RegionShare, BudgetEntry, YoungAtLoad, LawFit, StepFit, PosteriorGrid,
                           FitIteration, Identification, Identified, prediction::Band, PushPrediction, SuggestedPush,
-                          acquisition::RobotState, acquisition::RobotLimits, MadePush, LoopPush, Loop>();
+                          acquisition::RobotState, acquisition::RobotLimits, MadePush, LoopPush, Loop, estimation::CheckedError, RigCheck>();
 }
 
 /// What Python makes its classes of: [(name, about, [(field, type, about, maker of its default)], taker of the class)].
@@ -63,7 +66,6 @@ py::object read_recording(const py::object& path, const py::object& mapping) {
   std::vector<std::string>& warnings = loaded.recording.warnings;
   for (const acquisition::ClockOffset& clock : loaded.clocks)
     if (clock.usable) warnings.push_back("clock of " + clock.sensor + ": " + cli::to_words(clock));
-  warnings.insert(warnings.end(), loaded.notes.begin(), loaded.notes.end());
   return to_python(loaded.recording);
 }
 
@@ -71,13 +73,6 @@ py::list problems(const py::object& given) {
   py::list list;
   for (const io::Problem& problem : io::check_recording(recording_of(given))) list.append(py::make_tuple(to_python(problem.where), to_python(problem.what)));
   return list;
-}
-
-/// What is odd and does not stand in `known`, where Python's caller called.
-void warn_of(const std::vector<std::string>& odd, const std::vector<std::string>& known) {
-  const py::object warn = py::module_::import("warnings").attr("warn");
-  for (const std::string& text : odd)
-    if (std::find(known.begin(), known.end(), text) == known.end()) warn(text, py::arg("stacklevel") = 2);
 }
 
 py::object identify_recording(const py::object& given, const py::dict& options, const py::object& progress) {
@@ -141,24 +136,33 @@ py::object predict(const py::object& found, const py::dict& options) {
                                   there.von_mises_pa, there.von_mises_std_pa, there.largest_displacement_m, there.largest_von_mises_pa, push.warnings});
 }
 
-py::object export_to(const py::object& found, const std::string& to, const py::object& folder, double density_kg_m3,
+/// 0: the recording's. @throws Error for what no recording may state either (palpate/core/recording_values.cpp)
+double density_of(const py::object& given) {
+  const double density = from_python<std::optional<double>>(given, Place("density_kg_m3")).value_or(0);
+  if (density != 0 && !(density >= 5 && density <= 30000))
+    throw Error(fmt::format("is {:g}, outside 5 to 30000 kg/m3; is it in g/cm3? Multiply by 1000. None: the recording's", density), "density_kg_m3");
+  return density;
+}
+
+py::object export_to(const py::object& found, const std::string& to, const py::object& folder, const py::object& density_kg_m3,
                      const py::object& gravity_m_s2, const std::string& elements) {
   if (elements != "split" && elements != "corners") throw Error("is '" + elements + "'; it is split or corners", "elements");
   const auto linear = elements == "split" ? io::LinearElements::split : io::LinearElements::corners;
   const io::Exporter& exporter = io::exporter_named(to);
+  const double density = density_of(density_kg_m3);
   const fs::path out = path_of(folder);
   cli::must_take_files(out);
   const auto gravity = from_python<std::optional<Vec3>>(gravity_m_s2, Place("gravity_m_s2"));
   const cli::LearnedObject learned = learned_of(found);
   const cli::ExportedObject exported =
-      without_lock(py::none(), [&](const OnProgress&) { return cli::exported_object(learned, exporter, {density_kg_m3, gravity, linear}, threads_of(0)); });
+      without_lock(py::none(), [&](const OnProgress&) { return cli::exported_object(learned, exporter, {density, gravity, linear}, threads_of(0)); });
   fs::create_directories(out);
   std::vector<std::string> names{exporter.main_file};
   for (const auto& [name, bytes] : exported.files) {
     io::write_file(out / name, bytes);
     if (name != exporter.main_file) names.push_back(name);
   }
-  warn_of(exported.warnings, {});
+  warn_of(exported.warnings);
   return to_python(names);
 }
 
@@ -223,6 +227,21 @@ class OnlineFront {
   OnlineEstimator estimator_;
 };
 
+/// Of a folder that vanished or was closed after it had been looked at: a place and a reason like any other.
+Error error_of(const fs::filesystem_error& wrong) {
+  const fs::path& path = wrong.path1().empty() ? wrong.path2() : wrong.path1();
+  return Error(fmt::format("cannot be made, read or written ({}); give another path, or change its permissions", wrong.code().message()),
+               path.empty() ? "path" : path.string());
+}
+
+void raise_error(PyObject* type, const Error& wrong) {
+  const auto text = [](const std::string& words) { return to_python(words); };  // files' names may hold any bytes
+  const py::object raised = py::reinterpret_borrow<py::object>(type)(text(wrong.what()));
+  raised.attr("where") = text(wrong.where());
+  raised.attr("message") = text(wrong.message());
+  PyErr_SetObject(type, raised.ptr());
+}
+
 py::object demo(int seed, const py::object& progress) {
   lab::DemoOptions options;
   options.seed = static_cast<std::uint64_t>(seed);
@@ -237,6 +256,7 @@ py::object demo(int seed, const py::object& progress) {
 PYBIND11_MODULE(_palpate, m) {
   using namespace palpate;
   using namespace palpate::python;
+  namespace fs = std::filesystem;
   m.attr("__version__") = version;
   static PyObject* const error = PyErr_NewExceptionWithDoc(
       "palpate.Error", "No answer can exist: `where` names the file, line and field (or the argument), `message` says what is wrong and the cure.",
@@ -246,11 +266,9 @@ PYBIND11_MODULE(_palpate, m) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const Error& wrong) {
-      const auto text = [](const std::string& words) { return to_python(words); };  // files' names may hold any bytes
-      const py::object raised = py::reinterpret_borrow<py::object>(error)(text(wrong.what()));
-      raised.attr("where") = text(wrong.where());
-      raised.attr("message") = text(wrong.message());
-      PyErr_SetObject(error, raised.ptr());
+      raise_error(error, wrong);
+    } catch (const fs::filesystem_error& wrong) {
+      raise_error(error, error_of(wrong));
     }
   });
   m.def("nouns", &nouns);
@@ -269,6 +287,8 @@ PYBIND11_MODULE(_palpate, m) {
   m.def("write_result", &write_result);
   m.def("read_result", &read_result);
   m.def("result_json", [](const py::object& answer) { return io::result_json(from_python<Identification>(answer, Place("answer"))).dump(); });
+  m.def("check", &check_with);
+  m.def("pose", &pose_of);
   m.def("predict", &predict);
   m.def("export", &export_to);
   m.def("suggest", &suggest_pushes);

@@ -2,9 +2,12 @@
 // Long work on behalf of Python: without its lock, and with a word now and then to who asked for it.
 #pragma once
 
+#include <algorithm>
 #include <exception>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "palpate/core/progress.hpp"
 #include "python/convert.hpp"
@@ -56,6 +59,13 @@ class PythonProgress {
   std::exception_ptr raised_;
   bool stopped_ = false;  // by the callable, which said so once
 };
+
+/// What is odd and does not stand in `known`, where Python's caller called.
+inline void warn_of(const std::vector<std::string>& odd, const std::vector<std::string>& known = {}) {
+  const py::object warn = py::module_::import("warnings").attr("warn");
+  for (const std::string& text : odd)
+    if (std::find(known.begin(), known.end(), text) == known.end()) warn(to_python(text), py::arg("stacklevel") = 2);
+}
 
 /// @param work  touches nothing of Python's but by `told`
 template <typename Work>

@@ -3,14 +3,18 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "cli/new_folder.hpp"
 #include "cli/paths.hpp"
+#include "cli/push_words.hpp"
 #include "palpate/io/recording.hpp"
 #include "python/arguments.hpp"
 #include "python/python_calls.hpp"
+#include "python/robot_checks.hpp"
 
 namespace palpate::python {
 namespace {
@@ -28,7 +32,7 @@ class PythonRobot : public acquisition::Robot {
   acquisition::RobotState read() override {
     return asks_.call([&] {
       auto state = from_python<acquisition::RobotState>(robot_.attr("read")(), Place("robot.read()"));
-      if (!state.force_n.allFinite() || !std::isfinite(state.time_s)) throw Error("holds a number that is not finite", "robot.read()");
+      check_state(state, clock_s_);
       return state;
     });
   }
@@ -42,7 +46,9 @@ class PythonRobot : public acquisition::Robot {
     asks_.call([&] { robot_.attr("stop")(); });
   }
   DepthFrame take_depth_image() override {
-    return asks_.call([&] { return from_python<DepthFrame>(robot_.attr("take_depth_image")(), Place("robot.take_depth_image()")); });
+    return asks_.call([&] {
+      return checked_frame(from_python<DepthFrame>(robot_.attr("take_depth_image")(), Place("robot.take_depth_image()")), "take_depth_image");
+    });
   }
   void wait(double duration_s) override {
     asks_.call([&] { robot_.attr("wait")(duration_s); });
@@ -51,13 +57,16 @@ class PythonRobot : public acquisition::Robot {
   acquisition::RobotLimits limits() const override {
     return asks_.call([&] {
       if (!py::hasattr(robot_, "limits")) return acquisition::RobotLimits{};
-      return from_python<acquisition::RobotLimits>(robot_.attr("limits"), Place("robot.limits"));
+      const auto limits = from_python<acquisition::RobotLimits>(robot_.attr("limits"), Place("robot.limits"));
+      check_limits(limits);
+      return limits;
     });
   }
   std::optional<DepthFrame> look(int view, int views) override {
     return asks_.call([&] {
       if (!py::hasattr(robot_, "look")) return std::optional<DepthFrame>{};
-      return from_python<std::optional<DepthFrame>>(robot_.attr("look")(view, views), Place("robot.look()"));
+      auto frame = from_python<std::optional<DepthFrame>>(robot_.attr("look")(view, views), Place("robot.look()"));
+      return frame ? std::optional(checked_frame(std::move(*frame), "look")) : std::nullopt;
     });
   }
   bool reaches(const Pose& T_base_tip) const {
@@ -68,6 +77,7 @@ class PythonRobot : public acquisition::Robot {
   py::object robot_;
   PythonProgress& asks_;
   double travel_sigma_m_ = 0;
+  double clock_s_ = -std::numeric_limits<double>::infinity();
 };
 
 acquisition::PushOptions push_options(Options& from) {
@@ -103,6 +113,17 @@ acquisition::PushOptions push_options(Options& from) {
   from.take("slip_least_force_n", options.slip.least_force_n);
   from.take("changed_share", options.changed_share);
   return options;
+}
+
+/// What the program says after a push. It names its options, which are arguments here.
+std::vector<std::string> push_warnings(const std::string& name, const acquisition::PushReport& report) {
+  constexpr std::pair<std::string_view, std::string_view> arguments[] = {
+      {"--increment", "increment_m"}, {"--push-speed", "push_speed_m_s"}, {"--blind-retreat", "blind_retreat_m"}};
+  std::vector<std::string> warnings = cli::push_warnings(name, report);
+  for (std::string& text : warnings)
+    for (const auto& [option, argument] : arguments)
+      if (const auto at = text.find(option); at != std::string::npos) text.replace(at, option.size(), argument);
+  return warnings;
 }
 
 /// @throws Error where the scene has no such tool
@@ -153,7 +174,8 @@ LoopPush loop_push(const ExploredPush& push, const PushScene& scene) {
 
 MadePush made_push(const acquisition::PushReport& report) {
   return {acquisition::to_words(report.stop), report.message, acquisition::is_at_a_limit(report.stop), report.contact_m, report.highest_force_n,
-          report.deepest_m, report.steps, report.unsettled, report.compared, report.came_back, report.changed_share, report.drift_n};
+          report.deepest_m, report.overshoot_n, report.steps, report.unsettled, report.compared, report.came_back, report.changed_share,
+          report.drift_n, report.turned_rad, report.blind_retreat_m};
 }
 
 py::object push_with(const py::object& robot, const py::object& given, const py::dict& options, const py::object& on_step, const py::object& progress) {
@@ -190,6 +212,7 @@ py::object push_with(const py::object& robot, const py::object& given, const py:
     if (of_push.drift) take_off(*of_push.drift, made);
     return of_push;
   });
+  warn_of(push_warnings(plan.name, report));
   return py::make_tuple(to_python(made), to_python(made_push(report)));
 }
 
@@ -241,7 +264,9 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
     plan.name = "push";
     return plan;
   };
+  std::string pushing;
   hooks.on_push_begin = [&](const Push& push) {
+    pushing = push.name;
     if (kept) kept->recording.begin_push(push);
   };
   hooks.on_step = [&](const Push& push, const Step& step) {
@@ -253,6 +278,7 @@ py::object explore_with(const py::object& robot, const py::object& given, const 
   };
   hooks.on_push_end = [&](const acquisition::PushReport& report) {
     if (kept && report.drift) kept->recording.end_push(*report.drift);
+    asks.call([&] { warn_of(push_warnings(pushing, report)); });
   };
   hooks.on_push = [&](const ExploredPush& push) {
     asks.call([&] {

@@ -2,6 +2,10 @@
 // A robot that Python drives: an object with the calls of palpate.Robot (python/palpate/robot.py).
 #pragma once
 
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "palpate/acquisition/push_protocol.hpp"
 #include "palpate/explore.hpp"
 #include "python/nouns_answer.hpp"
@@ -37,11 +41,12 @@ struct MadePush {
   std::string stop, message;
   bool whole = false;
   Vec3 contact_m = Vec3::Zero();
-  double highest_force_n = 0, deepest_m = 0;
+  double highest_force_n = 0, deepest_m = 0, overshoot_n = 0;
   int steps = 0;
   std::vector<int> unsettled;
   bool compared = false, came_back = true;
-  double changed_share = 0, drift_n = 0;
+  double changed_share = 0, drift_n = 0, turned_rad = 0;
+  std::optional<double> blind_retreat_m;
 };
 MadePush made_push(const acquisition::PushReport& report);
 
@@ -55,12 +60,15 @@ struct Noun<MadePush> {
     field("contact_m", &MadePush::contact_m, "where contact began: the force's rise traced back to zero");
     field("highest_force_n", &MadePush::highest_force_n, "");
     field("deepest_m", &MadePush::deepest_m, "");
+    field("overshoot_n", &MadePush::overshoot_n, "of the highest force above the limit, where noise does not explain it");
     field("steps", &MadePush::steps, "that were recorded");
     field("unsettled", &MadePush::unsettled, "steps whose force still crept");
     field("compared", &MadePush::compared, "images from before and after the push");
     field("came_back", &MadePush::came_back, "False: the object is not what it was; says nothing if not compared");
     field("changed_share", &MadePush::changed_share, "of the image's pixels");
     field("drift_n", &MadePush::drift_n, "of the force's zero by the end; it is taken off");
+    field("turned_rad", &MadePush::turned_rad, "most that the tip was turned in a step since the force was tared: what a wrist's sensor reads by itself turns with it");
+    field("blind_retreat_m", &MadePush::blind_retreat_m, "back along the tool by so much and straight past the object, whose size nobody knows; None: around it");
   }
 };
 

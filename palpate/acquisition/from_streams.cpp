@@ -5,17 +5,15 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <memory>
-#include <set>
+#include <optional>
 
 #include "palpate/acquisition/force_track.hpp"
+#include "palpate/acquisition/nearest_time.hpp"
 #include "palpate/acquisition/repeated_notes.hpp"
 #include "palpate/acquisition/step_force.hpp"
 #include "palpate/acquisition/stream_joints.hpp"
+#include "palpate/acquisition/stream_views.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/sensing/cloud_mask.hpp"
-#include "palpate/sensing/plane_mask.hpp"
-#include "palpate/sensing/robot_mask.hpp"
 
 namespace palpate::acquisition {
 namespace {
@@ -49,12 +47,12 @@ class Assembly {
     if (plan.recording.joint_names.empty() && plan.recording.robot)
       std::copy_if(streams.joint_names.begin(), streams.joint_names.end(), std::back_inserter(out_.recording.joint_names),
                    [&](const std::string& name) { return knows(*plan.recording.robot, name); });
-    used_images_.resize(streams.cameras.size());
-    used_clouds_.resize(streams.clouds.size());
   }
 
   FromStreams run() {
     align_clocks();
+    views_.emplace(plan_, streams_, tree_, camera_offset_s_, cloud_offset_s_);
+    if (!plan_.views_at_s.empty()) out_.recording.rest.views = views_->of_rest(of_steps_);
     track_ = track_of(plan_, streams_, tree_, wrench_offset_s_);
     spans_ = find_contacts(track_, plan_);
     for (const PushTimes& push : pushes()) add_push(push);
@@ -213,7 +211,7 @@ class Assembly {
     if (!has_images && streams_.clouds.empty()) return wanted_s;
     const std::vector<double>& times = has_images ? streams_.cameras.front().times_s : streams_.clouds.front().times_s;
     const double offset_s = has_images ? camera_offset_s_.front() : cloud_offset_s_;
-    if (smallest_gap_s(times, offset_s, wanted_s) < plan_.image_gap_s) return wanted_s;
+    if (nearest_gap_s(times, offset_s, wanted_s) < plan_.image_gap_s) return wanted_s;
     double best_s = wanted_s, gap_s = std::numeric_limits<double>::infinity();
     for (const double one : times) {
       const double time_s = one + offset_s;
@@ -273,7 +271,7 @@ class Assembly {
     std::size_t loaded_steps = 0;
     std::vector<double> moving;  // times of steps whose force had not settled
     for (const StepTime& at : times.steps) {
-      const double seen_s = seen_at(at.time_s);
+      const double seen_s = views_->seen_at(at.time_s);
       const auto force = force_at(at.time_s, seen_s);
       const bool on_its_way = force && !force->rate_n_s.isZero(0);
       const auto tip = tree_.lookup(plan_.base_frame, plan_.tip_frame, on_its_way ? seen_s : at.time_s);
@@ -321,7 +319,7 @@ class Assembly {
               ToolTravel{plan.tool, travel, plan.travel_sigma_m[std::min(loaded_steps, plan.travel_sigma_m.size() - 1)]});
         ++loaded_steps;
       }
-      look(step);
+      views_->look(step, of_steps_);
       push.steps.push_back(std::move(step));
     }
     if (drifted_n > 0.05 * highest_n && highest_n > 0)
@@ -340,103 +338,6 @@ class Assembly {
     if (!push.steps.empty()) out_.recording.pushes.push_back(std::move(push));
   }
 
-  /// When the image that will belong to a step was taken; without one, the step's own time.
-  double seen_at(double time_s) const {
-    for (std::size_t c = 0; c < streams_.cameras.size(); ++c) {
-      std::set<std::size_t> used = used_images_[c];
-      const auto image = nearest(streams_.cameras[c].times_s, camera_offset_s_[c], time_s, used);
-      if (image) return streams_.cameras[c].times_s[*image] + camera_offset_s_[c];
-    }
-    for (std::size_t c = 0; c < streams_.clouds.size(); ++c) {
-      std::set<std::size_t> used = used_clouds_[c];
-      const auto cloud = nearest(streams_.clouds[c].times_s, cloud_offset_s_, time_s, used);
-      if (cloud) return streams_.clouds[c].times_s[*cloud] + cloud_offset_s_;
-    }
-    return time_s;
-  }
-
-  /// Index of the sample nearest to a time, if near enough and not used by another step.
-  std::optional<std::size_t> nearest(const std::vector<double>& times, double offset_s, double time_s,
-                                     std::set<std::size_t>& used) const {
-    const auto after = std::lower_bound(times.begin(), times.end(), time_s - offset_s);
-    std::optional<std::size_t> best;
-    for (const auto one : {after, after == times.begin() ? after : after - 1}) {
-      if (one == times.end()) continue;
-      const auto i = static_cast<std::size_t>(one - times.begin());
-      const double gap = std::abs(*one + offset_s - time_s);
-      if (gap < plan_.image_gap_s && (!best || gap < std::abs(times[*best] + offset_s - time_s))) best = i;
-    }
-    if (best && !used.insert(*best).second) return std::nullopt;
-    return best;
-  }
-
-  static double smallest_gap_s(const std::vector<double>& times, double offset_s, double time_s) {
-    double gap_s = std::numeric_limits<double>::infinity();
-    for (const double one : times) gap_s = std::min(gap_s, std::abs(one + offset_s - time_s));
-    return gap_s;
-  }
-
-  void look(Step& step) {
-    for (std::size_t c = 0; c < streams_.cameras.size(); ++c) {
-      const DepthStream& camera = streams_.cameras[c];
-      const auto image = nearest(camera.times_s, camera_offset_s_[c], step.time_s, used_images_[c]);
-      if (!image) {
-        const double gap_s = smallest_gap_s(camera.times_s, camera_offset_s_[c], step.time_s);
-        if (gap_s < plan_.image_gap_s)
-          of_steps_.add(camera.name + ": its image belongs to another step already; none is left for", step.time_s);
-        else
-          of_steps_.add(camera.name + ": no image within " + seconds_text(plan_.image_gap_s) + " of", step.time_s, "", gap_s);
-        continue;
-      }
-      DepthFrame frame = camera.like;
-      frame.time_s = camera.times_s[*image] + camera_offset_s_[c];
-      const auto pose = pose_of(camera.frame, frame.time_s);
-      if (!pose) {
-        of_steps_.add(camera.name + ": its pose is not known at the time of the image of", step.time_s);
-        continue;
-      }
-      frame.T_base_camera = *pose;
-      try {
-        frame.depth_m = camera.image(*image);
-        if (camera.mask) frame.mask = camera.mask(*image);
-      } catch (const Error& error) {
-        of_steps_.add(camera.name + ": the image cannot be used of", step.time_s, ": " + error.message());
-        continue;
-      }
-      if (const auto at = robot_to_mask(camera.mask_robot, frame.time_s, step.time_s, "image of", "topics.depth"))
-        frame = sensing::with_mask(frame, mask_->mask_known(frame, at->joints.names, at->joints.positions, at->T_base_root));
-      frame.robot_is_masked = plan_.recording.robot || camera.mask_robot;  // or it is not to be
-      step.observations.emplace_back(std::move(frame));
-    }
-    for (std::size_t c = 0; c < streams_.clouds.size(); ++c) {
-      const CloudStream& stream = streams_.clouds[c];
-      const auto number = nearest(stream.times_s, cloud_offset_s_, step.time_s, used_clouds_[c]);
-      const auto pose = number ? pose_of(stream.frame, stream.times_s[*number] + cloud_offset_s_) : std::nullopt;
-      if (!pose) {
-        of_steps_.add(stream.name + ": no cloud with a known pose near", step.time_s);
-        continue;
-      }
-      const auto at = robot_to_mask(stream.mask_robot, stream.times_s[*number] + cloud_offset_s_, step.time_s, "cloud of", "topics.clouds");
-      if (at && !in_clouds_) in_clouds_ = std::make_unique<sensing::RobotInClouds>(*mask_);
-      try {
-        PointCloud cloud = stream.cloud(*number);
-        cloud.points_m = (cloud.points_m * pose->linear().transpose()).rowwise() + pose->translation().transpose();
-        cloud.sigma_m = VectorX::Constant(1, stream.sigma_m);
-        cloud.pose_std_m = stream.pose_std_m;
-        cloud.pose_std_rad = stream.pose_std_rad;
-        if (at) cloud = in_clouds_->without_robot(cloud, at->joints.names, at->joints.positions, at->T_base_root);
-        step.observations.emplace_back(std::move(cloud));
-      } catch (const Error& error) {
-        of_steps_.add(stream.name + ": the cloud cannot be used of", step.time_s, ": " + error.message());
-      }
-    }
-  }
-
-  std::optional<Pose> pose_of(const std::string& frame, double time_s) const {
-    if (frame == plan_.base_frame) return Pose(Pose::Identity());
-    return tree_.lookup(plan_.base_frame, frame, time_s);
-  }
-
   /// In the order of the recording's joint names; empty where one is missing.
   std::vector<double> joints_of(double time_s) const {
     const auto all = joints_at(streams_, plan_.recording.robot, time_s);
@@ -449,32 +350,6 @@ class Assembly {
     return positions;
   }
 
-  struct PosedRobot {
-    Pose T_base_root;
-    NamedJoints joints;
-  };
-
-  /// The robot when an image or a cloud was taken, where it is to be left out and known; where it is not known that is said.
-  std::optional<PosedRobot> robot_to_mask(std::optional<bool> wanted, double time_s, double step_s, const std::string& where,
-                                          const std::string& topics) {
-    const auto& robot = plan_.recording.robot;
-    if (!wanted.value_or(robot && sensing::has_shapes(*robot) && !streams_.joints.empty())) return std::nullopt;
-    if (!robot) throw Error("mask_robot needs the robot: give robot.urdf or topics.robot_description", plan_.source + ": " + topics);
-    if (!mask_) mask_ = std::make_unique<sensing::RobotMask>(*robot);
-    const std::string root = mask_->kinematics().robot().links[std::size_t(mask_->kinematics().root_link())].name;
-    const auto base = pose_of(root, time_s);
-    if (!base) {
-      of_steps_.add("the robot is not masked in the " + where, step_s, ": the pose of '" + root + "' is not known");
-      return std::nullopt;
-    }
-    const NamedJoints joints = known_joints_at(streams_, robot, time_s);
-    if (const auto unmasked = unmasked_links(*mask_, joints, streams_)) {
-      of_steps_.add(unmasked->who + " not masked in the " + where, step_s, ": " + unmasked->why);
-      if (unmasked->is_whole_robot) return std::nullopt;
-    }
-    return PosedRobot{*base, joints};
-  }
-
   const StreamPlan& plan_;
   const SensorStreams& streams_;
   FrameTree tree_;
@@ -482,9 +357,7 @@ class Assembly {
   std::vector<ContactSpan> spans_;
   double wrench_offset_s_ = 0, cloud_offset_s_ = 0;
   std::vector<double> camera_offset_s_;
-  std::vector<std::set<std::size_t>> used_images_, used_clouds_;
-  std::unique_ptr<sensing::RobotMask> mask_;
-  std::unique_ptr<sensing::RobotInClouds> in_clouds_;
+  std::optional<StreamViews> views_;
   RepeatedNotes of_steps_;
   FromStreams out_;
 };

@@ -96,6 +96,7 @@ struct PushReport {
   /// Nobody knows how large the object is: the way there went straight past it, after this much back along the tool.
   std::optional<double> blind_retreat_m;
   int steps = 0;               ///< recorded now, resumed ones not counted
+  int blank_images = 0;        ///< without one pixel that has a depth: their steps have none
   std::vector<int> unsettled;  ///< indices (in the push) of steps whose force still crept
   Vec3 tare_n = Vec3::Zero();  ///< taken off every force
   double turned_rad = 0;       ///< most that the tip was turned since the tare in a step: what the wrist's sensor errs by in its own axes turned, too

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "palpate/acquisition/force_begin.hpp"
+#include "palpate/sensing/plane_mask.hpp"
 #include "palpate/sensing/rest_change.hpp"
 
 namespace palpate::acquisition {
@@ -162,9 +163,13 @@ void PushRun::record(const RobotState& state, const std::optional<Vec3>& force_n
     if (torque) step.observations.emplace_back(*torque);
   }
   DepthFrame image = robot_.take_depth_image();
-  if (!force_n && !unloading) before_ = image;
-  if (!force_n && unloading && before_) look_whether_it_came_back(image);
-  step.observations.emplace_back(std::move(image));
+  if (sensing::is_blank(image)) {  // a hiccup, or the arm before the lens: what is felt counts all the same
+    ++report_.blank_images;
+  } else {
+    if (!force_n && !unloading) before_ = image;
+    if (!force_n && unloading && before_) look_whether_it_came_back(image);
+    step.observations.emplace_back(std::move(image));
+  }
   if (on_step_) on_step_(push_, step);
   ++next_index_;
   ++report_.steps;

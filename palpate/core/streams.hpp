@@ -118,6 +118,9 @@ struct StreamPlan {
   Vec3 tool_centre_m = Vec3::Zero();
   Vec3 gravity_m_s2 = Vec3(0, 0, -9.81);
 
+  std::vector<double> views_at_s;  ///< images of the object untouched, when they were taken: its rest views
+  std::string views_where;         ///< file, line and field, for messages
+
   StepsBy steps_by = StepsBy::detection;
   double window_s = 0.5;             ///< over which the force of a step is averaged, before its time
   double image_gap_s = 0.5;          ///< an image belongs to a step when it is nearer than this

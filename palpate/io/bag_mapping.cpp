@@ -236,6 +236,7 @@ BagMapping read_mapping(const std::filesystem::path& path) {
   RecordingContext context{RecordingFolder(root), {}, {}, {}, {}, 0, {}};
   BagMapping mapping;
   mapping.root = root;
+  context.of_bag = &mapping.plan;
   std::error_code code;
   if (!std::filesystem::is_regular_file(path, code)) throw Error("there is no such mapping", path.string());
   const YamlField top = YamlField::parse(context.folder.read(path.filename().string(), path.string()), path.string());

@@ -106,11 +106,17 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
   std::string text =
       "# Write your own in place of every FILL_IN, and look at every line marked check. docs/recording-format.md explains every key.\n"
       "format: palpate-mapping/1\n"
-      "rest: {surface_mesh: FILL_IN.stl, state: stress_free}   # the object untouched, in the base frame; beside this file\n"
+      "# The object untouched, in the base frame, beside this file; or where the bag shows it from several sides, in place of surface_mesh,\n"
+      "# views_at_s: [the seconds from the bag's start at which the camera stood still]\n"
+      "rest: {surface_mesh: FILL_IN.stl, state: stress_free}\n"
       "supports:                                            # how it is held\n"
-      "  - {kind: table, point_m: [0, 0, 0], normal: [0, 0, 1], contact: frictionless}   # check: plane and contact\n"
-      "tools:\n"
-      "  - {name: tool, shape: sphere, radius_m: 0.01, contact: bonded}   # check: what touched the object\n"
+      "  # check: the plane, and that the object sticks to it; what only lies there: kind: table, contact: friction, friction_coefficient: 0.5\n"
+      "  - {name: table, kind: plane, point_m: [0, 0, 0], normal: [0, 0, 1], tolerance_m: 0.002}\n"
+      "environment:                                         # what the camera sees beside the object and is not it\n"
+      "  planes: [{point_m: [0, 0, 0], normal: [0, 0, 1]}]   # check\n"
+      "tools:                                               # what touched the object; check: disc (flat end) or sphere, and its radius\n"
+      "  - {name: tool, shape: disc, radius_m: 0.01, contact: bonded}\n"
+      "force_scale_std: 0.01                                # check: what the sensor's scale is known to\n"
       "topics:\n";
   text += "  wrench: " + (force ? force->name : std::string(fill_in)) + "\n";
   if (joints) text += "  joints: " + joints->name + "\n";
@@ -141,7 +147,7 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
           "}   # check: of a tip or camera that no frame names, frames.fixed says where it is\n";
   text += "wrench: {reports: force_on_sensor}   # check: or force_on_object; the sign shows in one push\n";
   if (!depth.empty()) text += "clocks: {camera_offset_s: estimate}\n";
-  return text + "steps: {by: detection, travel_sigma_m: 0.0005}\n";
+  return text + "steps: {by: detection, travel_sigma_m: 0.0005, travel_offset_std_m: 0.0005}   # check: the arm's repeatability\n";
 }
 
 }  // namespace

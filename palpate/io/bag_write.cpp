@@ -8,6 +8,7 @@
 #include <map>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/recording_values.hpp"
 #include "palpate/io/bag_folder.hpp"
 #include "palpate/io/bag_frames.hpp"
 #include "palpate/io/file.hpp"
@@ -30,12 +31,7 @@ struct BagCamera {
   bool has_mask = false;
 };
 
-bool same_device(const DepthFrame& a, const DepthFrame& b) {
-  return a.camera.width_px == b.camera.width_px && a.camera.height_px == b.camera.height_px &&
-         a.camera.fx_px == b.camera.fx_px && a.camera.fy_px == b.camera.fy_px && a.camera.cx_px == b.camera.cx_px &&
-         a.camera.cy_px == b.camera.cy_px && a.camera.distortion == b.camera.distortion &&
-         a.camera.distortion_coefficients == b.camera.distortion_coefficients && a.noise == b.noise;
-}
+bool same_device(const DepthFrame& a, const DepthFrame& b) { return a.camera == b.camera && a.noise == b.noise; }
 bool same_camera(const DepthFrame& a, const DepthFrame& b) {
   return same_device(a, b) && a.pose_std_m == b.pose_std_m && a.pose_std_rad == b.pose_std_rad;
 }
@@ -68,9 +64,9 @@ bool looks_alone(const Recording& recording) {
   return true;
 }
 
-[[noreturn]] void refuse(const std::string& what, const Step& step) {
-  throw Error(what + "; write a folder instead", "write_bag: step at " + std::to_string(step.time_s) + " s");
-}
+std::string place_of(const Step& step) { return "write_bag: step at " + std::to_string(step.time_s) + " s"; }
+
+[[noreturn]] void refuse(const std::string& what, const Step& step) { throw Error(what + "; write a folder instead", place_of(step)); }
 
 class BagWriter {
  public:
@@ -119,7 +115,11 @@ class BagWriter {
       if (first == nullptr && !step.loads.empty()) first = &step.loads.front();
     std::vector<double> travel_sigma_m;
     std::size_t loaded = 0;
+    const Step* before = nullptr;
     for (const Step& step : push.steps) {
+      if (before != nullptr && !(step.time_s > before->time_s))
+        throw Error("does not follow the step before in time; give each step of a push a later one", place_of(step) + ": time_s");
+      before = &step;
       time_ns_ = start_ns + static_cast<std::int64_t>(std::llround((step.time_s - first_s) * 1e9));
       std::string mark = push.name;
       if (mark.find(';') != std::string::npos) refuse("the name of push '" + push.name + "' holds a semicolon", step);
@@ -165,7 +165,7 @@ class BagWriter {
     line.word("name", push.name);
     if (!push.site.empty()) line.word("site", push.site);
     if (first != nullptr) {
-      line.word("tool", first->tool).vector("contact_m", first->contact_m).vector("direction", first->direction);
+      line.word("tool", first->tool).vector("contact_m", first->contact_m).vector("direction", unit_direction(first->direction));
       line.number_unless(0, "force_relative_std", first->force_relative_std)
           .number_unless(0, "contact_std_m", first->contact_std_m);
     }
@@ -197,14 +197,15 @@ class BagWriter {
 
   /// The tip that has gone that far: the recorded one where it says the same.
   static Pose tip_at(const Load& load, double travel_m, const std::optional<Pose>& recorded) {
+    const Vec3 direction = unit_direction(load.direction);
     Pose pose = Pose::Identity();
     if (recorded)
       pose = *recorded;
     else
-      pose.linear() = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), load.direction).toRotationMatrix();
+      pose.linear() = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), direction).toRotationMatrix();
     if (!recorded) pose.translation() = load.contact_m;
-    const double short_m = travel_m - load.direction.dot(pose.translation() - load.contact_m);
-    if (std::abs(short_m) > 1e-12) pose.translation() += short_m * load.direction;
+    const double short_m = travel_m - direction.dot(pose.translation() - load.contact_m);
+    if (std::abs(short_m) > 1e-12) pose.translation() += short_m * direction;
     return pose;
   }
 
@@ -213,6 +214,7 @@ class BagWriter {
     for (const Push& push : recording_.pushes)
       for (const Step& step : push.steps)
         for (const DepthFrame* image : images_of(step)) {
+          demand_depth_sigma(image->noise, place_of(step));
           const auto [place, is_new] = stands.emplace(cameras_[camera_of(*image)].frame, image->T_base_camera);
           if (place->second && place->second->matrix() != image->T_base_camera.matrix()) place->second.reset();
         }

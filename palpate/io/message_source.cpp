@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <optional>
 
@@ -57,8 +58,9 @@ std::vector<std::string> files_of(const fs::path& path) {
 std::vector<std::string> bag_files_in(const fs::path& folder) {
   std::vector<std::string> files;
   std::error_code code;
-  for (const auto& entry : fs::directory_iterator(folder, code)) {
-    if (entry.is_regular_file(code) && has_bag_extension(entry.path())) files.push_back(entry.path().filename().string());
+  for (auto entry = fs::directory_iterator(folder, code); !code && entry != fs::directory_iterator(); entry.increment(code)) {
+    std::error_code of_entry;
+    if (entry->is_regular_file(of_entry) && has_bag_extension(entry->path())) files.push_back(entry->path().filename().string());
   }
   std::sort(files.begin(), files.end());
   // Whoever unpacks a file or was about to pack it leaves both beside each other.
@@ -237,6 +239,19 @@ std::size_t MessageCollector::topic(const std::string& name, const std::string& 
   return topics_.size() - 1;
 }
 
+namespace {
+
+/// One message logged at 0 (a simulation's clock before it ran) would be the bag's start, and put every step decades after it.
+/// @param messages  in the order of their times  @returns how many went
+std::size_t drop_astray(std::vector<Message>& messages) {
+  if (messages.empty()) return 0;
+  constexpr double far_ns = 10 * 86400 * 1e9;
+  const double middle_ns = static_cast<double>(messages[messages.size() / 2].log_time_ns);
+  return std::erase_if(messages, [&](const Message& one) { return std::abs(static_cast<double>(one.log_time_ns) - middle_ns) > far_ns; });
+}
+
+}  // namespace
+
 MessageSource MessageCollector::finish(std::shared_ptr<const void> memory, const std::string& name) {
   MessageSource source;
   source.name = name;
@@ -250,12 +265,14 @@ MessageSource MessageCollector::finish(std::shared_ptr<const void> memory, const
     source.topics.push_back(topics_[order[i]]);
   }
   source.messages = std::move(messages_);
+  std::stable_sort(source.messages.begin(), source.messages.end(),
+                   [](const Message& a, const Message& b) { return a.log_time_ns < b.log_time_ns; });
+  if (const std::size_t astray = drop_astray(source.messages); astray > 0)
+    warnings.push_back(std::to_string(astray) + " messages are left out: their recorder's times lie days from all others (0, or damaged)");
   for (Message& message : source.messages) {
     message.topic = place[message.topic];
     ++source.topics[message.topic].messages;
   }
-  std::stable_sort(source.messages.begin(), source.messages.end(),
-                   [](const Message& a, const Message& b) { return a.log_time_ns < b.log_time_ns; });
   source.warnings = std::move(warnings);
   return source;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The object and what holds, touches and sees it: rest, supports, tools, cameras, markers, model.
 #include <Eigen/SVD>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -124,7 +125,7 @@ void read_rest(const YamlField& field, RecordingContext& context) {
   YamlKeys keys(field);
   Rest& rest = context.recording.rest;
   const auto volume = keys.optional("volume_mesh"), surface = keys.optional("surface_mesh"), views = keys.optional("views"),
-             observed = keys.optional("observed_triangles");
+             observed = keys.optional("observed_triangles"), views_at = context.of_bag != nullptr ? keys.optional("views_at_s") : std::nullopt;
   const auto scale_field = keys.optional("scale_to_m");
   const double scale = scale_field ? scale_field->positive() : 1.0;
   rest.surface_std_m = keys.within_or("surface_std_m", rest.surface_std_m, ranges::length_std);
@@ -132,8 +133,9 @@ void read_rest(const YamlField& field, RecordingContext& context) {
   rest.state =
       keys.required("state", "choose stress_free, under_gravity or under_pressure").choice<RestState>(rest_state_names);
   keys.finish();
-  if (int{volume.has_value()} + int{surface.has_value()} + int{views.has_value()} != 1) {
-    field.fail("exactly one of 'volume_mesh', 'surface_mesh' and 'views' must be given");
+  if (int{volume.has_value()} + int{surface.has_value()} + int{views.has_value()} + int{views_at.has_value()} != 1) {
+    field.fail(context.of_bag != nullptr ? "exactly one of 'volume_mesh', 'surface_mesh', 'views' and 'views_at_s' (times of the bag's own images) must be given"
+                                         : "exactly one of 'volume_mesh', 'surface_mesh' and 'views' must be given");
   }
   const auto mesh_of = [&](const YamlField& file) {
     return parse_named(file.where(), [&] {
@@ -153,6 +155,10 @@ void read_rest(const YamlField& field, RecordingContext& context) {
     MeshData mesh = mesh_of(*surface);
     rest.surface =
         parse_named(surface->where(), [&] { return tri_mesh_of(std::move(mesh), context.folder.path_of(surface->text())); });
+  } else if (views_at) {
+    context.of_bag->views_at_s = views_at->numbers();
+    if (context.of_bag->views_at_s.empty()) views_at->fail("names no time; give seconds from the bag's start at which the object stood untouched in view");
+    context.of_bag->views_where = rest.source = views_at->where();
   } else {
     for (const YamlField& view : views->items()) {
       YamlKeys view_keys(view);
@@ -340,7 +346,10 @@ MarkerPoints parse_marker_table(const std::string& bytes, const std::string& nam
   MarkerPoints markers;
   markers.points_m.resize(static_cast<Eigen::Index>(table.rows()), 3);
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    markers.names.push_back(table.cell(row, column[0]));
+    const std::string& marker = table.cell(row, column[0]);
+    if (std::find(markers.names.begin(), markers.names.end(), marker) != markers.names.end())
+      throw Error("marker '" + marker.substr(0, 60) + "' is there twice; remove one", table.where(row));
+    markers.names.push_back(marker);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const bool hidden = may_be_hidden && table.cell(row, column[axis + 1]).empty();
       markers.points_m(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(axis)) =

@@ -10,6 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/core/force_drift.hpp"
 #include "palpate/core/recording.hpp"
+#include "palpate/core/streams.hpp"
 #include "palpate/io/csv.hpp"
 #include "palpate/io/yaml_field.hpp"
 
@@ -60,6 +61,7 @@ struct RecordingContext {
   Points marker_rest_m;
   double marker_rest_std_m = 0;
   std::map<std::string, std::string> used_files;  ///< observation file -> step that uses it
+  StreamPlan* of_bag = nullptr;                   ///< where a mapping is read, whose object may be seen in the bag's own images
 };
 
 Pose read_pose(const YamlField& field);

@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/physical_range.hpp"
+#include "palpate/core/recording_values.hpp"
 #include "palpate/io/cloud_file.hpp"
 #include "palpate/io/depth_file.hpp"
 #include "palpate/io/file.hpp"
@@ -23,6 +25,7 @@ struct RecordingWriter::Pages {
   std::string head, markers, pushes;
   std::vector<Push> pending;  ///< a push that has no step yet
   std::size_t push_count = 0, step_count = 0;
+  double last_time_s = 0;  ///< of the step before, where the push has one
   Markers known_markers;
   bool has_markers = false;
 
@@ -69,14 +72,8 @@ struct RecordingWriter::Pages {
 
   std::size_t camera_of(const DepthFrame& frame, double unit_m) {
     for (std::size_t i = 0; i < cameras.size(); ++i) {
-      const Camera& a = cameras[i].camera;
-      const Camera& b = frame.camera;
-      if (a.width_px == b.width_px && a.height_px == b.height_px && a.fx_px == b.fx_px && a.fy_px == b.fy_px &&
-          a.cx_px == b.cx_px && a.cy_px == b.cy_px && a.distortion == b.distortion &&
-          a.distortion_coefficients == b.distortion_coefficients && cameras[i].noise == frame.noise &&
-          cameras[i].depth_unit_m == unit_m) {
-        return i;
-      }
+      const KnownCamera& known = cameras[i];
+      if (known.camera == frame.camera && known.noise == frame.noise && known.depth_unit_m == unit_m) return i;
     }
     cameras.push_back({frame.camera, frame.noise, unit_m});
     return cameras.size() - 1;
@@ -97,6 +94,7 @@ struct RecordingWriter::Pages {
   }
 
   std::string frame_text(const DepthFrame& frame, const std::string& stem, YamlLine line) {
+    demand_depth_sigma(frame.noise, stem);
     const double unit = exact_unit(frame.depth_m);
     const std::string file = stem + (unit > 0 ? ".png" : ".npy");
     put_file(file, unit > 0 ? depth_png(frame.depth_m, unit) : depth_npy(frame.depth_m));
@@ -124,6 +122,8 @@ struct RecordingWriter::Pages {
   std::string region_text(const Region& region, std::size_t number) const;
   std::string tool_text(const Tool& tool, std::size_t number) const;
   void add_step(const Step& step);
+  void demand_later(const Step& step) const;
+  /// Empty where nothing was observed.
   std::string observation_text(const Observation& observation, const std::string& stem, const Step& step);
   void note_markers(const Markers& seen);
 };
@@ -140,11 +140,18 @@ std::string load_text(const Load& load) {
   line.word("tool", load.tool);
   if (load.force_n) line.vector("force_n", *load.force_n);
   if (load.travel_m) line.number("travel_m", *load.travel_m);
-  line.vector("contact_m", load.contact_m).vector("direction", load.direction);
+  line.vector("contact_m", load.contact_m).vector("direction", unit_direction(load.direction));
   line.number_unless(0, "force_std_n", load.force_std_n).number_unless(0, "force_relative_std", load.force_relative_std);
   line.number_unless(0, "contact_std_m", load.contact_std_m);
   if (!load.force_rate_n_s.isZero(0)) line.vector("force_rate_n_s", load.force_rate_n_s);
   return line.str();
+}
+
+/// Files tell markers apart by their names.
+Markers with_names(Markers markers) {
+  if (!markers.names.empty()) return markers;
+  for (Eigen::Index i = 0; i < markers.rest_m.rows(); ++i) markers.names.push_back(fmt::format("marker_{}", i + 1));
+  return markers;
 }
 
 std::string marker_map(const std::vector<std::string>& names, const Points& places) {
@@ -196,11 +203,10 @@ std::string RecordingWriter::Pages::support_text(const Support& support, std::si
   YamlLine line;
   line.put("kind", name_of(support_names, support.kind)).word("name", support.name);
   const bool half_space = support.kind == SupportKind::table || support.kind == SupportKind::wall;
-  if (support.kind == SupportKind::vertices ||
-      (support.kind == SupportKind::clamp && support.select == NodeSelection::vertices)) {
+  const NodeSelection by = selection_of(support);
+  if (by == NodeSelection::vertices) {
     line.put("file", index_text(support.vertices, fmt::format("support_{}.csv", number)));
-  } else if (support.kind == SupportKind::box ||
-             (support.kind == SupportKind::clamp && support.select == NodeSelection::box)) {
+  } else if (by == NodeSelection::box) {
     line.vector("min_m", support.box_min_m).vector("max_m", support.box_max_m);
   } else {
     line.vector("point_m", support.plane.point_m)
@@ -248,7 +254,7 @@ std::string RecordingWriter::Pages::tool_text(const Tool& tool, std::size_t numb
     case ToolShape::sphere:
     case ToolShape::disc:
       line.number("radius_m", tool.radius_m).number_unless(0, "radius_std_m", tool.radius_std_m);
-      if (tool.pressure != Pressure::uniform) line.put("pressure", name_of(pressure_names, tool.pressure));
+      if (tool.shape == ToolShape::disc && tool.pressure != Pressure::uniform) line.put("pressure", name_of(pressure_names, tool.pressure));
       break;
     case ToolShape::capsule:
     case ToolShape::edge:
@@ -284,8 +290,9 @@ void RecordingWriter::Pages::set_head(const Recording& recording) {
     for (std::size_t i = 0; i < recording.supports.size(); ++i)
       head += "  - " + support_text(recording.supports[i], i + 1) + "\n";
   }
-  if (!recording.regions.empty()) head += "regions:\n";
-  for (std::size_t i = 0; i < recording.regions.size(); ++i)
+  const bool in_regions = recording.regions.size() > 1;  // one is the whole object, and no file names it
+  if (in_regions) head += "regions:\n";
+  for (std::size_t i = 0; in_regions && i < recording.regions.size(); ++i)
     head += "  - " + region_text(recording.regions[i], i + 1) + "\n";
   head += "environment:\n  gravity_m_s2: " + yaml_vector(recording.environment.gravity_m_s2) + "\n";
   if (!recording.environment.planes.empty()) {
@@ -349,11 +356,11 @@ std::string RecordingWriter::Pages::observation_text(const Observation& observat
     line.put("kind", "cloud").put("file", file);
     if (cloud->sigma_m.size() == 1) line.number("sigma_m", cloud->sigma_m[0]);
     line.number_unless(0, "pose_std_m", cloud->pose_std_m).number_unless(0, "pose_std_rad", cloud->pose_std_rad);
-  } else if (const auto* seen = std::get_if<Markers>(&observation)) {
-    note_markers(*seen);
-    line.put("kind", "markers")
-        .number("sigma_m", seen->sigma_m)
-        .put("observed_m", marker_map(seen->names, seen->observed_m));
+  } else if (const auto* markers_given = std::get_if<Markers>(&observation)) {
+    if (!markers_given->observed_m.array().isFinite().rowwise().all().any()) return "";  // all are hidden
+    const Markers seen = with_names(*markers_given);
+    note_markers(seen);
+    line.put("kind", "markers").number("sigma_m", seen.sigma_m).put("observed_m", marker_map(seen.names, seen.observed_m));
   } else if (const auto* travel = std::get_if<ToolTravel>(&observation)) {
     line.put("kind", "travel");
     if (!travel->tool.empty()) line.word("tool", travel->tool);
@@ -362,7 +369,8 @@ std::string RecordingWriter::Pages::observation_text(const Observation& observat
     line.put("kind", "wrench").number_unless(step.time_s, "time_s", wrench->time_s);
     if (!wrench->tool.empty()) line.word("tool", wrench->tool);
     if (wrench->along.norm() > 0) {
-      line.number("force_n", wrench->force_n.dot(wrench->along)).vector("along", wrench->along);
+      const Vec3 along = unit_direction(wrench->along);
+      line.number("force_n", wrench->force_n.dot(along)).vector("along", along);
     } else {
       line.vector("force_n", wrench->force_n);
     }
@@ -372,15 +380,30 @@ std::string RecordingWriter::Pages::observation_text(const Observation& observat
   return line.str();
 }
 
+/// In a push time goes on: a reader takes a step that stands still in it for one that is there twice.
+void RecordingWriter::Pages::demand_later(const Step& step) const {
+  const bool is_first = !pending.empty();
+  const std::string place = fmt::format("pushes[{}].steps[{}].time_s", is_first ? push_count : push_count - 1, is_first ? 0 : step_count);
+  if (!(step.time_s >= ranges::time.least && step.time_s <= ranges::time.most))
+    throw Error(fmt::format("is {:g} s, which cannot be; {}", step.time_s, ranges::time.slip), place);
+  if (is_first || step.time_s > last_time_s) return;
+  throw Error(step.time_s == last_time_s ? fmt::format("is that of the step before, {:.10g} s; give each step of a push its own, or remove one that is there twice",
+                                                       step.time_s)
+                                         : "goes back, from that of the step before; order the steps by time",
+              place);
+}
+
 void RecordingWriter::Pages::add_step(const Step& step) {
   if (!step.joints_rad.empty() && joints_named > 0 && step.joints_rad.size() != joints_named)
     throw Error(fmt::format("has {} values, 'robot: joints' names {}; name the joints that the robot tells of, in their order", step.joints_rad.size(),
                             joints_named),
                 "joints_rad");
+  if (pending.empty() && push_count == 0) throw Error("a step was added before any push was begun", "RecordingWriter::add_step");
+  demand_later(step);
   std::string text;
   if (!pending.empty()) {
     const Push& push = pending.back();
-    text += fmt::format("  - name: {}\n", yaml_word(push.name));
+    text += fmt::format("  - name: {}\n", yaml_word(push.name.empty() ? fmt::format("push {}", push_count + 1) : push.name));
     if (!push.site.empty()) text += fmt::format("    site: {}\n", yaml_word(push.site));
     if (push.force_tare_std_n != 0) text += fmt::format("    force_tare_std_n: {}\n", push.force_tare_std_n);
     if (push.travel_offset_std_m != 0) text += fmt::format("    travel_offset_std_m: {}\n", push.travel_offset_std_m);
@@ -390,7 +413,6 @@ void RecordingWriter::Pages::add_step(const Step& step) {
     push_count += 1;
     step_count = 0;
   }
-  if (push_count == 0) throw Error("a step was added before any push was begun", "RecordingWriter::add_step");
   text += fmt::format("      - time_s: {}\n", step.time_s);
   if (step.unloading) text += "        unloading: true\n";
   if (step.slipped) text += "        slipped: true\n";
@@ -399,13 +421,16 @@ void RecordingWriter::Pages::add_step(const Step& step) {
   if (step.T_base_tip) text += "        T_base_tip: " + yaml_pose(*step.T_base_tip) + "\n";
   if (!step.loads.empty()) text += "        loads:\n";
   for (const Load& load : step.loads) text += "          - " + load_text(load) + "\n";
-  if (!step.observations.empty()) text += "        observations:\n";
+  std::string observed;
   for (std::size_t i = 0; i < step.observations.size(); ++i) {
     const std::string stem = fmt::format("push{:03}_step{:04}_{}", push_count, step_count + 1, i + 1);
-    text += "          - " + observation_text(step.observations[i], stem, step) + "\n";
+    const std::string one = observation_text(step.observations[i], stem, step);
+    if (!one.empty()) observed += "          - " + one + "\n";
   }
+  if (!observed.empty()) text += "        observations:\n" + observed;
   pending.clear();
   step_count += 1;
+  last_time_s = step.time_s;
   pushes += text;
 }
 

@@ -2,6 +2,7 @@
 // Layouts: the .msg files of sensor_msgs, geometry_msgs, tf2_msgs and std_msgs; ros_types.cpp repeats them.
 #include "palpate/io/ros_messages.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "palpate/io/depth_file.hpp"
@@ -169,16 +170,27 @@ RosCameraInfo decode_camera_info(std::string_view message, const std::string& wh
   for (double& value : k) value = in.number<double>();
   double p[9 + 12];  // rectification, then the projection of what is rectified
   for (double& value : p) value = in.number<double>();
-  for (int i = 0; i < 6; ++i) in.number<std::uint32_t>();  // binning and region of interest
+  const auto binning_x = in.number<std::uint32_t>(), binning_y = in.number<std::uint32_t>(), roi_x = in.number<std::uint32_t>(),
+             roi_y = in.number<std::uint32_t>(), roi_height = in.number<std::uint32_t>(), roi_width = in.number<std::uint32_t>();
   in.number<std::uint8_t>();
   camera.fx_px = k[0], camera.cx_px = k[2], camera.fy_px = k[4], camera.cy_px = k[5];
   bool finite = true;
   for (const double value : k) finite = finite && std::isfinite(value);
   for (const double value : camera.distortion_coefficients) finite = finite && std::isfinite(value);
   if (!finite) in.fail("holds a number that is not finite in K or D");
+  if (!std::all_of(p, p + 21, [](double value) { return std::isfinite(value); })) std::fill(p, p + 21, 0.0);  // as where P is empty
   if (!(camera.fx_px > 0 && camera.fy_px > 0)) in.fail("holds no focal length: the camera is not calibrated");
   bool bent = false;
   for (const double value : camera.distortion_coefficients) bent |= value != 0;
+  if (model == "rational_polynomial" && bent && camera.distortion_coefficients.size() > 8) {  // OpenCV's thin prism and tilt
+    const auto further = camera.distortion_coefficients.begin() + 8;
+    if (std::any_of(further, camera.distortion_coefficients.end(), [](double value) { return value != 0; }))
+      in.fail("has a thin prism or tilt in D, beyond the eight numbers of rational_polynomial that are taken; rectify the images (image_proc)");
+    camera.distortion_coefficients.resize(8);
+  }
+  const std::size_t given = camera.distortion_coefficients.size();
+  if (bent && given != (model == "rational_polynomial" ? 8 : 4) && !(model == "plumb_bob" && given == 5))
+    in.fail("has " + std::to_string(given) + " numbers in D; plumb_bob has 4 or 5, rational_polynomial 8, equidistant 4");
   if (!bent)
     camera.distortion_coefficients.clear();
   else if (model == "plumb_bob")
@@ -193,6 +205,15 @@ RosCameraInfo decode_camera_info(std::string_view message, const std::string& wh
   result.rectified.distortion = DistortionModel::none;
   result.rectified.distortion_coefficients.clear();
   result.rectified.fx_px = p[9], result.rectified.cx_px = p[11], result.rectified.fy_px = p[14], result.rectified.cy_px = p[15];
+  // K, D and P are of the whole sensor: what is sent is a part of it, every so manieth pixel (image_geometry's PinholeCameraModel).
+  const double bin_x = std::max(binning_x, 1u), bin_y = std::max(binning_y, 1u);
+  for (Camera* one : {&result.camera, &result.rectified}) {
+    one->fx_px /= bin_x, one->cx_px = (one->cx_px - roi_x) / bin_x;
+    one->fy_px /= bin_y, one->cy_px = (one->cy_px - roi_y) / bin_y;
+    if (roi_width > 0) one->width_px = static_cast<int>(std::min(roi_width, width));
+    if (roi_height > 0) one->height_px = static_cast<int>(std::min(roi_height, height));
+    one->width_px /= static_cast<int>(bin_x), one->height_px /= static_cast<int>(bin_y);
+  }
   return result;
 }
 

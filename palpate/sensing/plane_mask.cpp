@@ -79,4 +79,11 @@ DepthFrame with_mask(DepthFrame frame, const MaskImage& mask) {
   return frame;
 }
 
+bool is_blank(const DepthFrame& frame) {
+  const bool masked = frame.mask.size() == frame.depth_m.size();
+  for (Eigen::Index i = 0; i < frame.depth_m.size(); ++i)
+    if (frame.depth_m.data()[i] > 0 && !(masked && frame.mask.data()[i] != 0)) return false;
+  return true;
+}
+
 }  // namespace palpate::sensing

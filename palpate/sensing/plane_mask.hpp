@@ -28,4 +28,7 @@ MaskImage mask_planes(const DepthFrame& frame, const std::vector<Plane>& planes,
 /// @throws Error when the sizes differ.
 DepthFrame with_mask(DepthFrame frame, const MaskImage& mask);
 
+/// No pixel outside its mask has a depth: it tells nothing, and no recording may hold it.
+bool is_blank(const DepthFrame& frame);
+
 }  // namespace palpate::sensing

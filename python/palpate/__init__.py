@@ -29,13 +29,15 @@ if _TYPE_CHECKING:
     from os import PathLike
     from typing import Any
 
+    from numpy.typing import ArrayLike, NDArray
+
 _classes = _nouns.classes()
 globals().update(_classes)
 
 from palpate.robot import Robot, explore, look_around, push  # noqa: E402  (needs the classes)
 
-__all__ = sorted(_classes) + ["Error", "OnlineEstimator", "Robot", "check_recording", "demo", "depth_sensors", "explore", "export", "exporters",
-                              "identify", "look_around", "materials", "predict", "push", "read_recording", "read_result", "read_robot",
+__all__ = sorted(_classes) + ["Error", "OnlineEstimator", "Robot", "check", "check_recording", "demo", "depth_sensors", "explore", "export", "exporters",
+                              "identify", "look_around", "materials", "pose", "predict", "push", "read_recording", "read_result", "read_robot",
                               "read_scene", "read_surface", "read_volume", "result_json", "suggest", "write_recording", "write_result"]
 
 
@@ -76,6 +78,40 @@ def read_volume(path: str | PathLike[str]) -> TetMesh:
 def read_robot(path: str | PathLike[str]) -> RobotModel:
     """RobotModel from a URDF file."""
     return _palpate.read_robot(path)
+
+
+def pose(position_m: ArrayLike, quaternion_xyzw: ArrayLike | None = None, rotation_vector_rad: ArrayLike | None = None,
+         rotation: ArrayLike | None = None) -> NDArray[Any]:
+    """A pose as T_base_tip, T_base_camera and the like want it: 4 x 4. Of frame b in frame a it is T_a_b: p_a = T_a_b @ [*p_b, 1].
+
+    position_m: of b's origin, in a's coordinates, metres (drivers of arms often have millimetres)
+    How b is turned against a, one of these, or none (b's axes are a's):
+    quaternion_xyzw:     x, y, z, w, as ROS and files of recordings have it (driver.h: w first). Of any length but zero
+    rotation_vector_rad: the axis times the angle in radians, at most a whole turn: the last three numbers of a UR controller's pose
+    rotation:            3 x 3, its columns are b's axes in a. Of few digits the nearest rotation is taken
+
+    The tip's z axis points along the tool, into the object; the camera's forward, x to the right, y down.
+    Raises Error for NaN and infinity, for an array of another shape, a quaternion of length zero, more than a whole turn, what is no
+    rotation (it says by how much), and where more than one rotation is given.
+    """
+    return _palpate.pose(position_m, quaternion_xyzw, rotation_vector_rad, rotation)
+
+
+def check(recording: Recording, *, stiffness_n_per_m: float | None = None, rigid=False, stiffness_relative_std: float | None = None,
+          placed_std_m=0.0, placed_std_rad=0.0, touch_std_m=5e-4) -> SelfCheck:
+    """The rig before the object, as `palpate check`: a SelfCheck of what is wrong with force, arm and camera (docs/how-to-push.md).
+
+    recording: of pushes on a body whose answer is known, with forces, travels and, of a camera, depth images; its rest surface is the body
+               where it stands in the base frame
+    stiffness_n_per_m, rigid: what was pushed, one of them: a spring, along every push (the surface is the plate on it), or rigid=True
+    stiffness_relative_std:   how well the spring's stiffness is known (0.002)
+    placed_std_m, placed_std_rad: of the body's place and orientation in the base frame; 0: exact
+    touch_std_m:              of the tip at first contact, along the push
+
+    Raises Error where no step has a force and a travel, for a body without a shape, and for numbers that cannot be.
+    """
+    return _palpate.check(recording, dict(stiffness_n_per_m=stiffness_n_per_m, rigid=rigid, stiffness_relative_std=stiffness_relative_std,
+                                          placed_std_m=placed_std_m, placed_std_rad=placed_std_rad, touch_std_m=touch_std_m))
 
 
 def identify(recording: Recording, *, method="palpate", material=None, element=None, refine=None, regions="recorded", poisson_range=None,
@@ -175,12 +211,15 @@ def predict(found: Identified, *, contact_m=None, direction=(0, 0, -1), force_n=
                                         tool=tool, threads=threads))
 
 
-def export(found: Identified, to: str, folder: str | PathLike[str], *, density_kg_m3=0.0, gravity_m_s2=None,
-           elements="split") -> list[str]:
+def export(found: Identified, to: str, folder: str | PathLike[str], *, density_kg_m3: float | None = None,
+           gravity_m_s2: ArrayLike | None = None, elements="split") -> list[str]:
     """The learned object for a simulator, one of exporters(). Returns the names of the files, the one to open first.
 
+    density_kg_m3: 5 to 30000 (the recording's); simulators of motion need one
+    gravity_m_s2:  [0, 0, -9.81] on earth (the recording's; none where the shape was measured with its weight on)
     elements:  of simulators that take no quadratic tetrahedra: 'split' (each in eight, near to what was fitted) or 'corners' (an eighth of them, stiffer)
-    What the files do not hold as it was learned (the law, supports, gravity) is said by `warnings.warn`."""
+    What the files do not hold as it was learned (the law, supports, gravity) is said by `warnings.warn`. Raises Error
+    for a density that cannot be, and where the folder cannot be made."""
     return _palpate.export(found, to, folder, density_kg_m3, gravity_m_s2, elements)
 
 

@@ -21,6 +21,7 @@ class Robot:
     """Derive from it and drive your arm. Poses are 4 x 4, base frame, metres; the tip's z axis points along the tool, into the object.
 
     What a call raises ends the push: the robot is stopped, its tip goes away from the object, and the caller of `push` or `explore` gets it.
+    So does what cannot be in what it gives (a joint that is NaN, an image of another size than its camera's): an Error that names call and field.
     After KeyboardInterrupt (Ctrl-C) and SystemExit it stands where it was stopped.
 
     travel_sigma_m: standard deviation of the encoders' tip position along a push; positive
@@ -30,7 +31,7 @@ class Robot:
     travel_sigma_m = 0.0005
 
     def read(self) -> RobotState:
-        """A RobotState. force_n is of the tool on the object, base frame; a constant bias is allowed."""
+        """A RobotState. force_n is of the tool on the object, base frame; a constant bias is allowed. Its clock must not go back."""
         raise NotImplementedError(f"{type(self).__name__}.read: say how your arm does it")
 
     def move(self, T_base_tip: NDArray[Any], speed_m_s: float) -> bool | None:
@@ -42,7 +43,7 @@ class Robot:
         raise NotImplementedError(f"{type(self).__name__}.stop: say how your arm does it")
 
     def take_depth_image(self) -> DepthFrame:
-        """A DepthFrame, with camera, pose of the camera, noise and, where the robot is in view, its mask."""
+        """A DepthFrame, with camera, pose of the camera, noise and, where the robot is in view, its mask. 0, NaN and infinity are no data."""
         raise NotImplementedError(f"{type(self).__name__}.take_depth_image: say how your arm does it")
 
     def wait(self, duration_s: float) -> None:
@@ -81,7 +82,8 @@ def push(robot: Robot, scene: Recording, contact_m: ArrayLike, direction: ArrayL
          **options) -> tuple[Push, PushReport]:
     """One push by the protocol: look, approach until contact, raise the force step by step, let it settle, record; go back and look.
 
-    Returns (Push, PushReport); `recording.pushes.append(push)` makes it part of a recording.
+    Returns (Push, PushReport); `recording.pushes.append(push)` makes it part of a recording. What went wrong with it (the force drifted,
+    the tip was turned, the object did not come back, ...) is said by `warnings.warn`, too.
 
     scene:    a Recording with the object, what holds it, and tools
     tool:     a name of scene.tools (its first)
@@ -96,7 +98,7 @@ def explore(robot: Robot, scene: Recording, folder: str | PathLike[str] | None =
             young_modulus_pa=2e4, contacts=24, tilts=2, seed=1, on_step: Callable[[str, Step], Any] | None = None,
             on_push: Callable[[str, list[Parameter], Parameter], Any] | None = None, progress: Callable[[str, float], Any] | None = None,
             **options) -> Explored:
-    """Push, estimate, take the next best push, until the intervals are narrow enough: an Explored.
+    """Push, estimate, take the next best push, until the intervals are narrow enough: an Explored. Warns after each push, as `push`.
 
     scene:    a Recording with the object, what holds it, tools and priors
     folder:   the recording is written there while it is made; a crash loses at most the step in flight. It must not be there yet, or be

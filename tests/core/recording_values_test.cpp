@@ -128,12 +128,152 @@ TEST(RecordingValues, AWrongUnitIsNamedWithWhatIsPossible) {
   EXPECT_EQ(wrong([](Recording& r) { r.pushes.push_back(r.pushes[0]); }), "pushes[1].name: 'push 1' is that of pushes[0] too; names must differ");
 }
 
+/// A plane whose normal was twice as long stood twice as far from everything.
+TEST(RecordingValues, DirectionsAreOfUnitLength) {
+  const auto with_plane = [](const Vec3& normal) { return wrong([&](Recording& r) { r.environment.planes = {Plane{Vec3::Zero(), normal}}; }); };
+  EXPECT_EQ(with_plane(Vec3(0, 0, 2)), "environment.planes[0].normal: is a direction: its length must be 1, is 2; normalise it\n");
+  EXPECT_EQ(with_plane(Vec3(0, 0, 1.009)), "") << "few digits, which files may have, too";
+  EXPECT_THAT(with_plane(Vec3(0, 0, 1.011)), HasSubstr("normal"));
+  EXPECT_THAT(with_plane(Vec3::Zero()), HasSubstr("normal"));
+  for (const SupportKind kind : {SupportKind::plane, SupportKind::table, SupportKind::wall, SupportKind::clamp}) {
+    const auto held = [&](const Vec3& normal) {
+      return wrong([&](Recording& r) {
+        Support& support = r.supports.emplace_back();
+        support.kind = kind;
+        support.plane.normal = normal;
+      });
+    };
+    EXPECT_EQ(held(-Vec3::UnitX()), "");
+    EXPECT_THAT(held(Vec3(0, 3, 0)), HasSubstr("supports[0].plane.normal: is a direction")) << int(kind);
+  }
+  const auto tool = [](ToolShape shape, const Vec3& direction) {
+    return wrong([&](Recording& r) {
+      Tool& other = r.tools.emplace_back();
+      other.name = "other";
+      other.shape = shape;
+      other.axis = other.plane.normal = direction;
+    });
+  };
+  for (const ToolShape shape : {ToolShape::capsule, ToolShape::edge, ToolShape::platen}) {
+    EXPECT_EQ(tool(shape, Vec3::UnitY()), "");
+    EXPECT_THAT(tool(shape, Vec3(0, 2, 0)), HasSubstr(shape == ToolShape::platen ? "tools[1].plane.normal: is a" : "tools[1].axis: is a"));
+  }
+  EXPECT_EQ(tool(ToolShape::sphere, Vec3::Zero()), "") << "has neither";
+}
+
+/// What a program can say and no file: it was taken as exact, or read where nothing was.
+TEST(RecordingValues, FilesAndProgramsMustSayTheSame) {
+  const auto support = [](SupportKind kind, const std::function<void(Support&)>& spoil) {
+    return wrong([&](Recording& r) {
+      Support& one = r.supports.emplace_back();
+      one.kind = kind;
+      one.box_max_m = Vec3::Ones();
+      spoil(one);
+    });
+  };
+  EXPECT_EQ(support(SupportKind::box, [](Support&) {}), "");
+  EXPECT_THAT(support(SupportKind::box, [](Support& s) { s.box_max_m.z() = 0; }), HasSubstr("supports[0].box_max_m: must be larger than box_min_m"));
+  EXPECT_THAT(support(SupportKind::vertices, [](Support& s) { s.vertices = {0, 4}; }), HasSubstr("supports[0].vertices: names vertices from 0 to 4, there are 4"));
+  EXPECT_THAT(support(SupportKind::plane, [](Support& s) { s.tolerance_m = 0; }), HasSubstr("supports[0].tolerance_m: must be a number above 0"));
+  EXPECT_THAT(support(SupportKind::table, [](Support& s) { s.contact = ContactLaw::friction; }), HasSubstr("supports[0].friction_coefficient: must be a number above 0"));
+  EXPECT_THAT(support(SupportKind::plane, [](Support& s) { s.contact = ContactLaw::frictionless, s.spread_std_m = 1e-3; }),
+              HasSubstr("supports[0].spread_std_m: is for a support that is bonded"));
+  const auto of_views = [](Recording& r) {
+    r.rest.views = {std::get<DepthFrame>(r.pushes[0].steps[0].observations[0])};
+    r.rest.surface.reset();
+  };
+  EXPECT_THAT(wrong([&](Recording& r) { of_views(r), r.supports.emplace_back().vertices = {0}; }), HasSubstr("supports[0].vertices: needs a mesh at rest"));
+  EXPECT_THAT(wrong([&](Recording& r) { r.tools[0].pressure = Pressure::punch; }), HasSubstr("tools[0].pressure: is that under a disc"));
+  EXPECT_EQ(wrong([&](Recording& r) { r.tools[0].pressure = Pressure::punch, r.tools[0].shape = ToolShape::disc; }), "");
+  EXPECT_THAT(wrong([&](Recording& r) { r.tools[0].radius_std_m = 0.02; }), HasSubstr("tools[0].radius_std_m: is larger than the radius itself"));
+  EXPECT_THAT(wrong([&](Recording& r) { r.density_kg_m3 = 30, r.density_std_kg_m3 = 40; }), HasSubstr("density_std_kg_m3: is larger than the density"));
+  EXPECT_THAT(wrong([&](Recording& r) { r.environment.gravity_m_s2.z() = -9.81; }), HasSubstr("environment.gravity_m_s2: acts, but density_kg_m3 is not given"));
+  const auto frame = [](Recording& r) -> DepthFrame& { return std::get<DepthFrame>(r.pushes[0].steps[1].observations[0]); };
+  EXPECT_THAT(wrong([&](Recording& r) { frame(r).camera.distortion_coefficients = {0.1, 0, 0, 0}; }),
+              HasSubstr("observations[0].camera.distortion_coefficients: has 4 numbers; plumb_bob has 4 or 5, rational 8, fisheye 4, none 0"));
+  EXPECT_THAT(wrong([&](Recording& r) { frame(r).camera.fx_px = 1e6; }), HasSubstr("observations[0].camera.fx_px: is 1e+06 px, which cannot be"));
+  EXPECT_THAT(wrong([&](Recording& r) { frame(r).T_base_camera.linear() *= -1; }), HasSubstr("observations[0].T_base_camera: is no rigid transform"));
+  EXPECT_THAT(wrong([&](Recording& r) { r.pushes[0].steps[1].time_s = 1.7e18; }), HasSubstr("pushes[0].steps[1].time_s: is 1.7e+18 s, which cannot be"));
+  EXPECT_THAT(wrong([&](Recording& r) {
+                Load& load = r.pushes[0].steps[1].loads[0];
+                load.force_n.reset(), load.travel_m = 1e-3, load.force_rate_n_s = Vec3::UnitZ();
+              }),
+              HasSubstr("loads[0].force_rate_n_s: belongs to a force that is given"));
+}
+
+/// A mesh of other columns was read past its end.
+TEST(RecordingValues, ATetrahedronHasFourNodesOrTen) {
+  const auto of_columns = [](Eigen::Index columns) {
+    return wrong([&](Recording& r) {
+      r.rest.volume = TetMesh{r.rest.surface->vertices_m, Tetrahedra::Zero(1, columns)};
+      r.rest.surface.reset();
+    });
+  };
+  EXPECT_EQ(of_columns(4), "");
+  EXPECT_EQ(of_columns(10), "");
+  for (const Eigen::Index columns : {3, 5, 8, 11}) EXPECT_THAT(of_columns(columns), HasSubstr("rest.volume.tetrahedra: has " + std::to_string(columns) + " columns"));
+}
+
+TEST(RecordingValues, RegionsAreThoseThatAFileMayName) {
+  const auto regions = [](const std::function<void(std::vector<Region>&)>& spoil) {
+    return wrong([&](Recording& r) {
+      r.rest.volume = TetMesh{r.rest.surface->vertices_m, Tetrahedra::Zero(2, 4)};
+      r.rest.volume->tetrahedra.rowwise() = Eigen::Matrix<Index, 1, 4>(0, 1, 2, 3);
+      r.rest.surface.reset();
+      r.regions.resize(2);
+      r.regions[0].name = "low";
+      r.regions[0].select = RegionSelection::box;
+      r.regions[0].box_max_m = Vec3::Ones();
+      r.regions[1].name = "high";
+      spoil(r.regions);
+    });
+  };
+  using All = std::vector<Region>;
+  EXPECT_EQ(regions([](All&) {}), "");
+  EXPECT_THAT(regions([](All& all) { all[1].name.clear(); }), HasSubstr("regions[1].name: must not be empty"));
+  EXPECT_THAT(regions([](All& all) { all[0].box_min_m.x() = nan; }), HasSubstr("regions[0].box_min_m: holds NaN"));
+  EXPECT_THAT(regions([](All& all) { all[0].box_max_m.x() = 0; }), HasSubstr("regions[0].box_max_m: must be larger"));
+  EXPECT_THAT(regions([](All& all) { all[0].select = RegionSelection::rest; }), HasSubstr("regions[1].select: is 'rest', and another"));
+  const auto points = [](All& all, const Points& at) { all[0].select = RegionSelection::points, all[0].points_m = at; };
+  EXPECT_THAT(regions([&](All& all) { points(all, Points::Constant(1, 3, infinity)); }), HasSubstr("regions[0].points_m: holds NaN or infinity"));
+  EXPECT_THAT(regions([&](All& all) { points(all, Points(0, 3)); }), HasSubstr("regions[0].points_m: holds no point"));
+  EXPECT_THAT(regions([&](All& all) { points(all, Points::Zero(1, 3)); }), HasSubstr("regions: around points leave no rest"));
+  const auto elements = [](All& all, const std::vector<Index>& of) { all[0].select = RegionSelection::elements, all[0].elements = of; };
+  EXPECT_EQ(regions([&](All& all) { elements(all, {1}); }), "");
+  EXPECT_THAT(regions([&](All& all) { elements(all, {0, 2}); }), HasSubstr("regions[0].elements: names element 2, the volume has 2"));
+  EXPECT_THAT(regions([&](All& all) { elements(all, {1, 1}); }), HasSubstr("regions[0].elements: names element 1, which was named before"));
+  EXPECT_THAT(wrong([](Recording& r) {
+                Region& one = r.regions.emplace_back();
+                one.select = RegionSelection::elements;
+                one.elements = {0};
+              }),
+              HasSubstr("regions[0].elements: needs a volume at rest"));
+}
+
 TEST(RecordingValues, WhatIsWrongIsNamedByItsPlace) {
   const auto step = [](Recording& r) -> Step& { return r.pushes[0].steps[1]; };
   const auto load = [](Recording& r) -> Load& { return r.pushes[0].steps[1].loads[0]; };
   const auto seen = [](Recording& r, std::size_t o) -> Observation& { return r.pushes[0].steps[1].observations[o]; };
   const std::string in_step = "pushes[0].steps[1].", in_load = in_step + "loads[0].";
   const auto observed = [&](int o, const std::string& field) { return in_step + "observations[" + std::to_string(o) + "]." + field; };
+  const auto held = [](Recording& r, SupportKind kind) -> Support& {
+    Support& support = r.supports.emplace_back();
+    support.kind = kind;
+    support.box_max_m = Vec3::Ones();
+    return support;
+  };
+  const auto tool = [](Recording& r, ToolShape shape) -> Tool& {
+    Tool& other = r.tools.emplace_back();
+    other.name = "other";
+    other.shape = shape;
+    return other;
+  };
+  const auto two_markers = [&](Recording& r) -> Markers& {
+    Markers& markers = std::get<Markers>(seen(r, 2));
+    markers.rest_m = markers.observed_m = Points::Zero(2, 3);
+    markers.observed_m.row(1).setConstant(nan);
+    return markers;
+  };
   const std::vector<std::pair<std::string, std::function<void(Recording&)>>> cases = {
       {"force_scale_std", [&](Recording& r) { r.force_scale_std = nan; }},
       {"force_cross_talk_std", [&](Recording& r) { r.force_cross_talk_std = -0.1; }},
@@ -167,6 +307,42 @@ TEST(RecordingValues, WhatIsWrongIsNamedByItsPlace) {
       {observed(3, "sigma_m"), [&](Recording& r) { std::get<ToolTravel>(seen(r, 3)).sigma_m = nan; }},
       {observed(3, "tool"), [&](Recording& r) { std::get<ToolTravel>(seen(r, 3)).tool = "finger"; }},
       {observed(4, "force_sigma_n"), [&](Recording& r) { std::get<Wrench>(seen(r, 4)).force_sigma_n = -1; }},
+      {"rest.surface_correlation_m", [&](Recording& r) { r.rest.surface_correlation_m = nan; }},
+      {"rest.surface_correlation_m", [&](Recording& r) { r.rest.surface_correlation_m = 0; }},
+      {"rest.observed_triangles", [&](Recording& r) { r.rest.observed_triangles = Triangles::Constant(1, 3, 4); }},
+      {"rest.volume.tetrahedra", [&](Recording& r) { r.rest.volume = TetMesh{r.rest.surface->vertices_m, Tetrahedra(0, 0)}; }},
+      {"supports[0].plane.point_m", [&](Recording& r) { held(r, SupportKind::plane).plane.point_m.x() = nan; }},
+      {"supports[0].plane.normal", [&](Recording& r) { held(r, SupportKind::table).plane.normal.x() = infinity; }},
+      {"supports[0].tolerance_m", [&](Recording& r) { held(r, SupportKind::wall).tolerance_m = nan; }},
+      {"supports[0].tolerance_m", [&](Recording& r) { held(r, SupportKind::plane).tolerance_m = -1e-3; }},
+      {"supports[0].box_min_m", [&](Recording& r) { held(r, SupportKind::box).box_min_m.x() = nan; }},
+      {"supports[0].vertices", [&](Recording& r) { held(r, SupportKind::vertices).vertices = {-1}; }},
+      {"supports[0].friction_coefficient", [&](Recording& r) { held(r, SupportKind::table).friction_coefficient = -1; }},
+      {"environment.planes[0].point_m", [&](Recording& r) { r.environment.planes.emplace_back().point_m.z() = nan; }},
+      {"environment.gravity_m_s2", [&](Recording& r) { r.environment.gravity_m_s2.z() = -981, r.density_kg_m3 = 30; }},
+      {"tools[1].axis", [&](Recording& r) { tool(r, ToolShape::edge).axis.x() = nan; }},
+      {"tools[1].plane.point_m", [&](Recording& r) { tool(r, ToolShape::platen).plane.point_m.x() = nan; }},
+      {"tools[1].vertices", [&](Recording& r) { tool(r, ToolShape::vertices).vertices = {0, 70}; }},
+      {"tools[1].mesh", [&](Recording& r) { tool(r, ToolShape::mesh); }},
+      {"tools[1].mesh.vertices_m", [&](Recording& r) { (tool(r, ToolShape::mesh).mesh = r.rest.surface)->vertices_m(0, 0) = nan; }},
+      {"tools[1].mesh.triangles", [&](Recording& r) { (tool(r, ToolShape::mesh).mesh = r.rest.surface)->triangles(0, 0) = 4; }},
+      {"tools[1].friction_coefficient", [&](Recording& r) { tool(r, ToolShape::sphere).contact = ContactLaw::friction; }},
+      {in_step + "T_base_tip", [&](Recording& r) { (step(r).T_base_tip = Pose::Identity())->linear() *= 2; }},
+      {observed(0, "camera.distortion_coefficients"),
+       [&](Recording& r) {
+         Camera& camera = std::get<DepthFrame>(seen(r, 0)).camera;
+         camera.distortion = DistortionModel::fisheye;
+         camera.distortion_coefficients = {0.1, nan, 0, 0};
+       }},
+      {observed(0, "noise.lens_scatter_std"), [&](Recording& r) { std::get<DepthFrame>(seen(r, 0)).noise.lens_scatter_std = -0.01; }},
+      {observed(2, "rest_std_m"), [&](Recording& r) { std::get<Markers>(seen(r, 2)).rest_std_m = -1; }},
+      {observed(2, "rest_std_m"), [&](Recording& r) { std::get<Markers>(seen(r, 2)).rest_std_m = nan; }},
+      {observed(2, "names"), [&](Recording& r) { two_markers(r).names = {"a", "a"}; }},
+      {observed(2, "rest_m"), [&](Recording& r) { two_markers(r).rest_m(0, 0) = infinity; }},
+      {observed(2, "observed_m"), [&](Recording& r) { two_markers(r).observed_m(0, 0) = infinity; }},
+      {observed(4, "time_s"), [&](Recording& r) { std::get<Wrench>(seen(r, 4)).time_s = nan; }},
+      {observed(4, "along"), [&](Recording& r) { std::get<Wrench>(seen(r, 4)).along.x() = nan; }},
+      {observed(4, "along"), [&](Recording& r) { std::get<Wrench>(seen(r, 4)).along = Vec3(0, 0, 2); }},
       {observed(4, "torque_nm"), [&](Recording& r) { std::get<Wrench>(seen(r, 4)).torque_nm.z() = infinity; }},
   };
   for (const auto& [where, spoil] : cases) {

@@ -82,6 +82,18 @@ TEST_P(EveryContainer, GivesBackEveryMessageInTheOrderOfTime) {
   }
 }
 
+// One message logged before the clock was set was the bag's start, and every step came decades after it.
+TEST_P(EveryContainer, AMessageOfAnotherCenturyIsLeftOutWithAWord) {
+  std::vector<TestMessage> written = mixed(100);
+  for (TestMessage& one : written) one.time_ns += 1'700'000'000'000'000'000;
+  const std::size_t count = written.size();
+  written.push_back({"/wrench", "geometry_msgs/msg/WrenchStamped", 0, noise(50, 300)});
+  const MessageSource bag = parse_bag(bytes(written), "a");
+  EXPECT_EQ(bag.messages.size(), count);
+  EXPECT_EQ(bag.topics[2].messages, 12u);
+  EXPECT_THAT(bag.warnings, testing::Contains(HasSubstr("1 messages are left out: their recorder's times lie days from all others")));
+}
+
 TEST_P(EveryContainer, MessagesOutliveTheSourceThatWasCopied) {
   MessageSource copy;
   {

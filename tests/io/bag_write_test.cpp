@@ -126,6 +126,43 @@ TEST(BagWrite, APushThatTouchedNothingComesBackAsOne) {
   }
 }
 
+/// A fit takes the way of a direction, whatever its length.
+TEST(BagWrite, DirectionsAreOfUnitLength) {
+  const TemporaryFolder folder("bag_directions");
+  Recording recording = made_up();
+  for (Step& step : recording.pushes[0].steps) {
+    step.T_base_tip.reset();  // the tip then stands where the travel says
+    for (Load& load : step.loads) load.direction *= 2;
+  }
+  write_bag(recording, folder.path() / "bag");
+  const Recording back = read_back(folder.path() / "bag");
+  for (std::size_t i = 1; i < recording.pushes[0].steps.size(); ++i) {
+    const Step &a = recording.pushes[0].steps[i], &b = back.pushes[0].steps[i];
+    EXPECT_EQ(b.loads.at(0).direction, Vec3(0, 0, -1));
+    ASSERT_NE(observation<ToolTravel>(b), nullptr);
+    EXPECT_NEAR(observation<ToolTravel>(b)->travel_m, observation<ToolTravel>(a)->travel_m, 1e-14);
+  }
+}
+
+TEST(BagWrite, WhatNoReaderTakesIsRefused) {
+  const TemporaryFolder folder("bag_unreadable");
+  const auto said = [&](const Recording& recording) -> std::string {
+    try {
+      write_bag(recording, folder.path() / "bag");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "was written";
+  };
+  Recording timeless = made_up();
+  for (Step& step : timeless.pushes[0].steps) step.time_s = 0;
+  EXPECT_THAT(said(timeless), testing::HasSubstr("time_s: does not follow the step before in time"));
+  Recording noiseless = made_up();
+  for (Observation& one : noiseless.pushes[1].steps[1].observations)
+    if (auto* frame = std::get_if<DepthFrame>(&one)) frame->noise = {};
+  EXPECT_THAT(said(noiseless), testing::HasSubstr("noise.sigma_m: is not given"));
+}
+
 TEST(BagWrite, WhatATopicCannotSayIsRefused) {
   const TemporaryFolder folder("bag_refused");
   Recording imposed = made_up();

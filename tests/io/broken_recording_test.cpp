@@ -384,6 +384,38 @@ TEST(ContradictoryRecording, PlatensAndSignsAreJudged) {
   EXPECT_THAT(said(wrong), HasSubstr("points away from the object"));
 }
 
+/// They were read past their end.
+TEST(ContradictoryRecording, TetrahedraOfAnotherNumberOfNodesAreNotLookedAt) {
+  const MeshData mesh = cube();
+  for (const Eigen::Index columns : {3, 5, 8}) {
+    Recording recording;
+    recording.rest.volume = TetMesh{mesh.points_m, Tetrahedra::Constant(1, columns, 7)};
+    const auto problems = check_recording(recording);
+    ASSERT_EQ(problems.size(), 1u);
+    EXPECT_EQ(problems[0].where, "rest.volume.tetrahedra");
+    EXPECT_THAT(problems[0].what, HasSubstr("has " + std::to_string(columns) + " columns; a tetrahedron has 4 nodes, or 10"));
+  }
+}
+
+TEST_F(BrokenRecording, AMarkerThatIsThereTwice) {
+  const auto with = [&](const std::string& rest) {
+    folder.put("recording.yaml", index_text.substr(0, index_text.find("pushes:")) + "markers: {" + rest +
+                                     "}\npushes:\n  - name: seen\n    steps:\n      - time_s: 0\n        loads: [{tool: tip, force_n: [0, 0, -1]}]\n"
+                                     "        observations: [{kind: markers, sigma_m: 0.001, file: seen.csv}]\n");
+  };
+  const std::string whole = "name,x_m,y_m,z_m\na,0,0,0.1\nb,0.1,0,0.1\n";
+  folder.put("places.csv", whole);
+  folder.put("seen.csv", whole);
+  with("rest_m: {a: [0, 0, 0.1], b: [0.1, 0, 0.1]}");
+  expect_accepted();
+  folder.put("seen.csv", whole + "a,0,0,0.09\n");  // the last row won
+  expect_refused("seen.csv:4", "marker 'a' is there twice; remove one");
+  with("file: places.csv");
+  expect_refused("seen.csv:4 (named in", "marker 'a' is there twice; remove one");
+  folder.put("places.csv", whole + "b,0.1,0,0.1\n");
+  expect_refused("places.csv:4", "marker 'b' is there twice; remove one");
+}
+
 TEST_F(BrokenRecording, AllProblemsAreListed) {
   folder.put("clouds/b.xyz", cloud_text(1000));
   MeshData mesh = cube();

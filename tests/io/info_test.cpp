@@ -261,6 +261,28 @@ TEST_F(Info, SaysWhereNothingMasksTheArm) {
   EXPECT_NE(outcome.err.find("hand.dae"), std::string::npos) << "a shape that cannot be read is said: " << outcome.err;
 }
 
+// A UR's controller tells poses in a base that is its description's turned by half a turn: the arm was masked on the wrong side.
+TEST_F(Info, SaysWhereARobotStandsFarFromItsTip) {
+  put_still_life(folder, {});
+  std::string told = folder.get("recording.yaml");
+  for (std::size_t at = 0; (at = told.find("loads:", at)) != std::string::npos;) {
+    const std::string indent(at - told.rfind('\n', at) - 1, ' ');
+    const std::string pose = "T_base_tip: [[1, 0, 0, 0.05], [0, 1, 0, 0.05], [0, 0, 1, 0.7], [0, 0, 0, 1]]\n" + indent + "joints_rad: [0]\n" + indent;
+    told.insert(at, pose);
+    at += pose.size() + 6;
+  }
+  folder.put("recording.yaml", told + "\nrobot: {urdf: arm.urdf, joints: [lift]}\n");
+  for (const char* height : {"0.3", "-0.3"}) {
+    folder.put("arm.urdf", std::string("<robot name='arm'><link name='foot'/><link name='hand'><visual><geometry><sphere radius='0.01'/></geometry></visual></link>"
+                                       "<joint name='lift' type='prismatic'><parent link='foot'/><child link='hand'/><axis xyz='0 0 1'/>"
+                                       "<limit lower='-1' upper='1' effort='1' velocity='1'/><origin xyz='0 0 ") +
+                               height + "'/></joint></robot>");
+    const Outcome outcome = info_of(folder);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err.find("no link comes nearer to the tip (T_base_tip) than 0.70 m") != std::string::npos, height[0] == '-') << outcome.err;
+  }
+}
+
 // A bag of ours has images with masks, and clouds: the mapping to start from names them all.
 TEST(InfoOfABag, SuggestsMaskAndClouds) {
   if (std::string(PALPATE_CLI).empty()) GTEST_SKIP() << "the command line program is not built";

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <cstring>
+#include <map>
 #include <random>
 
 #include "io/broken_bytes.hpp"
@@ -124,6 +126,24 @@ TEST(RosMessages, ComeBackAsTheyWereWritten) {
   EXPECT_EQ(back.cy_px, 239.5);
   EXPECT_EQ(back.distortion, DistortionModel::rational);
   EXPECT_EQ(back.distortion_coefficients, info.camera.distortion_coefficients);
+
+  // 24 bytes before the last stand binning_x, binning_y and the region: x, y, height, width.
+  std::string part = encode(info);
+  const auto put = [&](std::size_t place, std::uint32_t value) { std::memcpy(part.data() + part.size() - 25 + 4 * place, &value, 4); };
+  for (const auto& [place, value] : std::map<std::size_t, std::uint32_t>{{0, 2}, {1, 4}, {2, 40}, {3, 80}, {4, 240}, {5, 320}}) put(place, value);
+  const Camera seen = decode_camera_info(part, "m").camera;
+  EXPECT_EQ(seen.width_px, 160);
+  EXPECT_EQ(seen.height_px, 60);
+  EXPECT_EQ(seen.fx_px, 250);
+  EXPECT_EQ(seen.fy_px, 501 / 4.0);
+  EXPECT_EQ(seen.cx_px, (319.5 - 40) / 2);
+  EXPECT_EQ(seen.cy_px, (239.5 - 80) / 4);
+  info.camera.distortion_coefficients.resize(14, 0.0);
+  EXPECT_EQ(decode_camera_info(encode(info), "m").camera.distortion_coefficients.size(), 8u) << "no prism, no tilt";
+  for (const std::size_t count : {12, 7}) {
+    info.camera.distortion_coefficients.assign(count, 0.01);
+    EXPECT_THROW(decode_camera_info(encode(info), "m"), Error) << count;
+  }
 
   const RosJointState joints{header, {"a", "elbow", "c"}, {0.1, 0.2, 0.3}};
   EXPECT_EQ(decode_joint_state(encode(joints), "m").names, joints.names);

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the Python module is given: what is left out, mistyped or cannot be. Run by ctest like module_test.py."""
 import os
+import pathlib
 import tempfile
 import unittest
 import warnings
@@ -42,7 +43,50 @@ def pushed_block():
     return scene
 
 
+def found_quickly(**options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return palpate.identify(pushed_block(), refine="none", cross_checks=False, poisson_ratio=0.3, **options)
+
+
 class Export(unittest.TestCase):
+    def test_refuses_a_density_that_cannot_be(self):
+        found = found_quickly(element="tet4")
+        with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+            warnings.simplefilter("ignore")
+            for density in (-5, float("nan"), 1.1, float("inf"), 4e4):
+                with self.assertRaises(palpate.Error) as raised:
+                    palpate.export(found, "mujoco", folder + "/none", density_kg_m3=density)
+                self.assertEqual(raised.exception.where, "density_kg_m3")
+                self.assertIn(f"is {density:g}, outside 5 to 30000 kg/m3", raised.exception.message)
+            self.assertEqual(os.listdir(folder), [])
+            with self.assertRaisesRegex(palpate.Error, "density_kg_m3: must be a number, not str"):
+                palpate.export(found, "mujoco", folder + "/none", density_kg_m3="30")
+            found.object.density_kg_m3 = 40.0
+            same = []
+            for name, density in (("none", {}), ("zero", dict(density_kg_m3=0.0)), ("said", dict(density_kg_m3=40))):
+                files = palpate.export(found, "mujoco", f"{folder}/{name}", **density)
+                same.append(pathlib.Path(folder, name, files[0]).read_text())
+            self.assertEqual(same, same[:1] * 3, "None and 0 are the recording's")
+
+    def test_a_folder_that_cannot_be_made_is_an_error_like_any_other(self):
+        class Late(palpate.Identified):
+            """A file comes to stand at the folder's place once it was looked at."""
+
+            def __getattribute__(self, name):
+                if name == "volume":
+                    out.write_text("")
+                return super().__getattribute__(name)
+
+        found = found_quickly(element="tet4")
+        late = Late(answer=found.answer, volume=found.volume, region=found.region, object=found.object)
+        with tempfile.TemporaryDirectory() as folder:
+            out = pathlib.Path(folder, "out")
+            with self.assertRaises(palpate.Error) as raised:
+                palpate.export(late, "calculix", out)
+            self.assertEqual(raised.exception.where, str(out))
+            self.assertRegex(raised.exception.message, r"cannot be made, read or written \(.+\); give another path")
+
     def test_corners_alone_are_an_eighth_of_the_elements(self):
         with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
             warnings.simplefilter("ignore")
