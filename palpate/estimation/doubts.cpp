@@ -15,6 +15,7 @@
 #include "palpate/estimation/exact_inputs.hpp"
 #include "palpate/estimation/forward_model_parts.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/held_poisson.hpp"
 #include "palpate/estimation/names_of_unknowns.hpp"
 #include "palpate/estimation/slips.hpp"
 #include "palpate/fem/regions.hpp"
@@ -148,12 +149,6 @@ struct ScoreTests {
   }
 };
 
-/// A ratio at its bound does not follow.
-std::vector<int> without_held_poisson(std::vector<int> moving, const Optimum& optimum) {
-  if (optimum.poisson_at_lower || optimum.poisson_at_upper) std::erase(moving, static_cast<int>(poisson));
-  return moving;
-}
-
 }  // namespace
 
 Doubts look_for_doubts(const Recording& recording, const Objective& objective, const Optimum& optimum, const Inputs& inputs,
@@ -165,6 +160,7 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   const std::vector<ExactInput> exact = free_exact_inputs(recording, inputs, fitted.object().mesh, more.recording, more_inputs);
   SimulatedObject object = fitted.object();
   const bool divided = !fitted.touches() && divide(object, recording);
+  if (divided) more.recording.model.poisson_by_region = false;  // places are asked for their E alone
   if (more.asked.empty() && !divided && exact.empty()) return {};
   Unknowns unknowns;
   constexpr double between_ratios = 1e-3;  // of a linear body's answers: the test is no finer
@@ -202,9 +198,11 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
   if (!there.evaluation.usable) return {};
 
   Doubts out;
+  // What was fitted. A Poisson ratio held at its bound does not follow here either.
   std::vector<int> moving;
-  for (int k : free_unknowns(objective.unknowns())) moving.push_back(at[static_cast<std::size_t>(k)]);
-  out.budget_if = budget_if(exact, unknowns, there.evaluation.curvature, without_held_poisson(moving, optimum), fitted.object().region_names);
+  for (int k : moving_unknowns(objective.unknowns(), optimum.unknowns, optimum.evaluation.gradient))
+    moving.push_back(at[static_cast<std::size_t>(k)]);
+  out.budget_if = budget_if(exact, unknowns, there.evaluation.curvature, moving, fitted.object().region_names);
   if (fitted.touches()) return out;
   out.slip = contact_slip(wider, there, factor);
   for (const int k : of_torques)
@@ -236,9 +234,9 @@ Doubts look_for_doubts(const Recording& recording, const Objective& objective, c
     doubt.size_m = count == 1 ? asked(0) : asked.norm();
     doubt.p_value = std::min(1.0, chi_square_tail(doubt.chi2, static_cast<int>(count)) * static_cast<double>(more.asked.size()));
     const VectorX change = step->move.head(as_fitted->move.size()) - as_fitted->move;
-    doubt.log_young = log_young_of_regions(unknowns, moving) * change;
-    for (std::size_t k = 0; k < moving.size(); ++k) {
-      if (moving[k] == poisson) doubt.poisson = change(static_cast<Index>(k));
+    doubt.log_young = log_young_of_regions(unknowns, tests.moving) * change;
+    for (std::size_t k = 0; k < tests.moving.size(); ++k) {
+      if (tests.moving[k] == poisson) doubt.poisson = change(static_cast<Index>(k));
     }
     out.all.push_back(doubt);
   }

@@ -47,7 +47,7 @@ std::vector<ExactInput> free_exact_inputs(const Recording& recording, const Inpu
 /// One step of Gauss and Newton from the optimum for each of them, everything that was fitted free to follow. Independent ways are added
 /// in squares. What no step depends on is left out.
 /// @param unknowns   of the model in which nothing is exact, and the curvature of the cost over all of them
-/// @param moving     what was fitted, among them (log E first)
+/// @param moving     what was fitted and is not held at a bound, among them (log E first)
 /// @param regions    their names, where there are several
 std::vector<BudgetEntry> budget_if(const std::vector<ExactInput>& exact, const Unknowns& unknowns, const MatrixX& curvature,
                                    const std::vector<int>& moving, const std::vector<std::string>& regions);

@@ -15,6 +15,7 @@
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/doubts.hpp"
 #include "palpate/estimation/error_budget.hpp"
+#include "palpate/estimation/held_poisson.hpp"
 #include "palpate/estimation/law_comparison.hpp"
 #include "palpate/estimation/load_drift.hpp"
 #include "palpate/estimation/mesh_correction.hpp"
@@ -348,7 +349,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   }
   std::vector<Posterior> regions{posterior};
   for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));
-  OwnPoisson own = own_poisson(unknowns, optimum.unknowns, covariance, moving);
+  OwnPoisson own = own_poisson(unknowns, optimum, covariance, moving);
   const auto move_by = [&](const AnswerShift& shift) {
     for (std::size_t r = 0; r < regions.size(); ++r)
       move(regions[r], shift.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
@@ -397,7 +398,8 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   std::optional<fem::Certificate> certificate;
   // Without cross-checks all that may be doubted is asked only where the fit's own unknowns, which cost nothing, ask for a slip.
   const auto asks_for_slip = [&] {
-    const std::optional<Slip> slip = find_slip(objective, optimum, moving, factor, std::max(1.0, summary.chi2_per_dof));
+    const std::vector<int> follow = moving_unknowns(unknowns, optimum.unknowns, optimum.evaluation.gradient);
+    const std::optional<Slip> slip = find_slip(objective, optimum, follow, factor, std::max(1.0, summary.chi2_per_dof));
     return slip && slip->p_value < rare;
   };
   const bool doubting = options.cross_checks || (options.find_slips && asks_for_slip());

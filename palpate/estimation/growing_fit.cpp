@@ -8,6 +8,7 @@
 #include "palpate/estimation/answer_parts.hpp"
 #include "palpate/estimation/cross_check.hpp"
 #include "palpate/estimation/error_budget.hpp"
+#include "palpate/estimation/held_poisson.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/posterior.hpp"
 #include "palpate/estimation/unknown_names.hpp"
@@ -84,7 +85,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
     }
     optimum = optimise(objective, start, *weighed, optimiser, progress);
     if (optimum.termination == Termination::no_progress &&
-        newton_step(optimum.evaluation, free_unknowns(unknowns)).gain < least_gain) {
+        newton_step(optimum.evaluation, moving_unknowns(unknowns, optimum.unknowns, optimum.evaluation.gradient)).gain < least_gain) {
       optimum.termination = Termination::converged;
       optimum.message = "converged";
     }
@@ -165,7 +166,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   }
   std::vector<Posterior> regions{posterior};
   for (Index r = 1; r <= unknowns.ratio_count(); ++r) regions.push_back(posterior.of_region(r));
-  const OwnPoisson own = own_poisson(unknowns, optimum.unknowns, covariance, moving);
+  const OwnPoisson own = own_poisson(unknowns, optimum, covariance, moving);
   answer.parameters = parameters_from(regions, own, unknowns, object.region_names);
   answer.covariance = own.covariance_with(covariance_of(regions));
   objective.set_reuse(reuse);

@@ -7,6 +7,7 @@
 
 #include "palpate/estimation/answer_parts.hpp"
 #include "palpate/estimation/held_out.hpp"
+#include "palpate/estimation/held_poisson.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -64,12 +65,9 @@ double lowest_cost(const Evaluation& at, const std::vector<int>& moving) { retur
 /// cost that these were learned from: poses and tares of the held-out steps are no part of the prediction.
 double surprise(Objective& objective, const Optimum& joint, const Optimum& learned) {
   const Unknowns& unknowns = objective.unknowns();
-  std::vector<int> nuisances, moving;
-  for (const int k : free_unknowns(unknowns)) {
-    if (k >= unknowns.parameter_count()) nuisances.push_back(k);
-    const bool held = k == poisson && (learned.poisson_at_lower || learned.poisson_at_upper || joint.poisson_at_lower || joint.poisson_at_upper);
-    if (!held) moving.push_back(k);
-  }
+  std::vector<int> nuisances = free_unknowns(unknowns);
+  std::erase_if(nuisances, [&](int k) { return k < unknowns.parameter_count(); });
+  const std::vector<int> moving = moving_unknowns(unknowns, learned.unknowns, learned.evaluation.gradient);
   VectorX at = joint.unknowns;
   at.head(unknowns.parameter_count()) = learned.unknowns.head(unknowns.parameter_count());
   Evaluation all = objective.evaluate(at, joint.loss);

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/held_poisson.hpp"
 #include "palpate/estimation/own_poisson.hpp"
 #include "palpate/estimation/unknown_names.hpp"
 #include "palpate/estimation/young_bounds.hpp"
@@ -74,7 +75,9 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
   }
   const Evaluation before = objective.assemble(objective.last_rows(), optimum.unknowns, all);
   const Evaluation after = objective.assemble(changed, optimum.unknowns, all);
-  const std::vector<int> moving = free_unknowns(objective.unknowns());
+  // A region's own nu that is held stays where it is, and E with it. The shared one goes beyond its bound: `move` knows what that means.
+  std::vector<int> moving = free_unknowns(objective.unknowns());
+  std::erase_if(moving, [&](int k) { return k != poisson && is_held(objective.unknowns(), optimum.unknowns, optimum.evaluation.gradient, k); });
   MatrixX curvature = before.curvature;
   bound_young(curvature, objective.unknowns());  // else the mesh would move what nothing tells by rounding over rounding
   const VectorX change = MatrixX(curvature(moving, moving))
@@ -101,18 +104,69 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
   return shift.plus(finer.elsewhere);
 }
 
+namespace {
+
+/// A function on an even grid, linear between its nodes. Beyond them it goes on as it bends over as much of the grid as it has to go on:
+/// a log density upwards no more than straight.
+class OnGrid {
+ public:
+  OnGrid(const VectorX& grid, const VectorX& values, double beyond, bool concave)
+      : first_(grid(0)), spacing_((grid(grid.size() - 1) - first_) / static_cast<double>(grid.size() - 1)), values_(values), concave_(concave),
+        stride_(std::clamp<Index>(static_cast<Index>(std::lround(std::abs(beyond) / spacing_)), 1, (grid.size() - 1) / 2)) {}
+
+  double operator()(double x) const {
+    const double at = (x - first_) / spacing_, last = static_cast<double>(values_.size() - 1);
+    if (at < 0) return beyond(-at, 0, stride_);
+    if (at > last) return beyond(at - last, static_cast<Index>(values_.size()) - 1, -stride_);
+    const Index k = std::min(static_cast<Index>(at), static_cast<Index>(values_.size()) - 2);
+    const double share = at - static_cast<double>(k);
+    return (1 - share) * values_(k) + share * values_(k + 1);
+  }
+
+ private:
+  double beyond(double nodes, Index edge, Index inwards) const {
+    const double off = nodes / static_cast<double>(stride_), near = values_(edge + inwards), bend = values_(edge + 2 * inwards) - 2 * near + values_(edge);
+    return values_(edge) - off * (near - values_(edge)) + (concave_ ? 0.5 * off * (off + 1) * std::min(bend, 0.0) : 0);
+  }
+
+  double first_, spacing_;
+  const VectorX& values_;
+  bool concave_;
+  Index stride_;
+};
+
+}  // namespace
+
 void move(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper) {
   const Index size = static_cast<Index>(posterior.poisson.size());
-  const double variance = posterior.covariance(1, 1), close = 1e-9;
-  const bool at_bound = size < 2 || posterior.poisson(0) + std::min(shift.poisson, 0.0) < poisson_lower + close ||
-                        posterior.poisson(size - 1) + std::max(shift.poisson, 0.0) > poisson_upper - close;
-  if (at_bound) {
-    const double slope = variance > 0 ? posterior.covariance(0, 1) / variance : 0;
-    posterior.log_young_mean.array() += shift.log_young - slope * shift.poisson;
-  } else {
+  constexpr double close = 1e-9;
+  if (size < 3) {
+    posterior.log_young_mean.array() += shift.log_young;
+    update_covariance(posterior);
+    return;
+  }
+  const double first = posterior.poisson(0), last = posterior.poisson(size - 1);
+  if (first + std::min(shift.poisson, 0.0) >= poisson_lower + close && last + std::max(shift.poisson, 0.0) <= poisson_upper - close) {
     posterior.poisson.array() += shift.poisson;
     posterior.log_young_mean.array() += shift.log_young;
+    update_covariance(posterior);
+    return;
   }
+  // What the data say is moved, and cut at the bounds anew. What comes in over a bound was never asked for: it is taken to go on beyond as
+  // it bends before.
+  const VectorX before = posterior.poisson, log_density = posterior.weight.cwiseMax(1e-300).array().log(), mean = posterior.log_young_mean,
+                std_dev = posterior.log_young_std;
+  const OnGrid density(before, log_density, shift.poisson, true), ridge(before, mean, shift.poisson, false), width(before, std_dev, 0, false);
+  posterior.poisson = VectorX::LinSpaced(size, std::max(poisson_lower, std::min(first, first + shift.poisson)),
+                                         std::min(poisson_upper, std::max(last, last + shift.poisson)));
+  for (Index i = 0; i < size; ++i) {
+    const double from = posterior.poisson(i) - shift.poisson;
+    posterior.weight(i) = density(from);
+    posterior.log_young_mean(i) = ridge(from) + shift.log_young;
+    posterior.log_young_std(i) = width(std::clamp(from, first, last));
+  }
+  posterior.weight = (posterior.weight.array() - posterior.weight.maxCoeff()).exp();
+  posterior.weight /= posterior.weight.sum();
   update_covariance(posterior);
 }
 

@@ -29,8 +29,8 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
 /// lies between a quarter of what is estimated and twice of it (fem.discretisation).
 inline constexpr double mesh_left_over = 0.5;
 
-/// Moves a posterior to where it would be without an error that is known. Bounds of nu are kept: a posterior that touches one keeps
-/// its nu, and its ridge log E(nu) moves.
+/// Moves a posterior to where it would be without an error that is known: what the data say of nu, with its ridge log E(nu), and is cut at
+/// nu's bounds there. Where it is pressed against a bound, that leaves nu about where it was.
 void move(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper);
 
 /// Adds an error of known direction and normally distributed size (one standard deviation: `shift`) to a posterior. Exact for

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/held_poisson.hpp"
 #include "palpate/fem/materials.hpp"
 
 namespace palpate::estimation {
@@ -20,11 +21,6 @@ MatrixX pick(const MatrixX& matrix, const std::vector<int>& which) {
     for (std::size_t b = 0; b < which.size(); ++b) out(static_cast<Index>(a), static_cast<Index>(b)) = matrix(which[a], which[b]);
   }
   return out;
-}
-
-/// A nu of a region's own that sits on a bound which the gradient pushes against.
-bool pushes_out(const Unknowns& unknowns, const VectorX& at, const VectorX& gradient, int k) {
-  return (at(k) <= unknowns[k].lower && gradient(k) > 0) || (at(k) >= unknowns[k].upper && gradient(k) < 0);
 }
 
 void keep_own_poisson_inside(const Unknowns& unknowns, VectorX& at) {
@@ -49,8 +45,10 @@ NewtonStep newton_step(const Evaluation& evaluation, const std::vector<int>& mov
   return out;
 }
 
-Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, const OptimiseOptions& options,
-                 const OnProgress& progress) {
+namespace {
+
+Optimum search(Objective& objective, const VectorX& start, const Loss& loss, const OptimiseOptions& options,
+               const OnProgress& progress) {
   const Unknowns& unknowns = objective.unknowns();
   ForwardModel& model = objective.model();
   const ReuseWhile reuse(model, options.reuse);
@@ -79,18 +77,7 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
   double damping = 1e-6;
   VectorX last_move = VectorX::Zero(start.size());  // that was accepted
   for (best.iterations = 1; best.iterations <= options.max_iterations; ++best.iterations) {
-    // Hold nu where it sits on a bound that the gradient pushes against.
-    const double nu = best.unknowns(poisson);
-    const double slope = best.evaluation.gradient(poisson);
-    best.poisson_at_lower = nu <= unknowns[poisson].lower && slope > 0;
-    best.poisson_at_upper = nu >= unknowns[poisson].upper && slope < 0;
-    std::vector<int> moving = free_unknowns(unknowns);
-    if (best.poisson_at_lower || best.poisson_at_upper) moving.erase(std::remove(moving.begin(), moving.end(), poisson), moving.end());
-
-    std::erase_if(moving, [&](int k) {
-      return k >= unknowns.first_own_poisson() && k < unknowns.parameter_count() && pushes_out(unknowns, best.unknowns, best.evaluation.gradient, k);
-    });
-
+    const std::vector<int> moving = moving_unknowns(unknowns, best.unknowns, best.evaluation.gradient);
     const MatrixX hessian = pick(best.evaluation.curvature, moving);
     VectorX gradient(static_cast<Index>(moving.size()));
     for (std::size_t k = 0; k < moving.size(); ++k) gradient(static_cast<Index>(k)) = best.evaluation.gradient(moving[k]);
@@ -178,6 +165,15 @@ Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, c
   }
   best.termination = Termination::max_iterations;
   best.message = "stopped after " + std::to_string(options.max_iterations) + " iterations";
+  return best;
+}
+
+}  // namespace
+
+Optimum optimise(Objective& objective, const VectorX& start, const Loss& loss, const OptimiseOptions& options,
+                 const OnProgress& progress) {
+  Optimum best = search(objective, start, loss, options, progress);
+  if (best.evaluation.usable) note_held(objective.unknowns(), best);  // the last step may be the one that came to the bound
   return best;
 }
 

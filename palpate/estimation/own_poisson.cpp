@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "palpate/estimation/error_budget.hpp"
+#include "palpate/estimation/held_poisson.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -34,6 +35,14 @@ Parameter cut_normal(double mean, double std, double lower, double upper, const 
   out.std = std * std::sqrt(std::max(1 + second - first * first, 0.0));
   out.determined = out.std < 0.6 * (upper - lower) / std::sqrt(12.0);
   return out;
+}
+
+double log_share_in_range(double at, double beyond, double std, double lower, double upper) {
+  const double range = (upper - lower) / std, off = beyond / std;
+  constexpr double far = 20;  // its tail is an exponential there, and soon less than there are numbers for
+  if (off > far) return std::log1p(-std::exp(-off * range)) - std::log(off * std::sqrt(2 * EIGEN_PI));
+  if (off > 0) return 0.5 * off * off + std::log(below(-off) - below(-off - range));
+  return std::log(below((upper - at) / std) - below((lower - at) / std));
 }
 
 double highest_poisson(const Unknowns& unknowns, const VectorX& at) {
@@ -68,7 +77,7 @@ MatrixX OwnPoisson::covariance_with(const MatrixX& others) const {
   return out;
 }
 
-OwnPoisson own_poisson(const Unknowns& unknowns, const VectorX& optimum, const MatrixX& covariance, const std::vector<int>& moving) {
+OwnPoisson own_poisson(const Unknowns& unknowns, const Optimum& optimum, const MatrixX& covariance, const std::vector<int>& moving) {
   OwnPoisson out;
   const Index count = unknowns.own_poisson_count(), young = 1 + unknowns.ratio_count();
   if (count == 0) return out;
@@ -84,7 +93,15 @@ OwnPoisson own_poisson(const Unknowns& unknowns, const VectorX& optimum, const M
   const MatrixX all = parts * covariance * parts.transpose();
   const VectorX inverse = all.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
   out.correlation = inverse.asDiagonal() * all * inverse.asDiagonal();
-  out.mean = optimum.segment(unknowns.first_own_poisson(), count);
+  out.mean = optimum.unknowns.segment(unknowns.first_own_poisson(), count);
+  const VectorX& gradient = optimum.evaluation.gradient;
+  for (Index r = 0; r < count; ++r) {
+    const int own = unknowns.first_own_poisson() + static_cast<int>(r);
+    if (unknowns[own].fixed || !is_held(unknowns, optimum.unknowns, gradient, own)) continue;
+    std::vector<int> let_go{own};
+    for (const int k : moving_unknowns(unknowns, optimum.unknowns, gradient)) let_go.push_back(k);
+    out.mean(r) += newton_step(optimum.evaluation, let_go).move(0);
+  }
   out.std = all.diagonal().tail(count).cwiseMax(1e-12).cwiseSqrt();
   return out;
 }

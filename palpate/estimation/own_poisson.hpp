@@ -24,13 +24,18 @@ struct OwnPoisson {
   MatrixX covariance_with(const MatrixX& others) const;
 };
 
-/// @param covariance  of the unknowns `moving`, nu among them
-OwnPoisson own_poisson(const Unknowns& unknowns, const VectorX& optimum, const MatrixX& covariance, const std::vector<int>& moving);
+/// @param covariance  of the unknowns `moving`, nu among them, bounds left out. Means of those held at a bound are what the data say without it.
+OwnPoisson own_poisson(const Unknowns& unknowns, const Optimum& optimum, const MatrixX& covariance, const std::vector<int>& moving);
 
 /// The highest nu of all regions.
 double highest_poisson(const Unknowns& unknowns, const VectorX& at);
 
 /// A normal number that is known to lie between two bounds, as a Poisson ratio of a region.
 Parameter cut_normal(double mean, double std, double lower, double upper, const std::string& region);
+
+/// Log of the share of a normal distribution that lies between bounds, over its density at `at`, the place between them that is likeliest,
+/// times that of a standard one: what is left of an integral that the height at `at` and the width stand for.
+/// @param beyond  how far outside its middle lies; 0: at `at`
+double log_share_in_range(double at, double beyond, double std, double lower, double upper);
 
 }  // namespace palpate::estimation

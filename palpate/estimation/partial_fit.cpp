@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/held_poisson.hpp"
 #include "palpate/estimation/homogeneity.hpp"
 
 namespace palpate::estimation {
@@ -39,19 +40,19 @@ PartialFits::PartialFits(Objective& objective, const Optimum& optimum, const Los
 Optimum PartialFits::refit(const StepFlags& steps, bool hold_poisson) {
   Loss loss = loss_;
   loss.steps = steps;
-  const bool was_fixed = objective_.unknowns()[poisson].fixed;
-  hold_poisson = hold_poisson || was_fixed || optimum_.poisson_at_lower || optimum_.poisson_at_upper;
-  objective_.hold_poisson(hold_poisson);
-  const std::vector<int> moving = free_unknowns(objective_.unknowns());
+  const Unknowns& unknowns = objective_.unknowns();
+  const bool was_fixed = unknowns[poisson].fixed;
+  objective_.hold_poisson(hold_poisson || was_fixed);
   Optimum part;
   part.unknowns = optimum_.unknowns;
   part.evaluation = objective_.assemble(joint_rows_, optimum_.unknowns, loss);
+  const std::vector<int> moving = moving_unknowns(unknowns, optimum_.unknowns, part.evaluation.gradient);
   const VectorX move = newton_step(part.evaluation, moving).move;
-  const Unknown& nu = objective_.unknowns()[poisson];
+  const bool leaves = leaves_range(unknowns, optimum_.unknowns, moving, move);
   for (std::size_t k = 0; k < moving.size(); ++k) part.unknowns(moving[k]) += move(static_cast<Index>(k));
-  const bool inside = part.unknowns(poisson) >= nu.lower && part.unknowns(poisson) <= nu.upper;
+  note_held(unknowns, part);
   part.termination = Termination::converged;
-  if (!move.allFinite() || std::abs(move(0)) > nearly || !inside) {
+  if (!move.allFinite() || std::abs(move(0)) > nearly || leaves) {
     const OnProgress keep_going = [&](std::string_view, double share) { return !progress_ || progress_("cross-check", share); };
     part = optimise(objective_, optimum_.unknowns, loss, few_iterations(), keep_going);
   }

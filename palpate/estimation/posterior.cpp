@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/held_poisson.hpp"
+#include "palpate/estimation/own_poisson.hpp"
 #include "palpate/estimation/young_bounds.hpp"
 
 namespace palpate::estimation {
@@ -25,29 +27,72 @@ struct Conditional {
   MatrixX correlation;
 };
 
-/// Order: every free unknown but nu.
-Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& unknowns, const Unknowns& list, double factor) {
+/// An evaluation, and the optimum given nu that its quadratic leads to.
+struct Place {
+  const Evaluation& evaluation;
+  const VectorX &at, &optimum;
+
+  VectorX gradient_at_optimum() const { return evaluation.gradient + evaluation.curvature * (optimum - at); }
+};
+
+/// What follows where nu goes: every free unknown but nu itself, and but the regions' own that are held at a bound.
+std::vector<int> following(const Unknowns& list, const Place& place) {
+  std::vector<int> out = moving_unknowns(list, place.optimum, place.gradient_at_optimum());
+  std::erase(out, static_cast<int>(poisson));
+  return out;
+}
+
+/// What the bounds of the regions' own ratios leave of the integral over them, beside what the determinant says: without its share a
+/// density over nu would have a step where one of them comes to its bound. Each by itself.
+double log_left_by_bounds(const Unknowns& list, const Place& place, const MatrixX& information, const std::vector<int>& moving) {
+  double out = 0;
+  const VectorX gradient = list.own_poisson_count() > 0 ? place.gradient_at_optimum() : VectorX();
+  for (int k = list.first_own_poisson(); k < list.parameter_count(); ++k) {
+    if (list[k].fixed) continue;
+    std::vector<int> let_go{k};
+    for (const int other : moving)
+      if (other != k) let_go.push_back(other);
+    const VectorX unit = VectorX::Unit(static_cast<Index>(let_go.size()), 0);
+    const auto variance = [&](const MatrixX& of) { return MatrixX(of(let_go, let_go)).ldlt().solve(unit)(0); };
+    const double std_dev = std::sqrt(variance(information));
+    const bool held = is_held(list, place.optimum, gradient, k);
+    const double beyond = held ? std::abs(gradient(k)) * variance(place.evaluation.curvature) : 0;
+    const double share = log_share_in_range(place.optimum(k), beyond, std_dev, list[k].lower, list[k].upper);
+    if (std::isfinite(share)) out += share;
+  }
+  return out;
+}
+
+/// Order: every free unknown but nu. What of the regions' own ratios is held at a bound stays there when nu moves; in the others' spread
+/// it counts as free.
+Conditional condition_on_poisson(const Place& place, const Unknowns& list, double factor) {
+  const Evaluation& evaluation = place.evaluation;
+  const VectorX& unknowns = place.optimum;
   std::vector<int> others;
   for (int k : free_unknowns(list)) {
     if (k != poisson) others.push_back(k);
   }
+  const std::vector<int> moving = following(list, place);
+  VectorX gradient = evaluation.gradient;
+  for (const int k : others)  // what is held was taken to its bound
+    if (std::find(moving.begin(), moving.end(), k) == moving.end()) gradient += (unknowns(k) - place.at(k)) * evaluation.curvature.col(k);
   const MatrixX information = evaluation.information(factor);
-  const VectorX cross = information.col(poisson)(others);
   MatrixX given_poisson = information(others, others);
   Eigen::LDLT<MatrixX> factorised(given_poisson);
   Conditional out;
   out.young_told = tells_young(given_poisson, factorised, list);
   // The cost's slope leads to the estimate, the information says how sharp it is.
   const MatrixX& hessian = evaluation.curvature;
-  const VectorX hessian_cross = hessian.col(poisson)(others);
-  MatrixX bends = hessian(others, others);
+  const VectorX cross = information.col(poisson)(moving), hessian_cross = hessian.col(poisson)(moving);
+  MatrixX bends = hessian(moving, moving), given_held = information(moving, moving);
   if (!out.young_told) {
     bends(0, 0) += information_of_bounds(list);
     given_poisson(0, 0) += information_of_bounds(list);
+    given_held(0, 0) += information_of_bounds(list);
     factorised.compute(given_poisson);
   }
-  const Eigen::LDLT<MatrixX> held(bends);
-  const double slope = evaluation.gradient(poisson) - hessian_cross.dot(held.solve(VectorX(evaluation.gradient(others))));
+  const Eigen::LDLT<MatrixX> held(bends), ridge(given_held);
+  const double slope = gradient(poisson) - hessian_cross.dot(held.solve(VectorX(gradient(moving))));
   const double sharpness = hessian(poisson, poisson) - hessian_cross.dot(held.solve(hessian_cross));
   // log E of the first region comes first, then the log ratios of the others: a region's log E is the sum of two.
   const Index regions = 1 + list.ratio_count();
@@ -63,12 +108,15 @@ Conditional condition_on_poisson(const Evaluation& evaluation, const VectorX& un
     if (at != others.end()) sum(static_cast<Index>(at - others.begin()), r) = 1;
   }
   const MatrixX covariance = sum.transpose() * factorised.solve(sum);
+  std::vector<Index> places;  // of those that move, among the others
+  for (const int k : moving) places.push_back(std::lower_bound(others.begin(), others.end(), k) - others.begin());
   out.std_dev = covariance.diagonal().cwiseMax(1e-30).cwiseSqrt();
   out.correlation = out.std_dev.cwiseInverse().asDiagonal() * covariance * out.std_dev.cwiseInverse().asDiagonal();
-  out.log_determinant = factorised.vectorD().array().abs().max(1e-300).log().sum();
-  const double informed = information(poisson, poisson) - cross.dot(factorised.solve(cross));
+  out.log_determinant = factorised.vectorD().array().abs().max(1e-300).log().sum() - 2 * log_left_by_bounds(list, place, information, moving);
+  const VectorX along = ridge.solve(cross);
+  const double informed = information(poisson, poisson) - cross.dot(along);
   out.cost_slope = sharpness > 0 && informed > 0 ? slope * informed / sharpness : slope;
-  out.slope = -sum.transpose() * factorised.solve(cross);
+  out.slope = -MatrixX(sum(places, Eigen::all)).transpose() * along;
   return out;
 }
 
@@ -211,7 +259,7 @@ double Posterior::log_young_std_total() const { return std::sqrt(std::max(covari
 Posterior explore_posterior(Objective& objective, const Optimum& optimum, const Loss& loss, double information_factor,
                             const OnProgress& progress) {
   const Unknowns& list = objective.unknowns();
-  const Conditional at = condition_on_poisson(optimum.evaluation, optimum.unknowns, list, information_factor);
+  const Conditional at = condition_on_poisson({optimum.evaluation, optimum.unknowns, optimum.unknowns}, list, information_factor);
   const double nu = optimum.unknowns(poisson);
   const double lower = list[poisson].lower, upper = list[poisson].upper;
   Posterior posterior;
@@ -264,7 +312,7 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   few.step_tolerance = 0.02;
   few.enough_gain = 0.05;
   std::vector<int> others = moving;
-  others.erase(std::remove(others.begin(), others.end(), poisson), others.end());
+  std::erase(others, static_cast<int>(poisson));
   int done = 0;
   const OnProgress keep_going = [&](std::string_view, double) {
     return !progress || progress("posterior", static_cast<double>(done) / static_cast<double>(nodes));
@@ -276,14 +324,15 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
     std_dev.row(i) = c.std_dev.transpose();
   };
   // False: cancelled, or no equilibrium at this nu.
-  const auto visit = [&](Index i, Optimum& walk) {
+  const auto visit = [&](Index i, Optimum& walk, VectorX& evaluated_at) {
     ++done;
     VectorX begin = walk.unknowns;
-    const VectorX along = MatrixX(walk.evaluation.curvature(others, others))
+    const std::vector<int> follow_nu = following(list, {walk.evaluation, evaluated_at, walk.unknowns});
+    const VectorX along = MatrixX(walk.evaluation.curvature(follow_nu, follow_nu))
                               .ldlt()
-                              .solve(-VectorX(walk.evaluation.curvature.col(poisson)(others)));
-    for (std::size_t k = 0; k < others.size(); ++k) {
-      begin(others[k]) += (node(i) - walk.unknowns(poisson)) * along(static_cast<Index>(k));
+                              .solve(-VectorX(walk.evaluation.curvature.col(poisson)(follow_nu)));
+    for (std::size_t k = 0; k < follow_nu.size(); ++k) {
+      begin(follow_nu[k]) += (node(i) - walk.unknowns(poisson)) * along(static_cast<Index>(k));
     }
     if (!at.young_told) begin(log_young) = walk.unknowns(log_young);  // its share of the ridge is rounding
     begin(poisson) = node(i);
@@ -292,9 +341,11 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
     objective.hold_poisson(false);
     posterior.cancelled = conditional.termination == Termination::cancelled;
     if (posterior.cancelled || !conditional.evaluation.usable) return false;
-    const NewtonStep step = newton_step(conditional.evaluation, others);
+    evaluated_at = conditional.unknowns;
+    const Evaluation& there = conditional.evaluation;
+    const NewtonStep step = step_in_range(list, evaluated_at, there.curvature, there.gradient, others);
     for (std::size_t k = 0; k < others.size(); ++k) conditional.unknowns(others[k]) += step.move(static_cast<Index>(k));
-    note(i, condition_on_poisson(conditional.evaluation, conditional.unknowns, list, information_factor));
+    note(i, condition_on_poisson({there, evaluated_at, conditional.unknowns}, list, information_factor));
     walk = std::move(conditional);
     return true;
   };
@@ -303,8 +354,9 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   // Outwards until so little of the posterior is left that no quantile asks for it.
   const auto outwards = [&](Index& edge, Index by) {
     Optimum walk = optimum;
+    VectorX evaluated_at = optimum.unknowns;
     double rise = 0;
-    while (rise < negligible && edge + by >= 0 && edge + by < nodes && visit(edge + by, walk)) {
+    while (rise < negligible && edge + by >= 0 && edge + by < nodes && visit(edge + by, walk, evaluated_at)) {
       const Index next = edge + by;
       rise += 0.5 * (cost_slope(edge) + cost_slope(next)) * (node(next) - node(edge)) +
               0.5 * (log_determinant(next) - log_determinant(edge));

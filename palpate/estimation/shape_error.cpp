@@ -118,7 +118,6 @@ std::optional<Answer> answer_of(const Recording& recording, SimulatedObject obje
     }
     if (!answer) answer.emplace().fitted = found.unknowns.head(unknowns.parameter_count());
     answer->parameters = at.head(unknowns.parameter_count());
-    answer->parameters(poisson) = std::clamp(answer->parameters(poisson), unknowns[poisson].lower, unknowns[poisson].upper);
     answer->widening = widening;
     answer->cost = cost;
     answer->strange = false;

@@ -36,7 +36,7 @@ void take_slips(const Recording& from, Recording& to);
 /// push on (score test of up to three added unknowns; an unknown that there is none of is left out). Nothing where an E that
 /// changes with the load explains about as much: then the law is wrong, or nobody can tell.
 /// @param objective  in which contacts may shift and travels have a zero, evaluated at `optimum`
-/// @param moving     what was fitted
+/// @param moving     what was fitted and is not held at a bound
 /// @param factor     information factor of robust rows
 /// @param misfit     chi2 per degree of freedom, where it is above one
 /// @param otherwise_chi2  what something else explains: a slip has to explain more

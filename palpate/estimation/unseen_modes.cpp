@@ -10,6 +10,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/held_body.hpp"
+#include "palpate/estimation/held_poisson.hpp"
 #include "palpate/estimation/own_poisson.hpp"
 #include "palpate/estimation/unknown_names.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
@@ -188,14 +189,20 @@ std::optional<UnseenModes> unseen_modes(const UnseenSide& side, const VectorX& a
   const MatrixX effect = -without * information(moving, places);  // of one standard deviation of a mode
   moving.insert(moving.end(), places.begin(), places.end());
   const MatrixX with = inverse(information(moving, moving));
-  const VectorX change = -with * gradient(moving);
+  NewtonStep step;
+  step.move = -with * gradient(moving);
+  step.gain = -0.5 * gradient(moving).dot(step.move);
+  // A ratio that would leave its range stops there, and E does not go along with the rest of its way.
+  if (leaves_range(objective.unknowns(), optimum.unknowns, moving, step.move))
+    step = step_in_range(objective.unknowns(), optimum.unknowns, information, gradient, moving);
+  const VectorX& change = step.move;
   if (!change.allFinite()) return std::nullopt;
 
   UnseenModes out;
   out.change = VectorX::Zero(known);
   for (Index k = 0; k < free; ++k) out.change(moving[static_cast<std::size_t>(k)]) = change(k);
   out.amounts = amounts + change.tail(unseen_mode_count);
-  out.gain = -0.5 * gradient(moving).dot(change);
+  out.gain = step.gain;
   const int parameters = objective.unknowns().parameter_count();
   out.widening = MatrixX::Zero(parameters, parameters);
   for (Index a = 0; a < free; ++a)

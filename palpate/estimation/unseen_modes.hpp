@@ -38,10 +38,10 @@ TetMesh with_unseen_moved(const TetMesh& mesh, const UnseenSide& side, VectorX& 
 
 /// What the modes do to an optimum: one step of Gauss and Newton with them among the unknowns.
 struct UnseenModes {
-  VectorX change;      ///< of all unknowns of the objective
+  VectorX change;      ///< of all unknowns of the objective; Poisson ratios stay in their range
   VectorX amounts;     ///< of the modes at the end of that step, in standard deviations
   MatrixX widening;    ///< what the unseen side adds to the covariance of the parameters (log E of the first region, nu, ratios)
-  double gain = 0;     ///< by which the cost falls
+  double gain = 0;     ///< by which the cost falls on that step
 };
 
 /// Changes of the surface are those of small strains at the optimum's nu. The objective's last evaluation must be the optimum's,

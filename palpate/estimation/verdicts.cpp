@@ -238,10 +238,10 @@ void judge_doubts(const VerdictInput& in, bool slipped, std::vector<Verdict>& ou
   constexpr double least_share = 0.1;  // of a tool's radius: less is within what a patch of even pressure means
   constexpr double matters = 0.5;      // standard deviations of E or nu
   std::vector<const Parameter*> young;
-  double poisson_std = 0;
+  std::optional<double> poisson_std;  // of the first region's nu, which a doubt speaks of
   for (const auto& parameter : in.answer.parameters) {
     if (parameter.name == "young_modulus") young.push_back(&parameter);
-    if (parameter.name == "poisson_ratio") poisson_std = parameter.std;
+    if (parameter.name == "poisson_ratio" && !poisson_std) poisson_std = parameter.std;
   }
   for (const Doubt& doubt : in.doubts.all) {
     if (doubt.p_value >= very_rare || (slipped && doubt.about == Doubt::About::contact)) continue;
@@ -254,7 +254,7 @@ void judge_doubts(const VerdictInput& in, bool slipped, std::vector<Verdict>& ou
       most = in_std, log_young = change;
       if (young.size() > 1) of_region = " of region '" + young[r]->region + "'";
     }
-    if (most <= matters && std::abs(doubt.poisson) <= matters * poisson_std) continue;
+    if (most <= matters && std::abs(doubt.poisson) <= matters * poisson_std.value_or(0)) continue;
     const bool of_foot = doubt.about == Doubt::About::support || doubt.about == Doubt::About::support_compliance;
     if (doubt.about == Doubt::About::support_compliance && doubt.scale_m + doubt.size_m < 0) continue;  // nothing comes towards a push
     if (!of_foot && std::abs(doubt.size_m) < least_share * doubt.scale_m) continue;

@@ -130,6 +130,69 @@ TEST(Doubts, AContactThatSlipsWhereItIsStatedExactly) {
   EXPECT_NE(found.front().find("step 2"), std::string::npos) << found.front();
 }
 
+/// What the residuals ask for beside the fit of a block that is linear.
+Doubts asked(const Recording& stated, const Inputs& inputs, double nu, bool known, bool sites = true) {
+  Unknowns unknowns;
+  SimulatedObject object = simulated(fem::to_quadratic(kuhn_block(6, 4, 3, block_size_m)), "linear");
+  if (!sites) object.region.assign(static_cast<std::size_t>(object.mesh.tetrahedra.rows()), 0), object.region_names = {"all"};
+  ForwardModel model(stated, object, unknowns);
+  Objective objective(model, inputs, unknowns);
+  VectorX start = unknowns.prior_mean();
+  start(log_young) = std::log(2e4);
+  start(poisson) = nu;
+  unknowns[poisson].fixed = known;
+  Optimum at = optimise(objective, start, {}, {}, {});
+  EXPECT_EQ(at.termination, Termination::converged) << at.message;
+  SolveCount took;
+  return look_for_doubts(stated, objective, at, inputs, {}, 1, 1, {}, took);
+}
+
+// At a bound that the data push it out of nu is as good as known: it must not make room for what is wrong.
+TEST(Doubts, ANuThatIsHeldAtItsBoundDoesNotFollow) {
+  Recording real = glued_block(), stated = real;
+  real.tools[0].radius_m *= 1.3;
+  stated.model.poisson_upper = 0.25;
+  PushedBlock truth;
+  truth.material = "linear";
+  truth.points = 800;
+  truth.sigma_m = 2e-4;
+  const Inputs inputs = clouds_of(truth, real);
+  const Doubts held = asked(stated, inputs, 0.25, false), known = asked(stated, inputs, 0.25, true);
+  ASSERT_FALSE(held.all.empty());
+  ASSERT_EQ(held.all.size(), known.all.size());
+  for (std::size_t k = 0; k < held.all.size(); ++k) {
+    EXPECT_EQ(held.all[k].about, known.all[k].about);
+    EXPECT_EQ(held.all[k].poisson, 0);
+    EXPECT_NEAR(held.all[k].chi2, known.all[k].chi2, 1e-2 * known.all[k].chi2 + 0.01) << k;
+    EXPECT_NEAR(held.all[k].log_young(0), known.all[k].log_young(0), 1e-2 * std::abs(known.all[k].log_young(0)) + 1e-4) << k;
+  }
+  ASSERT_EQ(held.unrecorded_slip.has_value(), known.unrecorded_slip.has_value());
+  if (held.unrecorded_slip) {
+    EXPECT_NEAR(held.unrecorded_slip->chi2, known.unrecorded_slip->chi2, 1e-2 * known.unrecorded_slip->chi2);
+  }
+}
+
+// Where places differ each has its E in what a doubt would change.
+TEST(Doubts, OfPlacesThatDifferEachIsToldWhatWouldChangeThere) {
+  Recording recording = glued_block_recording({Vec3(0, 0, -1.5), Vec3(0, 0, -3)}, 0.015, 0.02);
+  recording.pushes.push_back(glued_block_recording({Vec3(0, 0, -1.5), Vec3(0, 0, -3)}, 0.045, 0.02).pushes[0]);
+  recording.pushes[1].name = "free";
+  PushedBlock truth;
+  truth.material = "linear";
+  truth.points = 800;
+  truth.sigma_m = 2e-4;
+  truth.free_half = 1.5;
+  Recording real = recording;
+  for (auto& step : real.pushes[1].steps) step.loads[0].contact_m += Vec3(0, 0.003, 0);
+  const Doubts found = asked(recording, clouds_of(truth, real), 0.3, false);
+  ASSERT_TRUE(found.sites);
+  ASSERT_LT(found.sites->p_value, rare);
+  ASSERT_FALSE(found.all.empty());
+  const Doubt& contact = found.all.front();
+  ASSERT_EQ(contact.log_young.size(), 2);
+  EXPECT_GT(std::abs(contact.log_young(1) - contact.log_young(0)), 0.1 * std::abs(contact.log_young(0)));
+}
+
 /// What a doubt asks for, given as a prior, is found by the fit.
 TEST(Doubts, AsNuisancesTheyAreFound) {
   Recording real = glued_block(), stated = real;

@@ -131,12 +131,53 @@ TEST(MeshError, MovesRegionsWithANuOfTheirOwnLikeThoseThatShareOne) {
   }
 }
 
-/// Normal posterior of (log E, nu) on a grid.
-Posterior normal_posterior(double log_young, double nu, double var_e, double cov, double var_nu) {
+// Nor does E of a region go along with a nu that is held at its bound.
+TEST(MeshError, MovesARegionWhoseOwnNuIsHeldAsIfItWereKnown) {
+  std::vector<AnswerShift> shifts;
+  for (const bool known : {false, true}) {
+    Recording recording = glued_block_recording({Vec3(0, 0, -0.8), Vec3(0, 0, -1.6)}, 0.045, 0.02);
+    recording.model.poisson_by_region = true;
+    recording.model.poisson_upper = 0.2;
+    const TetMesh corners = kuhn_block(4, 3, 2, block_size_m);
+    recording.rest.volume = corners;
+    recording.rest.surface = SimulatedSurface::boundary_of(corners, nullptr).rest();
+    SimulatedObject object = coarse_block("linear");
+    auto finer = finer_model(recording, object);
+    ASSERT_TRUE(finer);
+    put_two_halves(object);
+    put_two_halves(finer->object);
+    PushedBlock truth;
+    truth.free_poisson = 0.45;
+    truth.material = "linear";
+    truth.finer = 1;
+    truth.sigma_m = 1e-4;
+    Unknowns unknowns;
+    ForwardModel model(recording, object, unknowns);
+    Objective objective(model, clouds_of(truth, recording), unknowns);
+    VectorX start = unknowns.prior_mean();
+    start(log_young) = std::log(truth.young_pa);
+    const int own = unknowns.first_own_poisson();
+    start(own) = start(poisson) = 0.2;
+    unknowns[own].fixed = known;
+    unknowns[poisson].fixed = true;
+    const Optimum at = optimise(objective, start, {}, {}, {});
+    ASSERT_EQ(at.termination, Termination::converged) << at.message;
+    ASSERT_EQ(at.unknowns(own), 0.2);
+    const auto shift = mesh_shift(recording, object, objective, at, at.loss, *finer, {}, {});
+    ASSERT_TRUE(shift);
+    shifts.push_back(*shift);
+  }
+  EXPECT_EQ(shifts[0].region_poisson(0), 0);
+  EXPECT_NEAR(shifts[0].log_young, shifts[1].log_young, 1e-3 * std::abs(shifts[1].log_young));
+  EXPECT_NEAR(shifts[0].region_log_young(0), shifts[1].region_log_young(0), 1e-3 * std::abs(shifts[1].region_log_young(0)));
+}
+
+/// Normal posterior of (log E, nu) on a grid, cut at bounds of nu.
+Posterior normal_posterior(double log_young, double nu, double var_e, double cov, double var_nu, double lower = -1, double upper = 1) {
   Posterior p;
   const Index n = 401;
   const double sd = std::sqrt(var_nu);
-  p.poisson = VectorX::LinSpaced(n, nu - 5 * sd, nu + 5 * sd);
+  p.poisson = VectorX::LinSpaced(n, std::max(lower, nu - 5 * sd), std::min(upper, nu + 5 * sd));
   const VectorX off = p.poisson.array() - nu;
   p.weight = (-0.5 * off.array().square() / var_nu).exp();
   p.weight /= p.weight.sum();
@@ -183,11 +224,27 @@ TEST(Moving, TakesANormalPosteriorAlongAndKeepsTheBoundsOfNu) {
   EXPECT_NEAR(p.poisson_quantile(0.5), 0.26, 1e-4);
   EXPECT_NEAR(p.log_young_quantile(0.5), 9.48, 1e-4);
 
-  // At the bound nu stays, and E is what it would be at that nu: 9.5 - 0.02 + 1.2 * 0.01.
-  Posterior bound = normal_posterior(9.5, 0.25, 4e-4, -1.2e-4, 1e-4);
+  // Far outside, nu stays at its bound, and E is what it would be at that nu: ten deviations on along the ridge, 9.5 - 0.02 + 1.2 * 0.11.
+  Posterior bound = normal_posterior(9.5, 0.4, 4e-4, -1.2e-4, 1e-4, 0, 0.3);
+  const double nu = bound.poisson_quantile(0.5), log_e = bound.log_young_quantile(0.5);
   move(bound, {-0.02, 0.01, {}}, 0, 0.3);
-  EXPECT_NEAR(bound.poisson_quantile(0.5), 0.25, 1e-4);
-  EXPECT_NEAR(bound.log_young_quantile(0.5), 9.5 - 0.02 + 1.2 * 0.01, 1e-4);
+  EXPECT_NEAR(bound.poisson_quantile(0.5), nu, 2e-4);
+  EXPECT_NEAR(bound.log_young_quantile(0.5), log_e - 0.02 + 1.2 * 0.01, 5e-4);
+}
+
+// A normal one that is cut and then moved is the moved one cut, wherever the bounds lie, in or out over them.
+TEST(Moving, IsThatOfTheUncutPosteriorCutAgain) {
+  for (const double nu : {0.1, 0.02, 0.005, -0.02})
+    for (const double by : {-0.012, -0.004, 0.0005, 0.004, 0.012}) {
+      Posterior moved = normal_posterior(9.5, nu, 4e-4, -1.2e-4, 4e-4, 0, 0.4995);
+      move(moved, {-0.02, by, {}}, 0, 0.4995);
+      const Posterior wanted = normal_posterior(9.48, nu + by, 4e-4, -1.2e-4, 4e-4, 0, 0.4995);
+      EXPECT_GE(moved.poisson.minCoeff(), 0);
+      for (const double p : {0.025, 0.16, 0.5, 0.84, 0.975}) {
+        EXPECT_NEAR(moved.poisson_quantile(p), wanted.poisson_quantile(p), 4e-4) << nu << " " << by << " " << p;
+        EXPECT_NEAR(moved.log_young_quantile(p), wanted.log_young_quantile(p), 4e-4) << nu << " " << by << " " << p;
+      }
+    }
 }
 
 TEST(Widening, KeepsTheBoundsOfNu) {

@@ -191,5 +191,34 @@ TEST(UnseenModes, RegionsMayHaveANuOfTheirOwn) {
   EXPECT_NEAR(said[1].change(log_young), said[0].change(log_young), 1e-6 * std::abs(said[0].change(log_young)));
 }
 
+// At a bound that the data push it out of nu is as good as known: the modes do what they do where it is.
+TEST(UnseenModes, ANuThatIsHeldAtItsBoundDoesNotTakeEAlong) {
+  std::vector<UnseenModes> said;
+  for (const bool known : {false, true}) {
+    Seen data = seen_from_above(3e-4);
+    data.recording.model.poisson_fixed.reset();
+    data.recording.model.poisson_upper = 0.1;  // of 0.3
+    const SimulatedObject block = block_from(0);
+    Unknowns unknowns;
+    ForwardModel model(data.recording, block, unknowns);
+    Objective objective(model, data.inputs, unknowns);
+    VectorX start = unknowns.prior_mean();
+    start(log_young) = std::log(true_pa);
+    start(poisson) = 0.1;
+    unknowns[poisson].fixed = known;
+    const Optimum at = optimise(objective, start, {}, {}, {});
+    ASSERT_EQ(at.termination, Termination::converged) << at.message;
+    ASSERT_EQ(at.unknowns(poisson), 0.1);
+    const auto modes =
+        unseen_modes(underside(block), VectorX::Zero(unseen_mode_count), data.recording, block, objective, at, at.loss, 1, {}, nullptr);
+    ASSERT_TRUE(modes);
+    said.push_back(*modes);
+  }
+  EXPECT_EQ(said[0].change(poisson), 0);
+  EXPECT_NEAR(said[0].gain, said[1].gain, 1e-3 * said[1].gain);
+  EXPECT_NEAR(said[0].change(log_young), said[1].change(log_young), 1e-3 * std::abs(said[1].change(log_young)));
+  EXPECT_LT((said[0].amounts - said[1].amounts).norm(), 1e-3 * said[1].amounts.norm());
+}
+
 }  // namespace
 }  // namespace palpate::estimation

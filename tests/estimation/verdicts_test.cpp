@@ -154,6 +154,49 @@ TEST(PoissonAtBound, IsNotSaidInside) {
   EXPECT_FALSE(says(answer, "nu_at_bound"));
 }
 
+// ---- What is doubted of a nu
+
+// A doubt speaks of the first region's nu, which is well known here; that of the other one is not.
+TEST(ContactElsewhere, IsSaidWhereItMattersForTheFirstRegionsNu) {
+  const Recording recording = pushed_block_recording();
+  SimulatedObject object = coarse_block("linear");
+  put_two_halves(object);
+  Unknowns unknowns;
+  ForwardModel model(recording, object, unknowns);
+  Objective objective(model, clouds_of(clear_view()), unknowns);
+  Optimum at;
+  at.unknowns = unknowns.prior_mean();
+  at.unknowns(log_young) = std::log(2e4);
+  at.unknowns(poisson) = 0.3;
+  at.evaluation = objective.evaluate(at.unknowns, at.loss);
+  at.termination = Termination::converged;
+  Identification answer;
+  answer.material = "linear";
+  for (const char* region : {"clamped half", "free half"}) {
+    const bool first = answer.parameters.empty();
+    answer.parameters.push_back({"young_modulus", region, "Pa", 2e4, 200, 1.96e4, 2.04e4, true});
+    answer.parameters.push_back({"poisson_ratio", region, "1", 0.3, first ? 0.01 : 0.2, 0.28, 0.32, true});
+  }
+  Doubts doubts;
+  Doubt contact;
+  contact.name = "down";
+  contact.size_m = 0.005, contact.scale_m = 0.012;
+  contact.p_value = 0;
+  contact.log_young = VectorX::Zero(2);
+  contact.poisson = 0.05;
+  doubts.all = {contact};
+  const auto codes = [&] {
+    std::vector<std::string> out;
+    for (const Verdict& verdict : judge({recording, objective, at, objective.summarise(at.loss), answer, CrossChecks{}, doubts, std::nullopt}))
+      out.push_back(verdict.code);
+    return out;
+  };
+  const auto says_it = [](const std::vector<std::string>& all) { return std::count(all.begin(), all.end(), "contact_elsewhere") == 1; };
+  EXPECT_TRUE(says_it(codes()));
+  std::swap(answer.parameters[1].std, answer.parameters[3].std);
+  EXPECT_FALSE(says_it(codes())) << "a quarter of a standard deviation";
+}
+
 // ---- Strains beyond the linear law
 
 /// Bent so far that linear theory turns what is compressed at the clamp inside out: a strain of M c / (E I) = 3.6 at 80 times the load.
