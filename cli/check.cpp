@@ -67,7 +67,11 @@ std::string camera_as_found(const Recording& recording, const Pose& correction) 
 int run(const Options& given, Session& session) {
   if (given.rigid == (given.stiffness_n_per_m > 0))
     throw Error("say what was pushed: --stiffness N_PER_M of a spring, or --rigid", "--stiffness");
-  const Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
+  Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
+  // Its images are compared with the body: an arm in them is taken for it, too.
+  const std::size_t said = recording.warnings.size();
+  warn_of_oddities(recording);
+  for (std::size_t i = said; i < recording.warnings.size(); ++i) session.warn(recording.warnings[i]);
   estimation::SelfCheckOptions options = given.check;
   if (!given.rigid) options.stiffness_n_per_m = given.stiffness_n_per_m;
   const estimation::SelfCheck check = estimation::self_check(recording, body_of(recording), observe(recording), options);

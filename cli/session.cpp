@@ -11,7 +11,8 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <thread>
+
+#include "palpate/core/thread_count.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -101,8 +102,7 @@ std::string duration(double seconds) {
 }
 
 int Session::thread_count() const {
-  if (threads > 0) return threads;
-  return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  return palpate::thread_count(threads);
 }
 
 void Session::clear_line() {

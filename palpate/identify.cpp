@@ -10,6 +10,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/recording_values.hpp"
+#include "palpate/core/thread_count.hpp"
 #include "palpate/core/version.hpp"
 #include "palpate/estimation/contacts_on_surface.hpp"
 #include "palpate/estimation/deep_loads.hpp"
@@ -188,7 +189,7 @@ std::map<std::string, std::string> provenance(const Recording& recording, const 
                                           {"element", recording.model.element},
                                           {"refine", recording.model.refine},
                                           {"iterations at most", std::to_string(options.fit.max_iterations)},
-                                          {"threads", std::to_string(options.fit.threads)}};
+                                          {"threads", std::to_string(thread_count(options.fit.threads))}};
   std::ostringstream prior;
   if (recording.model.poisson_fixed) {
     prior << "known: " << *recording.model.poisson_fixed;

@@ -28,7 +28,7 @@ struct SuggestOptions {
   std::vector<DepthFrame> cameras;                ///< empty = those of the recording; pixels are not looked at
   std::optional<estimation::SensorPlan> sensors;  ///< errors of force and travel; nothing = as pushes stated them last
   int viewpoints = 0;                             ///< further places of the first camera, around the object
-  int threads = 1;
+  int threads = 1;  ///< 0: as many as the machine has
 };
 
 struct Viewpoint {

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <thread>
 
 #include "cli/material_names.hpp"
+#include "palpate/core/thread_count.hpp"
 
 namespace palpate::python {
 namespace {
@@ -40,7 +40,7 @@ std::filesystem::path path_of(const py::object& given) { return std::string(py::
 
 int threads_of(int asked) {
   if (asked < 0) throw Error("must be at least 1, or 0: as many as the machine has", "threads");
-  return asked > 0 ? asked : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  return thread_count(asked);
 }
 
 IdentifyOptions identify_options(Options& from) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/mesh_error.hpp"
+
 namespace palpate::estimation {
 namespace {
 
@@ -80,6 +82,61 @@ MatrixX covariance_of(const std::vector<Posterior>& regions) {
     }
   }
   return out;
+}
+
+void widen_together(std::vector<Posterior>& regions, const AnswerShift& shift, double poisson_lower, double poisson_upper) {
+  // Of two regions what they share given nu, and so do widened ones: all of it less what goes along their ridges over nu.
+  struct Before {
+    VectorX std;
+    double variance, slope;
+  };
+  std::vector<Before> before;
+  for (const Posterior& one : regions) {
+    const double variance = one.covariance(1, 1);
+    before.push_back({one.log_young_std, variance, variance > 0 ? one.covariance(0, 1) / variance : 0});
+  }
+  const VectorX weight = regions.front().weight;
+  for (std::size_t r = 0; r < regions.size(); ++r) widen(regions[r], shift.of_region(static_cast<Index>(r)), poisson_lower, poisson_upper);
+  Posterior& first = regions.front();
+  const bool nu_is_known = first.poisson.size() < 2;
+  const double variance = before.front().variance, wider = variance + shift.poisson * shift.poisson;
+  for (std::size_t a = 0; a < regions.size(); ++a) {
+    for (std::size_t b = a + 1; b < regions.size(); ++b) {
+      const Index at_a = static_cast<Index>(a), at_b = static_cast<Index>(b);
+      const double young_a = shift.of_region(at_a).log_young, young_b = shift.of_region(at_b).log_young;
+      double more = young_a * young_b;
+      if (!nu_is_known && wider > 0) {
+        const double along = before[a].slope * before[b].slope * variance;
+        more += along - (before[a].slope * variance + young_a * shift.poisson) * (before[b].slope * variance + young_b * shift.poisson) / wider;
+      }
+      const double shared = first.correlation(at_a, at_b) * weight.dot(before[a].std.cwiseProduct(before[b].std)) + more;
+      const double most = first.weight.dot(regions[a].log_young_std.cwiseProduct(regions[b].log_young_std));
+      first.correlation(at_a, at_b) = first.correlation(at_b, at_a) = std::clamp(most > 0 ? shared / most : 0, -1.0, 1.0);
+    }
+  }
+}
+
+MatrixX with_shared(MatrixX covariance, Index others, const std::vector<AnswerShift>& errors) {
+  const Index count = static_cast<Index>(covariance.rows()), own = count - others;
+  MatrixX products = MatrixX::Zero(count, count);
+  for (const AnswerShift& error : errors) {
+    if (own == 0 || error.region_poisson.size() != own) continue;
+    VectorX all(count);
+    all << error.log_young, error.poisson, error.region_log_young, error.region_poisson;
+    products += all * all.transpose();
+  }
+  if (products.isZero(0)) return covariance;
+  // The correlations are those from before these errors.
+  constexpr double left = 0.01;
+  const VectorX total = covariance.diagonal().cwiseMax(1e-300);
+  const VectorX share = ((total - products.diagonal()).cwiseMax(left * total).cwiseQuotient(total)).cwiseSqrt();
+  const VectorX diagonal = covariance.diagonal();
+  const MatrixX corrected = share.asDiagonal() * covariance * share.asDiagonal() + products;
+  const MatrixX known = covariance.topLeftCorner(others, others);
+  covariance = corrected;
+  covariance.topLeftCorner(others, others) = known;
+  covariance.diagonal() = diagonal;
+  return covariance;
 }
 
 std::vector<Nuisance> nuisances_from(const Objective& objective, const Optimum& optimum, const MatrixX& covariance,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "palpate/core/identification.hpp"
+#include "palpate/estimation/answer_shift.hpp"
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/own_poisson.hpp"
 #include "palpate/estimation/posterior.hpp"
@@ -26,6 +27,14 @@ std::vector<Parameter> parameters_from(const std::vector<Posterior>& regions, co
 
 /// (log E of the first region, nu, log E of the others), in the order of the parameters.
 MatrixX covariance_of(const std::vector<Posterior>& regions);
+
+/// An error that all regions share: each gets as wide as it makes it, and their correlation holds its products.
+/// @param regions  the first one holds the correlation
+void widen_together(std::vector<Posterior>& regions, const AnswerShift& shift, double poisson_lower, double poisson_upper);
+
+/// The same for the rows of regions' own nu, whose variances hold these errors already; unchanged where there are none.
+/// @param covariance  of all parameters  @param others  of them, that come before the regions' own nu
+MatrixX with_shared(MatrixX covariance, Index others, const std::vector<AnswerShift>& errors);
 
 /// Every nuisance with its normal interval and pull; the rest surface's error is one of them (its rms over the surface) where a
 /// prediction holds its field.

@@ -2,6 +2,7 @@
 #include "palpate/estimation/cross_check.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "palpate/estimation/held_out.hpp"
 
@@ -134,21 +135,46 @@ class CrossCheck {
     if (!fits_.cancelled()) out.chance_of_loads = fits_.chance_of_one_young({out.low_loads, out.high_loads}, poisson_std_);
   }
 
+  /// The same places under the same loads, on the way in and on the way back: a push without a way back, or loads that the way back
+  /// has none of, would make of another place or of a material that stiffens one that remembers.
   void compare_ways(CrossChecks& out) {
+    constexpr double alike = 0.1;  // of the push's highest load: what is let go never stands exactly where it was pressed
     StepFlags forth(model_.step_count(), 0), back(model_.step_count(), 0);
     bool any = false;
-    for (std::size_t s = 0; s < model_.step_count(); ++s) {
-      const bool unloaded = load_of(model_.step(s)) == 0;
-      const bool unloading = model_.step(s).unloading;
-      any = any || (unloading && !unloaded);
-      forth[s] = unloaded || !unloading;
-      back[s] = unloaded || unloading;
+    for (std::size_t first = 0, last = 0; first < model_.step_count(); first = last) {
+      Range in, out_again;
+      for (last = first; last < model_.step_count() && model_.index(last).push == model_.index(first).push; ++last)
+        (model_.step(last).unloading ? out_again : in).take(load_of(model_.step(last)));
+      const double margin = alike * std::max(in.most, out_again.most);
+      const Range both{std::max(in.least, out_again.least) - margin, std::min(in.most, out_again.most) + margin};
+      const auto has_both = [&](bool unloading) {
+        for (std::size_t s = first; s < last; ++s)
+          if (model_.step(s).unloading == unloading && both.holds(load_of(model_.step(s)))) return true;
+        return false;
+      };
+      if (!has_both(false) || !has_both(true)) continue;
+      any = true;
+      for (std::size_t s = first; s < last; ++s) {
+        const double load = load_of(model_.step(s));
+        // What the unloaded frame says of pose and shape serves both.
+        forth[s] = load == 0 || (!model_.step(s).unloading && both.holds(load));
+        back[s] = load == 0 || (model_.step(s).unloading && both.holds(load));
+      }
     }
     if (!any || fits_.cancelled()) return;
     out.loading = fits_.young_of(forth, "loading");
     if (!fits_.cancelled()) out.unloading = fits_.young_of(back, "unloading");
     if (!fits_.cancelled()) out.chance_of_ways = fits_.chance_of_one_young({out.loading, out.unloading}, poisson_std_);
   }
+
+  /// Of loads; an unloaded step has none.
+  struct Range {
+    double least = std::numeric_limits<double>::infinity(), most = 0;
+    void take(double load) {
+      if (load > 0) least = std::min(least, load), most = std::max(most, load);
+    }
+    bool holds(double load) const { return load > 0 && load >= least && load <= most; }
+  };
 
   double poisson_std_;
   Objective& objective_;

@@ -10,6 +10,7 @@
 #include <map>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/thread_count.hpp"
 #include "palpate/estimation/answer_parts.hpp"
 #include "palpate/estimation/contacts_found.hpp"
 #include "palpate/estimation/cross_check.hpp"
@@ -81,7 +82,7 @@ void check(const FitOptions& options) {
   demand(!options.young_start_pa || (*options.young_start_pa > 0 && std::isfinite(*options.young_start_pa)),
          "young_start_pa", "must be positive, in pascal");
   demand(options.poisson_start > -1 && options.poisson_start < 0.5, "poisson_start", "must lie between -1 and 0.5");
-  demand(options.threads >= 1, "threads", "must be at least 1");
+  demand(options.threads >= 0, "threads", "must be at least 1, or 0: as many as the machine has");
 }
 
 fem::StaticsOptions statics_options(const Recording& recording, const SimulatedObject& object, const FitOptions& options) {
@@ -90,7 +91,7 @@ fem::StaticsOptions statics_options(const Recording& recording, const SimulatedO
 
 fem::StaticsOptions statics_options(const SimulatedObject& object, const FitOptions& options, double largest_poisson) {
   fem::StaticsOptions statics;
-  statics.threads = options.threads;
+  statics.threads = thread_count(options.threads);
   // A search that comes to a modulus which hardly bears the load does better to turn back than to follow it to the end.
   statics.max_load_steps = 16;
   // Quadratic tetrahedra lock mildly towards nu = 0.5 (a few per cent of E at 0.49); linear ones are left as they are, since
@@ -355,17 +356,19 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
       move(regions[r], shift.of_region(static_cast<Index>(r)), unknowns[poisson].lower, unknowns[poisson].upper);
     own.move(shift);
   };
+  std::vector<AnswerShift> shared_errors;
   const auto widen_by = [&](const char* name, const std::vector<AnswerShift>& independent) {
     BudgetEntry entry{name};
     VectorX percent = VectorX::Zero(static_cast<Index>(regions.size()));
     for (const AnswerShift& shift : independent) {
+      widen_together(regions, shift, unknowns[poisson].lower, unknowns[poisson].upper);
       for (std::size_t r = 0; r < regions.size(); ++r) {
         const Index region = static_cast<Index>(r);
-        widen(regions[r], shift.of_region(region), unknowns[poisson].lower, unknowns[poisson].upper);
         percent(region) = std::hypot(percent(region), 100 * shift.of_region(region).log_young);
       }
       entry.poisson_shift = std::hypot(entry.poisson_shift, shift.poisson);
       own.widen(shift);
+      shared_errors.push_back(shift);
     }
     set_young(entry, percent, object.region_names);
     answer.budget.push_back(entry);
@@ -381,7 +384,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   }
   if (doubt != nullptr && doubt->foot && doubt->foot->effect) widen_by("foot", *doubt->foot->effect);
   answer.parameters = parameters_from(regions, own, unknowns, object.region_names);
-  answer.covariance = own.covariance_with(covariance_of(regions));
+  answer.covariance = with_shared(own.covariance_with(covariance_of(regions)), 1 + static_cast<Index>(regions.size()), shared_errors);
   answer.posterior = posterior_grid(regions.front());
   if (options.on_estimate) options.on_estimate(answer);
   const auto stopped = [&] {

@@ -48,7 +48,8 @@ struct FitOptions {
                                           ///< contact asks for one
   bool compare_laws = false;              ///< other laws are fitted too, also where E does not drift with the load (law_comparison.hpp)
   bool stresses = true;                   ///< von Mises stress of every step, for figures
-  int threads = 1;
+  int threads = 1;                        ///< 0: as many as the machine has. Steps that start from their neighbours' solutions are shared out
+                                          ///< among them, so the last digits may depend on their number
   OnEstimate on_estimate;                 ///< for those who watch; empty: nobody does
   /// Asked once it is known what the mesh does to E and what all else leaves unknown of it (a region each): a mesh that is
   /// fine enough, or nullptr. The fit goes on with it where it can (MeshCorrection); else it ends at its optimum, without

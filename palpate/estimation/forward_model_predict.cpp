@@ -63,6 +63,8 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> ForwardModel::d_driven_force(const Body
   return at.d_driven_force.middleRows<3>(3 * contact);
 }
 
+double ForwardModel::read_of_true(const VectorX& unknowns) const { return force_scale_ >= 0 ? 1 / (1 + unknowns(force_scale_)) : 1; }
+
 void ForwardModel::undeform(std::size_t s, const VectorX& unknowns, StepPrediction& predicted) const {
   place_surface(s, unknowns, VectorX::Zero(3 * object_.surface.vertex_count()), predicted);
 }
@@ -76,7 +78,7 @@ Vec3 ForwardModel::mean_motion(const std::vector<LoadPart>& parts, const fem::Re
 void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficients& c, const VectorX& unknowns,
                                 const fem::ResponseState& at, StepPrediction& out) const {
   const Step& now = step(s);
-  const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
+  const double read_share = read_of_true(unknowns);
   out.travel_m = VectorX::Zero(static_cast<Index>(now.loads.size()));
   out.force_n.assign(now.loads.size(), Vec3::Zero());
   for (std::size_t l = 0; l < now.loads.size(); ++l) {
@@ -86,7 +88,8 @@ void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficie
     if (load.travel_m) {
       const int m = body.motion_column.at(load.tool);
       travel_m = c.motion(m) + support_compliance(unknowns) * given_way_along(s, load);
-      out.force_n[l] = scale * driven_force_n(body, load, at);
+      out.force_n[l] = read_share * driven_force_n(body, load, at);
+      if (time_offset_ >= 0) out.force_n[l] -= unknowns(time_offset_) * load.force_rate_n_s;
       const ToolErrors& errors = errors_of(s, l);
       if (errors.tare < 0) continue;
       out.force_n[l] += errors.tare_axis.norm() > 0 ? Vec3(unknowns(errors.tare) * errors.tare_axis) : Vec3(unknowns.segment<3>(errors.tare));
@@ -168,15 +171,14 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   const Index loads = static_cast<Index>(now.loads.size());
   out.d_travel = MatrixX::Zero(loads, count);
   out.d_force.assign(now.loads.size(), Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, count));
-  const double scale = force_scale_ >= 0 ? 1 + unknowns(force_scale_) : 1;
+  const double read_share = read_of_true(unknowns);
   for (Index l = 0; l < loads; ++l) {
     const auto at_load = static_cast<std::size_t>(l);
     const Load& load = now.loads[at_load];
     if (load.travel_m) {
       const int m = body.motion_column.at(load.tool);
-      out.d_force[at_load] = scale * d_driven_force(body, load, at);
+      out.d_force[at_load] = read_share * d_driven_force(body, load, at);
       for (Index k = parameters_; k < count; ++k) {
-        if (out.columns[static_cast<std::size_t>(k)] == force_scale_) out.d_force[at_load].col(k) += driven_force_n(body, load, at);
         out.d_travel(l, k) = c.d_motion(m, k - parameters_);
         if (out.columns[static_cast<std::size_t>(k)] == support_compliance_unknown_) out.d_travel(l, k) += given_way_along(s, load);
       }
@@ -201,7 +203,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     }
   }
 
-  // The readings of a driven platen carry the sensor's tare and scale; those of an imposed force are the load itself.
+  // The readings of a driven tool carry the sensor's tare, scale and clock; those of an imposed force are the load itself.
   const auto reading_column = [&](int unknown) {
     const auto it = std::find(out.columns.begin(), out.columns.end(), unknown);
     if (it != out.columns.end()) return static_cast<Index>(it - out.columns.begin());
@@ -220,9 +222,13 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
   };
   for (std::size_t l = 0; l < now.loads.size(); ++l) {
     if (!now.loads[l].travel_m) continue;
-    if (force_scale_ >= 0 && std::find(c.columns.begin(), c.columns.end(), force_scale_) == c.columns.end()) {
+    if (force_scale_ >= 0) {
       const Index at_scale = reading_column(force_scale_);
-      out.d_force[l].col(at_scale) += driven_force_n(body, now.loads[l], at);
+      out.d_force[l].col(at_scale) -= read_share * read_share * driven_force_n(body, now.loads[l], at);
+    }
+    if (time_offset_ >= 0) {
+      const Index at_offset = reading_column(time_offset_);
+      out.d_force[l].col(at_offset) -= now.loads[l].force_rate_n_s;
     }
     const ToolErrors& errors = errors_of(s, l);
     if (errors.tare < 0) continue;

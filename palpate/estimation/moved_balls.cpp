@@ -15,7 +15,7 @@ namespace palpate::estimation {
 namespace {
 
 /// Along the push alone: what it drags across tells next to nothing of E, and a ball that is moved goes straight.
-void observe_force(Step& step, const Load& load, const Vec3& force_n, double time_offset_std_s) {
+void observe_force(Step& step, const Load& load, const Vec3& force_n) {
   constexpr double exact = 1e-3;  // of the force, where it is said to be exactly known
   Wrench read;
   read.tool = load.tool;
@@ -29,8 +29,6 @@ void observe_force(Step& step, const Load& load, const Vec3& force_n, double tim
     if (wrench == nullptr || !(wrench->tool.empty() || wrench->tool == load.tool)) seen.push_back(std::move(one));
     else if (read.force_sigma_n == 0 && wrench->force_sigma_n > 0) read.force_sigma_n = wrench->force_sigma_n;
   }
-  // Where the force was changing, what the clocks differ by is an error of it.
-  read.force_sigma_n = std::hypot(read.force_sigma_n, time_offset_std_s * read.along.dot(load.force_rate_n_s));
   read.force_sigma_n = std::max(read.force_sigma_n, exact * force_n.norm());
   seen.push_back(read);
   step.observations = std::move(seen);
@@ -59,7 +57,7 @@ void take_away(const Tool& ball, Step& step) {
   std::erase_if(step.loads, [&](const Load& load) { return load.tool == ball.name; });
 }
 
-void move(const Tool& ball, Push& push, double time_offset_std_s) {
+void move(const Tool& ball, Push& push) {
   constexpr double same_place = 0.05;  // of the radius
   const Load line = hardest(ball, push);
   for (Step& step : push.steps) {
@@ -80,10 +78,9 @@ void move(const Tool& ball, Push& push, double time_offset_std_s) {
       load.direction = line.direction;
       load.contact_m = line.contact_m;
       load.travel_m = travel->travel_m;
-      observe_force(step, load, *load.force_n, time_offset_std_s);
+      observe_force(step, load, *load.force_n);
       load.force_n.reset();
-      load.force_std_n = load.force_relative_std = 0;
-      load.force_rate_n_s.setZero();
+      load.force_std_n = load.force_relative_std = 0;  // force_rate_n_s stays: the clocks' difference is one for all steps
     }
   }
 }
@@ -96,7 +93,7 @@ Recording with_balls_moved(Recording recording) {
     bool moved = false;
     for (Push& push : recording.pushes) {
       if (!shows_what_it_touches(ball, push)) continue;
-      move(ball, push, recording.time_offset_std_s);
+      move(ball, push);
       moved = true;
     }
     if (moved)

@@ -74,7 +74,7 @@ struct SpringRobot : Robot {
     ++images;
     DepthFrame frame;
     frame.time_s = clock_s;
-    frame.depth_m = DepthImage::Constant(2, 2, float(depth()));
+    frame.depth_m = DepthImage::Constant(2, 2, float(1 + depth()));
     if (camera_moves) frame.T_base_camera.translation().x() = 1e-3 * images;
     return frame;
   }

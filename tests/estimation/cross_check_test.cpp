@@ -212,6 +212,57 @@ TEST(CrossCheck, APushOfOneLoadAtAStifferPlaceIsNoMaterialThatStiffens) {
   EXPECT_FALSE(says(answer, "not_linear"));
 }
 
+/// Steps of these loads in newtons; below zero: on the way back.
+Push up_and_back(const Recording& like, const std::vector<double>& newtons) {
+  Push push = like.pushes[0];
+  const Step pressed = push.steps[0];
+  push.steps.clear();
+  for (const double newton : newtons) {
+    push.steps.push_back(newton != 0 ? pressed : Step());
+    push.steps.back().unloading = newton < 0;
+    if (newton != 0) push.steps.back().loads[0].force_n = Vec3(0, 0, -std::abs(newton));
+  }
+  return push;
+}
+
+// A push that was not recorded on its way back, at a place that is stiffer.
+TEST(CrossCheck, AStifferPlaceWithoutAWayBackIsNoHysteresis) {
+  const Recording like = pushed_block_recording();
+  Recording recording = like;
+  recording.pushes = {up_and_back(like, {0.06, 0.12}), up_and_back(like, {0.06, 0.12, -0.12, -0.06})};
+  recording.pushes[1].name = "again";
+  Recording first = like, second = like;
+  first.pushes = {recording.pushes[0]};
+  second.pushes = {recording.pushes[1]};
+  PushedBlock soft, stiff;
+  stiff.young_pa = 1.5 * soft.young_pa;
+  stiff.seed = 8;
+  Inputs inputs = clouds_of(stiff, first);
+  for (auto& step : clouds_of(soft, second)) inputs.push_back(step);
+  const Identification answer = fit(recording, coarse_block(), inputs, {});
+  EXPECT_TRUE(says(answer, "not_homogeneous"));
+  EXPECT_FALSE(says(answer, "hysteresis"));
+}
+
+// On the way back there is no load as high as the highest, which meets a stiffer body.
+TEST(CrossCheck, AMaterialThatStiffensIsNoHysteresis) {
+  Recording recording = pushed_block_recording();
+  recording.pushes = {up_and_back(recording, {0, 0.06, 0.12, 0.24, -0.11, -0.06, 0})};
+  PushedBlock soft, stiff;
+  stiff.young_pa = 1.5 * soft.young_pa;
+  Inputs inputs = clouds_of(soft, recording);
+  inputs[3] = clouds_of(stiff, recording)[3];
+  const Identification answer = fit(recording, coarse_block(), inputs, {});
+  EXPECT_TRUE(says(answer, "not_linear"));
+  EXPECT_FALSE(says(answer, "hysteresis"));
+  // What is softer at the same loads on the way back still is.
+  PushedBlock let_go;
+  let_go.young_pa = 0.8 * soft.young_pa;
+  inputs = clouds_of(soft, recording);
+  for (const std::size_t s : {4u, 5u}) inputs[s] = clouds_of(let_go, recording)[s];
+  EXPECT_TRUE(says(fit(recording, coarse_block(), inputs, {}), "hysteresis"));
+}
+
 TEST(CochranQ, IsTheChiSquareTestOfWeightedMeans) {
   // Upper tails from tables of the chi-square distribution.
   EXPECT_NEAR(chi_square_tail(3.841, 1), 0.05, 1e-4);

@@ -220,6 +220,54 @@ TEST(ImposedContact, WhatCannotBeUsedIsSaidByItsField) {
   EXPECT_NE(said->message.find("radius_std_m"), std::string::npos) << said->message;
 }
 
+/// The bent block, and the same pressed beside it by a force that was measured, whose travel was read: one sensor for both.
+Recording of_both_kinds(double scale_std) {
+  Recording recording = bent_block(ContactLaw::bonded);
+  const Recording by_force = pushed_block_recording();
+  recording.tools.push_back(by_force.tools[0]);
+  recording.pushes.push_back(by_force.pushes[0]);
+  recording.pushes[0].name = "moved";
+  recording.force_scale_std = scale_std;
+  return recording;
+}
+
+// A sensor that reads 4 % too little does so whether its force is given or asked for: E is off by as much and no push tells.
+TEST(ForceScale, IsOneForForcesThatAreGivenAndThatAreAskedFor) {
+  constexpr double scale_std = 0.05, off = 0.04;
+  Recording real = of_both_kinds(0);
+  for (Step& step : real.pushes[1].steps) *step.loads[0].force_n *= 1 + off;
+  Unknowns unknowns;
+  ForwardModel model(real, block(), unknowns);
+  VectorX at = unknowns.prior_mean();
+  at(log_young) = std::log(young_pa);
+  at(poisson) = 0.3;
+  Inputs inputs;
+  for (std::size_t s = 0; s < model.step_count(); ++s) {
+    const StepPrediction seen = model.predict(s, at, false);
+    if (model.push(s).name == "moved") {
+      Wrench read;
+      read.force_n = seen.force_n[0] / (1 + off);
+      read.along = -Vec3::UnitZ();
+      read.force_sigma_n = force_sigma_n;
+      inputs.push_back({read});
+    } else {
+      ToolTravel travel;
+      travel.travel_m = seen.travel_m(0);
+      travel.sigma_m = 1e-6;
+      inputs.push_back({travel});
+    }
+  }
+  const Identification answer = fitted(of_both_kinds(scale_std), inputs);
+  const Parameter& young = parameter(answer, "young_modulus");
+  EXPECT_NEAR(young.value * (1 + off) / young_pa, 1, 0.005) << "no two kinds of pushes that disagree";
+  EXPECT_GE(young.std / young.value, 0.99 * scale_std);
+  EXPECT_LT(young.std / young.value, 1.1 * scale_std);
+  const auto scale = std::find_if(answer.nuisances.begin(), answer.nuisances.end(), [](const auto& n) { return n.name == "force_scale"; });
+  ASSERT_NE(scale, answer.nuisances.end());
+  EXPECT_NEAR(scale->value, 0, 0.05 * scale_std);
+  EXPECT_NEAR(scale->std, scale_std, 0.02 * scale_std);
+}
+
 // A tool that stands still while the object relaxes: the force falls and nothing moves.
 TEST(HeldTool, ThatIsPushedBackLessAndLessHasNotSettled) {
   Recording held = bent_block(ContactLaw::frictionless);

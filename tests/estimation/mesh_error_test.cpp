@@ -5,8 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "palpate/estimation/answer_parts.hpp"
 #include "pushed_block.hpp"
 
 namespace palpate::estimation {
@@ -172,6 +174,38 @@ TEST(MeshError, MovesARegionWhoseOwnNuIsHeldAsIfItWereKnown) {
   EXPECT_NEAR(shifts[0].region_log_young(0), shifts[1].region_log_young(0), 1e-3 * std::abs(shifts[1].region_log_young(0)));
 }
 
+// What the mesh does to both halves at once is shared by them, and so in their covariance: E of both is off together or apart.
+TEST(MeshError, OfTwoRegionsIsInTheirCovariance) {
+  Recording recording = pushed_block_recording();
+  const TetMesh corners = kuhn_block(4, 3, 2, block_size_m);
+  recording.rest.volume = corners;
+  recording.rest.surface = SimulatedSurface::boundary_of(corners, nullptr).rest();
+  recording.model.poisson_fixed = 0.3;
+  SimulatedObject object = coarse_block("linear");
+  auto finer = finer_model(recording, object);
+  ASSERT_TRUE(finer);
+  put_two_halves(object);
+  put_two_halves(finer->object);
+  PushedBlock truth;
+  truth.material = "linear";
+  truth.sigma_m = 1e-4;
+  truth.points = 800;
+  FitOptions options;
+  options.cross_checks = options.stresses = false;
+  const Inputs inputs = clouds_of(truth, recording);
+  const Identification plain = fit(recording, object, inputs, options), widened = fit(recording, object, inputs, options, {}, &*finer);
+  ASSERT_EQ(widened.covariance.rows(), 3);
+  const auto mesh = std::find_if(widened.budget.begin(), widened.budget.end(), [](const auto& e) { return e.input == "mesh"; });
+  ASSERT_NE(mesh, widened.budget.end());
+  ASSERT_EQ(mesh->regions.size(), 2u);
+  const double product = mesh->regions[0].young_modulus_percent * mesh->regions[1].young_modulus_percent / 1e4;
+  EXPECT_GT(product, 0.2 * std::abs(plain.covariance(0, 2))) << "it matters";
+  EXPECT_NEAR(std::abs(widened.covariance(0, 2) - plain.covariance(0, 2)), product, 0.05 * product);
+  for (const Index k : {0, 2})
+    EXPECT_NEAR(widened.covariance(k, k) - plain.covariance(k, k), std::pow(mesh->regions[std::size_t(k / 2)].young_modulus_percent / 100, 2),
+                0.02 * widened.covariance(k, k));
+}
+
 /// Normal posterior of (log E, nu) on a grid, cut at bounds of nu.
 Posterior normal_posterior(double log_young, double nu, double var_e, double cov, double var_nu, double lower = -1, double upper = 1) {
   Posterior p;
@@ -185,6 +219,32 @@ Posterior normal_posterior(double log_young, double nu, double var_e, double cov
   p.log_young_std = VectorX::Constant(n, std::sqrt(var_e - cov * cov / var_nu));
   update_covariance(p);
   return p;
+}
+
+TEST(Widening, OfTwoRegionsAddsTheProductsOfTheirShifts) {
+  // (log E of the first, nu, log E of the second)
+  Mat3 before;
+  before << 4e-4, -1e-4, 1e-4, -1e-4, 4e-4, 0.5e-4, 1e-4, 0.5e-4, 9e-4;
+  std::vector<Posterior> regions{normal_posterior(9, 0.25, before(0, 0), before(0, 1), before(1, 1)),
+                                 normal_posterior(10, 0.25, before(2, 2), before(2, 1), before(1, 1))};
+  const auto given_nu = [&](int a, int b) { return before(a, b) - before(a, 1) * before(b, 1) / before(1, 1); };
+  regions[0].correlation = MatrixX::Identity(2, 2);
+  regions[0].correlation(0, 1) = regions[0].correlation(1, 0) = given_nu(0, 2) / std::sqrt(given_nu(0, 0) * given_nu(2, 2));
+  ASSERT_LT((covariance_of(regions) - before).norm(), 2e-3 * before.norm());
+  for (const AnswerShift& shift : {AnswerShift{0.03, 0.01, VectorX::Constant(1, -0.02)}, AnswerShift{-0.01, 0.02, VectorX::Constant(1, -0.03)},
+                                   AnswerShift{0.02, 0, VectorX::Constant(1, 0.02)}}) {
+    auto wider = regions;
+    widen_together(wider, shift, -0.5, 0.499);
+    const Vec3 all(shift.log_young, shift.poisson, shift.region_log_young(0));
+    const Mat3 expected = before + all * all.transpose();
+    EXPECT_LT((covariance_of(wider) - expected).norm(), 0.02 * expected.norm()) << covariance_of(wider) << "\n" << expected;
+    // Each by itself is what it was when it was widened alone.
+    for (Index r = 0; r < 2; ++r) {
+      Posterior alone = regions[std::size_t(r)];
+      widen(alone, shift.of_region(r), -0.5, 0.499);
+      EXPECT_EQ(wider[std::size_t(r)].covariance, alone.covariance);
+    }
+  }
 }
 
 TEST(Widening, AddsTheOuterProductOfTheShiftToANormalPosterior) {

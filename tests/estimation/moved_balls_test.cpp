@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -127,7 +128,8 @@ TEST(MovedBalls, TheForceIsWhatWasObservedAlongThePush) {
   const auto& read = std::get<Wrench>(step.observations[1]);
   EXPECT_EQ(read.force_n, Vec3(0, 0, -2));
   EXPECT_EQ(read.along, Vec3(0, 0, -1));
-  EXPECT_NEAR(read.force_sigma_n, std::hypot(sigma_n, 0.02 * Vec3(0.3, 0, -2).norm(), 0.05), 1e-12);
+  EXPECT_NEAR(read.force_sigma_n, std::hypot(sigma_n, 0.02 * Vec3(0.3, 0, -2).norm()), 1e-12);
+  EXPECT_EQ(step.loads[0].force_rate_n_s, Vec3(0, 1, -5)) << "what the clocks differ by is no noise of this step";
   EXPECT_TRUE(moved.pushes[0].steps.front().loads.empty()) << "not yet touching: it is not there";
   EXPECT_TRUE(moved.pushes[0].steps.front().observations.empty()) << "and says nothing of where it stands";
   const Recording again = with_balls_moved(moved);
@@ -152,6 +154,24 @@ TEST(MovedBalls, TheyGoAlongTheLineOfTheHardestStep) {
 
   steps[1].loads[0].contact_m += Vec3(4e-3, 0, 0);
   EXPECT_THAT(message_of([&] { with_balls_moved(recording); }), HasSubstr("presses at another place than in other steps of push"));
+}
+
+// All forces grew by half of themselves in a second: clocks that are 0.1 s apart make all of them 5 % too large or too small.
+TEST(MovedBalls, ClocksThatDifferAreOneErrorOfAllForces) {
+  constexpr double apart_s = 0.1, rate_1_s = 0.5;
+  const auto spread = [&](double time_offset_std_s) {
+    Recording recording = pressed_block(6);
+    recording.time_offset_std_s = time_offset_std_s;
+    for (Step& step : recording.pushes[0].steps) step.loads[0].force_rate_n_s = rate_1_s * *step.loads[0].force_n;
+    IdentifyOptions options;
+    options.fit.cross_checks = false;
+    const Identified found = identify(recording, options);
+    const bool asked = std::any_of(found.answer.nuisances.begin(), found.answer.nuisances.end(), [](const auto& n) { return n.name == "time_offset"; });
+    EXPECT_EQ(asked, time_offset_std_s > 0);
+    return found.answer.parameters[0].std / found.answer.parameters[0].value;
+  };
+  const double alike = spread(0), apart = spread(apart_s);
+  EXPECT_NEAR(std::sqrt(apart * apart - alike * alike), apart_s * rate_1_s, 0.1 * apart_s * rate_1_s);
 }
 
 TEST(MovedBalls, StepByStepTheyAreMovedToo) {
