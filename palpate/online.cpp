@@ -133,6 +133,7 @@ void OnlineEstimator::begin(const Push& push) {
   }
   Recording alone = light_;
   alone.pushes = {push};
+  if (!alone.rest.volume && !alone.rest.surface) alone.rest.views = recording_.rest.views;  // they are its shape
   demand_right_values(wrong_values(alone));
   take_in(alone);
   recording_.pushes.push_back(push);

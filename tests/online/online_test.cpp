@@ -215,6 +215,23 @@ TEST_F(SeenByOneCamera, AStepThatWasBrokenOffLeavesNothingBehind) {
 }
 
 /// A force that is imposed is no observation of it.
+// Views are not carried along with every step, and the first push was refused for want of a shape.
+TEST(OnlineEstimator, AnObjectThatIsSeenInViewsCanBePushed) {
+  Recording scene = pushed_block({});
+  Push push = scene.pushes[0];
+  push.steps.clear();
+  scene.pushes.clear();
+  scene.rest.volume.reset();
+  DepthFrame view;
+  view.camera = {64, 48, 60, 60, 31.5, 23.5, DistortionModel::none, {}};
+  view.noise.sigma_m = 1e-3;
+  view.depth_m = DepthImage::Constant(48, 64, 0.5f);
+  scene.rest.views = {view};
+  scene.supports.clear();  // they name vertices of the mesh
+  OnlineEstimator online(scene);
+  EXPECT_NO_THROW(online.begin(push));
+}
+
 TEST(OnlineEstimator, WaitsUntilSomethingIsSeen) {
   Recording whole = pushed_block({});
   Recording scene = whole;
