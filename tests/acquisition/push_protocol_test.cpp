@@ -316,6 +316,21 @@ TEST(PushProtocol, WhateverBreaksTheTipGoesAway) {
   EXPECT_NEAR(wanted.depth(), 0.006, 6e-4) << "the user wants it where it is";
 }
 
+// Nothing could read a recording that held one.
+TEST(PushProtocol, AnImageWithoutADepthIsLeftOutAndItsForceCounts) {
+  SpringRobot robot;
+  robot.blank_images = 2;
+  const Result result = run(robot);
+  EXPECT_EQ(result.report.blank_images, 2);
+  EXPECT_FALSE(result.report.compared) << "there is none from before";
+  ASSERT_EQ(result.push.steps.size(), 8u);
+  for (std::size_t i = 0; i < 8; ++i) {
+    const auto& seen = result.push.steps[i].observations;
+    EXPECT_EQ(std::any_of(seen.begin(), seen.end(), [](const Observation& one) { return std::holds_alternative<DepthFrame>(one); }), i >= 2) << i;
+  }
+  EXPECT_NEAR(force(result.push.steps[1]), 2, 0.4);
+}
+
 TEST(PushProtocol, ACameraThatMovedTellsNothingOfTheObject) {
   SpringRobot stands, moves;
   moves.camera_moves = true;

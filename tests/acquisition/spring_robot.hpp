@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -27,6 +28,7 @@ struct SpringRobot : Robot {
   double repeat_std_m = 0;   // every motion ends this far from where the encoders say
   double unseen_m = 0;       // the last one's error, deeper
   int images = 0;
+  int blank_images = 0;  // to come, without a depth
   double highest_n = 0;  // of the spring, as nobody reads it
   bool camera_moves = false;
   double rolls_rad_m = 0;  // around its axis, with the way it goes down
@@ -74,7 +76,10 @@ struct SpringRobot : Robot {
     ++images;
     DepthFrame frame;
     frame.time_s = clock_s;
-    frame.depth_m = DepthImage::Constant(2, 2, float(1 + depth()));
+    frame.camera = {2, 2, 2, 2, 0.5, 0.5, DistortionModel::none, {}};
+    frame.noise.sigma_m = 1e-3;
+    frame.depth_m = DepthImage::Constant(2, 2, blank_images > 0 ? 0.0f : 1.0f);
+    blank_images = std::max(0, blank_images - 1);
     if (camera_moves) frame.T_base_camera.translation().x() = 1e-3 * images;
     return frame;
   }

@@ -395,7 +395,7 @@ TEST(FitOptionsCheck, EveryFieldOutOfItsRangeIsNamed) {
   EXPECT_EQ(where([](FitOptions& o) { o.tukey_cut = std::nan(""); }), "FitOptions.tukey_cut");
   EXPECT_EQ(where([](FitOptions& o) { o.young_start_pa = -1; }), "FitOptions.young_start_pa");
   EXPECT_EQ(where([](FitOptions& o) { o.poisson_start = 0.5; }), "FitOptions.poisson_start");
-  EXPECT_EQ(where([](FitOptions& o) { o.threads = 0; }), "FitOptions.threads");
+  EXPECT_EQ(where([](FitOptions& o) { o.threads = -1; }), "FitOptions.threads");
 }
 
 TEST(FitWithoutObservations, IsAnError) {

@@ -242,9 +242,10 @@ TEST(NextPush, WhatAllPushesShareIsNotAveragedOut) {
     EXPECT_EQ(ranking.knowledge.shared, radius_std_m > 0 && !touched ? 1 : 0);
     return expected_after(ranking.knowledge, std::vector<const RatedPush*>(static_cast<std::size_t>(pushes), &ranking.pushes.front())).log_young_std;
   };
-  const auto of_radius = [&](int pushes) { return std::sqrt(std::pow(after(1e-3, false, pushes), 2) - std::pow(after(0, false, pushes), 2)); };
-  EXPECT_GT(of_radius(1), 0.005);
-  EXPECT_GT(of_radius(20), 0.7 * of_radius(1)) << "less only by what dents tell of it";
+  // So well known that dents tell little of it. (Of one known to 1 mm twenty pushes tell half.)
+  const auto of_radius = [&](int pushes) { return std::sqrt(std::pow(after(1e-4, false, pushes), 2) - std::pow(after(0, false, pushes), 2)); };
+  EXPECT_GT(of_radius(1), 4e-4);
+  EXPECT_GT(of_radius(20), 0.8 * of_radius(1)) << "0.22 where each push had a radius of its own";
   EXPECT_NEAR(after(1e-3, true, 1), after(0, true, 1), 1e-6) << "after a fit it is in what no push takes away";
 }
 
