@@ -73,8 +73,7 @@ struct Explored {
   std::optional<FixedLists> fixed_lists;  ///< nothing: no estimate to expect them by, or stopped on request
   int fruitless = 0;     ///< pushes that found nothing to press on; they count, and their places are not tried again
                          ///< (of an earlier run those that recorded a step)
-  /// The goal: the last estimate converged, its intervals are narrow, and no verdict says that they are not to be believed.
-  bool reached = false;
+  bool reached = false;  ///< the goal
   std::string message;   ///< why it ended, in plain words
 };
 

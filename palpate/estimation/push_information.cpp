@@ -180,19 +180,19 @@ struct PushInformation::Impl {
     for (int k = 0; k < unknowns.parameter_count(); ++k) at.emplace(k, k);
     const Index scale = unknowns.parameter_count();
     if (force_scale >= 0) at.emplace(force_scale, scale);
-    std::vector<int> of_one;
+    std::vector<int> own;
     for (const Block* block : blocks)
       for (const int unknown : block->unknowns) {
         if (unknowns[unknown].fixed || at.count(unknown) > 0) continue;
         if (!is_shared(unknown))
-          of_one.push_back(unknown);
+          own.push_back(unknown);
         else if (!touched && std::find(all_share.begin(), all_share.end(), unknown) == all_share.end())
           all_share.push_back(unknown);
       }
     Index size = scale + 1;
     for (const int unknown : all_share) at.emplace(unknown, size++);
     const Index kept = size;
-    for (const int unknown : of_one) size += at.emplace(unknown, size).second;
+    for (const int unknown : own) size += at.emplace(unknown, size).second;
     MatrixX all = MatrixX::Zero(size, size);
     for (const Block* block : blocks) {
       for (std::size_t i = 0; i < block->unknowns.size(); ++i) {
