@@ -6,7 +6,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 
 #include "palpate/core/error.hpp"
@@ -60,22 +59,11 @@ MatrixX made_possible(const MatrixX& covariance, double left) {
   return out;
 }
 
-/// The mesh's error comes back with every push, and none shows the unseen side or the foot. The others are of one tool, support, camera or
-/// object, whose errors pushes share: what they do to E and nu is no noise that goes with the root of their number.
-bool comes_with_every_push(const std::string& input, const Recording& recording) {
-  constexpr const char* always[] = {"mesh",         "unseen side",       "foot",           "tool_radius",     "compliance",   "density",
-                                    "rest_surface", "support_compliance", "support_spread", "camera",          "camera_rotation", "lens_scatter",
-                                    "time_offset"};
-  if (std::find(std::begin(always), std::end(always), input) != std::end(always)) return true;
-  return (input == "clamp" || input == "clamp_rotation") &&
-         std::all_of(recording.supports.begin(), recording.supports.end(), [](const Support& s) { return s.pose_varies == PoseVaries::never; });
-}
-
 /// Standard deviations that errors which no push takes away have given to every log E and then nu.
-VectorX shares_of(const Recording& recording, const Identification& answer, const std::vector<std::string>& regions, Index count) {
+VectorX shares_of(const Identification& answer, const std::vector<std::string>& regions, Index count) {
   VectorX squares = VectorX::Zero(count);
   for (const auto& entry : answer.budget) {
-    if (!comes_with_every_push(entry.input, recording)) continue;
+    if (entry.input != "mesh" && entry.input != "unseen side" && entry.input != "foot") continue;
     for (Index r = 0; r < count - 1; ++r) {
       double percent = entry.young_modulus_percent;
       for (const RegionShare& share : entry.regions)
@@ -98,14 +86,6 @@ MatrixX part_of(const VectorX& shares, const MatrixX& covariance) {
       part(i, j) = i == j ? product : std::clamp(covariance(i, j), -product, product);
     }
   return made_possible(part, -1e-9);
-}
-
-/// Without what all pushes share, each with its prior in the last rows: integrated out once, of all pushes together.
-MatrixX without_shared(const MatrixX& information, Index shared) {
-  if (shared == 0) return information;
-  const Index kept = information.rows() - shared;
-  const MatrixX cross = information.bottomLeftCorner(shared, kept);
-  return information.topLeftCorner(kept, kept) - cross.transpose() * information.bottomRightCorner(shared, shared).ldlt().solve(cross);
 }
 
 /// @param touched  false: nothing of E is known but what pushes that are planned would tell
@@ -208,7 +188,8 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
   const double scale = std::min(scale_std * scale_std, within_covariance / common.dot(covariance.ldlt().solve(common)));
   const MatrixX of_scale = scale * common * common.transpose();
 
-  VectorX shares = shares_of(recording, answer, known.regions, regions + 1);
+  // The mesh's error comes back with every push, and none shows the unseen side or the foot.
+  VectorX shares = shares_of(answer, known.regions, regions + 1);
   if (fixed) shares(regions) = 0;
   known.uncured = part_of(shares, covariance - of_scale);
   MatrixX joint = MatrixX::Zero(regions + 2, regions + 2);
@@ -228,7 +209,7 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
 ExpectedSpread expected_after(const Knowledge& knowledge, const std::vector<const RatedPush*>& pushes) {
   MatrixX information = knowledge.information;
   for (const RatedPush* push : pushes) information += push->information;
-  return spread_of(without_shared(information, knowledge.shared), knowledge.uncured, knowledge.touched);
+  return spread_of(information, knowledge.uncured, knowledge.touched);
 }
 
 PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, const std::string& tool,
@@ -245,19 +226,10 @@ PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, c
     if (progress && !progress("rate pushes", static_cast<double>(c) / static_cast<double>(information.count()))) break;
     std::vector<RatedPush> rated = information.rate(c);
     if (rated.empty()) ++ranking.out_of_view;
-    for (RatedPush& push : rated) ranking.pushes.push_back(std::move(push));
-  }
-  // What all pushes share, every push beside it.
-  const VectorX shared = information.shared_information();
-  Knowledge& known = ranking.knowledge;
-  known.shared = static_cast<Index>(shared.size());
-  const Index size = static_cast<Index>(known.information.rows()) + known.shared;
-  const MatrixX nothing = MatrixX::Zero(size, size);
-  known.information.conservativeResizeLike(nothing);
-  known.information.diagonal().tail(known.shared) = shared;
-  for (RatedPush& push : ranking.pushes) {
-    push.information.conservativeResizeLike(nothing);
-    push.expected = expected_after(known, {&push});
+    for (RatedPush& push : rated) {
+      push.expected = expected_after(knowledge, {&push});
+      ranking.pushes.push_back(std::move(push));
+    }
   }
   std::stable_sort(ranking.pushes.begin(), ranking.pushes.end(), [&](const RatedPush& a, const RatedPush& b) {
     return a.expected.score(options.goal) < b.expected.score(options.goal);

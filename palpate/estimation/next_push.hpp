@@ -42,12 +42,8 @@ struct Knowledge {
   double young_modulus_pa = 2e4, poisson_ratio = 0.3;  ///< where information is computed
   std::vector<std::string> regions;                    ///< R names; empty: one stiffness everywhere
   VectorX log_ratio;                                   ///< R - 1: where information is computed
-  MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, R - 1 log ratios, force scale, `shared`), their priors included
-  /// Errors that all pushes share, as the force's scale (tool radius, compliance, density, supports, lens, a camera that stands): so many
-  /// are the last of `information`, where pushes were ranked before the first touch. After a fit what they do is in `uncured`.
-  Index shared = 0;
-  /// Covariance of (log E of every region, nu) that no push takes away: the mesh's, the unseen side's and the foot's, and that of the
-  /// errors that all pushes share. Empty: none.
+  MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, R - 1 log ratios, force scale), their priors included
+  /// Covariance of (log E of every region, nu) that no push takes away: the mesh's, the unseen side's and the foot's. Empty: none.
   MatrixX uncured;
   bool touched = false;                                ///< false: nothing but priors, E is a guess
 
@@ -56,8 +52,7 @@ struct Knowledge {
 
 /// Priors alone: nothing of E, the recording's range of nu and scale of force, ratios as wide as the fit's.
 Knowledge before_touch(const Recording& recording, double young_modulus_pa);
-/// The posterior so far. Errors that all pushes share are held apart: further pushes do not average them out, though they might tell
-/// something of them.
+/// The posterior so far. The force's scale is a common error that is held apart: further pushes do not average it out.
 /// @throws Error when the answer has no Young's modulus or Poisson ratio, or no covariance.
 Knowledge after_fit(const Recording& recording, const Identification& answer);
 
@@ -78,11 +73,11 @@ struct RatedPush {
   double seen_share = 0;    ///< of the surface around the tool, by that view
   ExpectedSpread expected;  ///< after the push
   int region = 0;           ///< that the tool presses on
-  MatrixX information;      ///< that it adds, as that of PushRanking::knowledge, every nuisance of its own integrated out
+  MatrixX information;      ///< that it adds, as Knowledge's, every nuisance of its own integrated out
 };
 
 struct PushRanking {
-  Knowledge knowledge;  ///< that was given; before the first touch with the errors that these pushes share
+  Knowledge knowledge;
   PushGoal goal = PushGoal::both;
   ExpectedSpread so_far;              ///< infinite where nothing is known
   std::vector<RatedPush> pushes;      ///< best first
@@ -93,7 +88,7 @@ struct RankOptions {
   PushGoal goal = PushGoal::both;
   PushLimits limits;
   double least_seen_share = 0.2;  ///< of the surface around the tool
-  int threads = 1;                ///< 0: as many as the machine has
+  int threads = 1;
 };
 
 /// @param scene      supports, environment, tools and priors of the object; its pushes are not looked at
