@@ -374,6 +374,7 @@ class Loop {
     fresh.poisson_ratio = ranking.knowledge.poisson_ratio;
     fresh.log_ratio = ranking.knowledge.log_ratio;
     fresh.uncured = ranking.knowledge.uncured;
+    fresh = estimation::with_shared(std::move(fresh), ranking.knowledge.information.diagonal().tail(ranking.knowledge.shared));
     FixedLists lists;
     const int most = 10 * options_.max_pushes;
     lists.candidates = static_cast<int>(pushes.size());

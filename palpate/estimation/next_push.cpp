@@ -6,7 +6,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 
 #include "palpate/core/error.hpp"
@@ -60,22 +59,11 @@ MatrixX made_possible(const MatrixX& covariance, double left) {
   return out;
 }
 
-/// The mesh's error comes back with every push, and none shows the unseen side or the foot. The others are of one tool, support, camera or
-/// object, whose errors pushes share: what they do to E and nu is no noise that goes with the root of their number.
-bool comes_with_every_push(const std::string& input, const Recording& recording) {
-  constexpr const char* always[] = {"mesh",         "unseen side",       "foot",           "tool_radius",     "compliance",   "density",
-                                    "rest_surface", "support_compliance", "support_spread", "camera",          "camera_rotation", "lens_scatter",
-                                    "time_offset"};
-  if (std::find(std::begin(always), std::end(always), input) != std::end(always)) return true;
-  return (input == "clamp" || input == "clamp_rotation") &&
-         std::all_of(recording.supports.begin(), recording.supports.end(), [](const Support& s) { return s.pose_varies == PoseVaries::never; });
-}
-
 /// Standard deviations that errors which no push takes away have given to every log E and then nu.
-VectorX shares_of(const Recording& recording, const Identification& answer, const std::vector<std::string>& regions, Index count) {
+VectorX shares_of(const Identification& answer, const std::vector<std::string>& regions, Index count) {
   VectorX squares = VectorX::Zero(count);
   for (const auto& entry : answer.budget) {
-    if (!comes_with_every_push(entry.input, recording)) continue;
+    if (entry.input != "mesh" && entry.input != "unseen side" && entry.input != "foot") continue;
     for (Index r = 0; r < count - 1; ++r) {
       double percent = entry.young_modulus_percent;
       for (const RegionShare& share : entry.regions)
@@ -208,7 +196,8 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
   const double scale = std::min(scale_std * scale_std, within_covariance / common.dot(covariance.ldlt().solve(common)));
   const MatrixX of_scale = scale * common * common.transpose();
 
-  VectorX shares = shares_of(recording, answer, known.regions, regions + 1);
+  // The mesh's error comes back with every push, and none shows the unseen side or the foot.
+  VectorX shares = shares_of(answer, known.regions, regions + 1);
   if (fixed) shares(regions) = 0;
   known.uncured = part_of(shares, covariance - of_scale);
   MatrixX joint = MatrixX::Zero(regions + 2, regions + 2);
@@ -222,6 +211,14 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
   for (Index r = 1; r < regions; ++r) to(1 + r, r) = 1, to(1 + r, 0) = -1;
   const MatrixX about = to * joint * to.transpose();
   known.information = about.fullPivLu().inverse();
+  return known;
+}
+
+Knowledge with_shared(Knowledge known, const VectorX& information) {
+  const Index count = static_cast<Index>(information.size()), size = static_cast<Index>(known.information.rows()) - known.shared + count;
+  known.information.conservativeResizeLike(MatrixX::Zero(size, size));
+  known.information.bottomRightCorner(count, count) = information.asDiagonal();
+  known.shared = count;
   return known;
 }
 
@@ -248,16 +245,11 @@ PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, c
     for (RatedPush& push : rated) ranking.pushes.push_back(std::move(push));
   }
   // What all pushes share, every push beside it.
-  const VectorX shared = information.shared_information();
-  Knowledge& known = ranking.knowledge;
-  known.shared = static_cast<Index>(shared.size());
-  const Index size = static_cast<Index>(known.information.rows()) + known.shared;
-  const MatrixX nothing = MatrixX::Zero(size, size);
-  known.information.conservativeResizeLike(nothing);
-  known.information.diagonal().tail(known.shared) = shared;
+  ranking.knowledge = with_shared(knowledge, information.shared_information());
+  const MatrixX nothing = MatrixX::Zero(ranking.knowledge.information.rows(), ranking.knowledge.information.cols());
   for (RatedPush& push : ranking.pushes) {
     push.information.conservativeResizeLike(nothing);
-    push.expected = expected_after(known, {&push});
+    push.expected = expected_after(ranking.knowledge, {&push});
   }
   std::stable_sort(ranking.pushes.begin(), ranking.pushes.end(), [&](const RatedPush& a, const RatedPush& b) {
     return a.expected.score(options.goal) < b.expected.score(options.goal);

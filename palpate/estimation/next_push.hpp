@@ -44,10 +44,10 @@ struct Knowledge {
   VectorX log_ratio;                                   ///< R - 1: where information is computed
   MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, R - 1 log ratios, force scale, `shared`), their priors included
   /// Errors that all pushes share, as the force's scale (tool radius, compliance, density, supports, lens, a camera that stands): so many
-  /// are the last of `information`, where pushes were ranked before the first touch. After a fit what they do is in `uncured`.
+  /// are the last of `information` once pushes are ranked, each with its prior: planned pushes tell of them together. What they did in
+  /// pushes that were fitted is taken for an error of its own, since an answer does not say which way it went.
   Index shared = 0;
-  /// Covariance of (log E of every region, nu) that no push takes away: the mesh's, the unseen side's and the foot's, and that of the
-  /// errors that all pushes share. Empty: none.
+  /// Covariance of (log E of every region, nu) that no push takes away: the mesh's, the unseen side's and the foot's. Empty: none.
   MatrixX uncured;
   bool touched = false;                                ///< false: nothing but priors, E is a guess
 
@@ -56,8 +56,7 @@ struct Knowledge {
 
 /// Priors alone: nothing of E, the recording's range of nu and scale of force, ratios as wide as the fit's.
 Knowledge before_touch(const Recording& recording, double young_modulus_pa);
-/// The posterior so far. Errors that all pushes share are held apart: further pushes do not average them out, though they might tell
-/// something of them.
+/// The posterior so far. The force's scale is a common error that is held apart: further pushes do not average it out.
 /// @throws Error when the answer has no Young's modulus or Poisson ratio, or no covariance.
 Knowledge after_fit(const Recording& recording, const Identification& answer);
 
@@ -82,7 +81,7 @@ struct RatedPush {
 };
 
 struct PushRanking {
-  Knowledge knowledge;  ///< that was given; before the first touch with the errors that these pushes share
+  Knowledge knowledge;  ///< that was given, with the errors that these pushes share
   PushGoal goal = PushGoal::both;
   ExpectedSpread so_far;              ///< infinite where nothing is known
   std::vector<RatedPush> pushes;      ///< best first
@@ -104,6 +103,10 @@ struct RankOptions {
 PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, const std::string& tool,
                         const std::vector<PushCandidate>& candidates, const SensorPlan& sensors, const Knowledge& knowledge,
                         const RankOptions& options, const OnProgress& progress = {});
+
+/// In place of errors that all pushes share, if there are any, those with this information by themselves (of a ranking, the last of its
+/// knowledge's diagonal).
+Knowledge with_shared(Knowledge known, const VectorX& information);
 
 /// What is expected after these pushes on top of what is known.
 ExpectedSpread expected_after(const Knowledge& knowledge, const std::vector<const RatedPush*>& pushes);

@@ -134,15 +134,14 @@ struct PushInformation::Impl {
   double log_young_value = 0, poisson_value = 0;
   VectorX log_ratio;
   int force_scale = -1;
-  bool touched = false;
   std::vector<int> all_share;  // unknowns that no push has for itself, in the order in which they came up
 
   /// An error that comes again with every push: one would take from it what only another calibration can. The rest surface's has too many
-  /// numbers to be carried along before the first touch.
+  /// numbers to be carried along.
   bool is_shared(int unknown) const {
     const std::string& name = unknowns[unknown].name;
     const bool of_one = name.find(std::string("[") + candidate_name) != std::string::npos;
-    return unknown >= unknowns.parameter_count() && !of_one && (touched || !name.starts_with("rest_surface["));
+    return unknown >= unknowns.parameter_count() && !of_one && !name.starts_with("rest_surface[");
   }
 
   Push made_up(const PushCandidate& candidate, double highest_n, const std::string& name) const {
@@ -173,8 +172,7 @@ struct PushInformation::Impl {
     return at;
   }
 
-  /// Schur complement of all that is not (log E, nu, log ratios, force scale, what all pushes share). After a fit the latter is held: what
-  /// it does is in the covariance that no push takes away.
+  /// Schur complement of all that is not (log E, nu, log ratios, force scale, what all pushes share).
   MatrixX marginal(const std::vector<const Block*>& blocks) {
     std::map<int, Index> at;
     for (int k = 0; k < unknowns.parameter_count(); ++k) at.emplace(k, k);
@@ -186,7 +184,7 @@ struct PushInformation::Impl {
         if (unknowns[unknown].fixed || at.count(unknown) > 0) continue;
         if (!is_shared(unknown))
           of_one.push_back(unknown);
-        else if (!touched && std::find(all_share.begin(), all_share.end(), unknown) == all_share.end())
+        else if (std::find(all_share.begin(), all_share.end(), unknown) == all_share.end())
           all_share.push_back(unknown);
       }
     Index size = scale + 1;
@@ -223,7 +221,6 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
   if (!(sensors.variance_inflation >= 1)) throw Error("must be at least 1", "SensorPlan.variance_inflation");
   plan.sensors = sensors;
   plan.options = options;
-  plan.touched = knowledge.touched;
   plan.tool = tool_named(scene, tool_name);
   plan.planned = scene;
   plan.planned.pushes.clear();

@@ -45,15 +45,6 @@ double rank_correlation(const std::vector<double>& a, const std::vector<double>&
   return ab / aa;
 }
 
-/// E within 1.3 %, 1 % of which is the force's scale, and beside it an input that moves E by this share.
-Identification answer_with_share(const std::string& input, double share) {
-  Identification answer;
-  answer.parameters = {{"young_modulus", "", "Pa", 2e4}, {"poisson_ratio", "", "1", 0.3}};
-  answer.covariance = Vec2(0.013 * 0.013 + share * share, 0.012 * 0.012).asDiagonal();
-  answer.budget = {BudgetEntry{input, 100 * share, 0}};
-  return answer;
-}
-
 TEST(NextPush, PromisesWhatAFitOfTheRealPushDelivers) {
   const auto candidates = block_candidates(6, 1);
   ASSERT_GE(candidates.size(), 6u);
@@ -233,30 +224,17 @@ TEST(NextPush, WhatAllPushesShareIsNotAveragedOut) {
   const SimulatedObject object = block_object(1);
   const auto candidates = block_candidates(1, 0);
   SensorPlan sensors = block_sensors(object.surface.rest());
-  const auto after = [&](double radius_std_m, bool touched, int pushes) {
+  sensors.views.clear();  // dents that are seen would tell the radius
+  const auto after = [&](double radius_std_m, int pushes) {
     Recording scene = block_on_table();
     scene.tools[0].radius_std_m = radius_std_m;
-    Knowledge known = before_touch(scene, true_young_pa);
-    known.touched = touched;
-    const PushRanking ranking = rank_pushes(scene, object, "pad", candidates, sensors, known, {});
-    EXPECT_EQ(ranking.knowledge.shared, radius_std_m > 0 && !touched ? 1 : 0);
+    const PushRanking ranking = rank_pushes(scene, object, "pad", candidates, sensors, before_touch(scene, true_young_pa), {});
+    EXPECT_EQ(ranking.knowledge.shared, radius_std_m > 0 ? 1 : 0);
     return expected_after(ranking.knowledge, std::vector<const RatedPush*>(static_cast<std::size_t>(pushes), &ranking.pushes.front())).log_young_std;
   };
-  const auto of_radius = [&](int pushes) { return std::sqrt(std::pow(after(1e-3, false, pushes), 2) - std::pow(after(0, false, pushes), 2)); };
+  const auto of_radius = [&](int pushes) { return std::sqrt(std::pow(after(1e-3, pushes), 2) - std::pow(after(0, pushes), 2)); };
   EXPECT_GT(of_radius(1), 0.005);
-  EXPECT_GT(of_radius(20), 0.7 * of_radius(1)) << "less only by what dents tell of it";
-  EXPECT_NEAR(after(1e-3, true, 1), after(0, true, 1), 1e-6) << "after a fit it is in what no push takes away";
-}
-
-TEST(NextPush, AfterAFitWhatAllPushesShareStays) {
-  for (const char* input : {"tool_radius", "compliance", "density", "camera", "rest_surface", "support_compliance", "lens_scatter"}) {
-    const double share = 0.03;
-    Identification answer = answer_with_share(input, share);
-    const Knowledge known = after_fit(block_on_table(), answer);
-    RatedPush exact;
-    exact.information = 1e10 * Vec3(1, 0, -1) * Vec3(1, 0, -1).transpose();
-    EXPECT_NEAR(expected_after(known, {&exact}).log_young_std, std::hypot(0.01, share), 5e-4) << input;
-  }
+  EXPECT_GT(of_radius(20), 0.7 * of_radius(1));
 }
 
 TEST(NextPush, WithTheRatioOfTwoHalvesKnownAPushSaysWhatItSaysOfOneMaterial) {
