@@ -435,6 +435,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   answer.fit.load_cases = model.load_cases() + elsewhere.load_cases;
   for (Verdict& verdict : judge({recording, objective, optimum, residuals, answer, checks, doubts, certificate}))
     answer.verdicts.push_back(std::move(verdict));
+  if (auto unexplored = nu_not_explored(posterior)) answer.verdicts.push_back(std::move(*unexplored));
   if (doubt != nullptr && !doubt->shapes.empty()) answer.verdicts.push_back(partly_seen(*doubt));
   answer.provenance["variance inflation of correlated points"] = std::to_string((loss.noise ? loss.noise->of_cells : 1) / loss.surface_weight);
   if (loss.noise)

@@ -172,6 +172,7 @@ Identification GrowingFit::update(const Recording& recording, const SimulatedObj
   objective.set_reuse(reuse);
   objective.evaluate(optimum.unknowns, optimum.loss);  // verdicts look at the optimum's rows
   answer.verdicts = judge({recording, objective, optimum, residuals, answer, CrossChecks{}, Doubts{}, std::nullopt});
+  if (auto unexplored = nu_not_explored(posterior)) answer.verdicts.push_back(std::move(*unexplored));
   answer.provenance["posterior"] = posterior.quadrature ? "quadrature over nu" : "Laplace";
   kept_ = objective.take_kept();
   remember();

@@ -15,6 +15,7 @@ namespace {
 constexpr int grid_size = 401;
 constexpr double search_reuse = 2;  // Objective::set_reuse for a linear body: what single points err by
 constexpr double negligible = 8;  // of the cost above its least: e^-8 of the density, four standard deviations
+constexpr double excluded = 3;    // the same: what lies beyond is less than a hundredth of a normal density
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
@@ -352,19 +353,23 @@ Posterior explore_posterior(Objective& objective, const Optimum& optimum, const 
   note(nearest, at);
   Index first = nearest, last = nearest;  // that have an equilibrium
   // Outwards until so little of the posterior is left that no quantile asks for it.
-  const auto outwards = [&](Index& edge, Index by) {
+  const auto outwards = [&](Index& edge, Index by, std::optional<double>& unsolved) {
     Optimum walk = optimum;
     VectorX evaluated_at = optimum.unknowns;
     double rise = 0;
-    while (rise < negligible && edge + by >= 0 && edge + by < nodes && visit(edge + by, walk, evaluated_at)) {
+    while (rise < negligible && edge + by >= 0 && edge + by < nodes) {
       const Index next = edge + by;
+      if (!visit(next, walk, evaluated_at)) {
+        if (rise < excluded && !posterior.cancelled) unsolved = node(next);
+        return;
+      }
       rise += 0.5 * (cost_slope(edge) + cost_slope(next)) * (node(next) - node(edge)) +
               0.5 * (log_determinant(next) - log_determinant(edge));
       edge = next;
     }
   };
-  outwards(last, 1);
-  if (!posterior.cancelled) outwards(first, -1);
+  outwards(last, 1, posterior.unsolved_above);
+  if (!posterior.cancelled) outwards(first, -1, posterior.unsolved_below);
   if (posterior.cancelled) return posterior;
   const Index count = last - first + 1;
   if (count < 2) {  // no neighbour could be solved: what the optimum alone says

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 
 #include "palpate/core/identification.hpp"
 #include "palpate/estimation/optimise.hpp"
@@ -22,6 +23,9 @@ struct Posterior {
   double log_young_upper = std::numeric_limits<double>::infinity();
   bool cancelled = false;     ///< the caller asked to stop: nothing else is filled
   bool quadrature = false;    ///< conditional optima were solved at several nu (else Laplace, cut at the bounds)
+  /// The next nu below the grid and above it, where no equilibrium was found though the data do not exclude it: the density says
+  /// nothing of what lies there.
+  std::optional<double> unsolved_below, unsolved_above;
 
   /// The same distribution of nu with log E of a region (0: the first, which is this one).
   Posterior of_region(Index region) const;

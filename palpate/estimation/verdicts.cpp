@@ -403,6 +403,16 @@ std::optional<Verdict> several_minima(const Starts& starts) {
                                        "`--young-modulus-start`, or press otherwise (other loads, another place) so that they part."};
 }
 
+std::optional<Verdict> nu_not_explored(const Posterior& posterior) {
+  if (!posterior.unsolved_below && !posterior.unsolved_above) return std::nullopt;
+  std::string where;
+  if (posterior.unsolved_below) where = number(*posterior.unsolved_below, "{:.3f}") + " and below";
+  if (posterior.unsolved_above) where += (where.empty() ? "" : ", nor at ") + number(*posterior.unsolved_above, "{:.3f}") + " and above";
+  return Verdict{"nu_not_explored", "No equilibrium of the object under these loads was found with a Poisson ratio of " + where +
+                                        ", though the data do not exclude it: the intervals of E and nu know nothing of what lies there. Press "
+                                        "less deep, or say what nu may be (`--poisson-range`)."};
+}
+
 Verdict partly_seen(const ShapeDoubt& doubt) {
   const std::optional<ShapeEffect>& effect = doubt.effect;
   std::string said = number(100 * doubt.unseen_share, "{:.0f}") + " % of the object's surface was not seen, and is a guess. ";

@@ -9,6 +9,7 @@
 #include "palpate/estimation/doubts.hpp"
 #include "palpate/estimation/objective.hpp"
 #include "palpate/estimation/optimise.hpp"
+#include "palpate/estimation/posterior.hpp"
 #include "palpate/estimation/several_starts.hpp"
 #include "palpate/estimation/shape_error.hpp"
 
@@ -30,6 +31,9 @@ std::vector<Verdict> judge(const VerdictInput& input);
 
 /// Where the search came to places that the data hardly tell apart; nothing where it did not.
 std::optional<Verdict> several_minima(const Starts& starts);
+
+/// Where no equilibrium was found at a Poisson ratio that the data do not exclude; nothing where all were.
+std::optional<Verdict> nu_not_explored(const Posterior& posterior);
 
 /// Of an object that was not seen from all sides.
 Verdict partly_seen(const ShapeDoubt& doubt);

@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "palpate/estimation/verdicts.hpp"
 #include "pushed_block.hpp"
 
 namespace palpate::estimation {
@@ -30,18 +31,18 @@ struct Fitted {
   Unknowns unknowns;
   std::unique_ptr<ForwardModel> model;
   std::unique_ptr<Objective> objective;
+  Inputs inputs;
   Optimum optimum;
   Loss loss;
 
   /// @param upper  of nu's prior
-  Fitted(double sigma_m, double upper, double true_nu) {
+  Fitted(double sigma_m, double upper, double true_nu, const std::string& material = "linear") {
     recording.model.poisson_upper = upper;
-    model = std::make_unique<ForwardModel>(recording, simulated(kuhn_block(3, 2, 2, block_size_m), "linear"), unknowns);
+    model = std::make_unique<ForwardModel>(recording, simulated(kuhn_block(3, 2, 2, block_size_m), material), unknowns);
     // Markers: no correspondences, no robust loss, so that the cost is smooth. Made without noise by this very model.
     VectorX truth = unknowns.prior_mean();
     truth(log_young) = std::log(2e4);
     truth(poisson) = true_nu;
-    Inputs inputs;
     for (std::size_t s = 0; s < model->step_count(); ++s) {
       const Points rest_m = model->object().surface.rest().vertices_m;
       Markers markers;
@@ -102,6 +103,29 @@ TEST(PosteriorAtTheBound, IsTheTruncatedNormal) {
   // Mean of a normal cut from above: -phi / Phi.
   const double mean = 0.3 - std_nu * std::exp(-0.18) / std::sqrt(2 * EIGEN_PI) / mass;
   EXPECT_NEAR(posterior.weight.dot(posterior.poisson), mean, 0.05 * std_nu);
+}
+
+TEST(PosteriorWithoutEquilibria, SaysWhereNothingWasFound) {
+  Fitted fitted(1e-4, 0.4995, 0.3, "neo_hookean");
+  ASSERT_EQ(fitted.optimum.termination, Termination::converged) << fitted.optimum.message;
+  const Posterior whole = explore_posterior(*fitted.objective, fitted.optimum, fitted.loss, 1, {});
+  ASSERT_TRUE(whole.quadrature);
+  EXPECT_FALSE(whole.unsolved_below || whole.unsolved_above);
+  EXPECT_FALSE(nu_not_explored(whole));
+  // The same object by a solver that may take no step finds none at any other nu.
+  fem::StaticsOptions no_steps;
+  no_steps.max_newton_steps = no_steps.max_load_steps = 0;
+  Unknowns unknowns;
+  ForwardModel stuck(fitted.recording, fitted.model->object(), unknowns, no_steps);
+  Objective objective(stuck, fitted.inputs, unknowns);
+  const Posterior cut = explore_posterior(objective, fitted.optimum, fitted.loss, 1, {});
+  ASSERT_TRUE(cut.unsolved_below && cut.unsolved_above);
+  EXPECT_LT(*cut.unsolved_below, fitted.optimum.unknowns(poisson));
+  EXPECT_GT(*cut.unsolved_above, fitted.optimum.unknowns(poisson));
+  const std::optional<Verdict> said = nu_not_explored(cut);
+  ASSERT_TRUE(said);
+  EXPECT_EQ(said->code, "nu_not_explored");
+  EXPECT_NE(said->message.find(" and below, nor at "), std::string::npos) << said->message;
 }
 
 }  // namespace
