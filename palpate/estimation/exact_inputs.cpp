@@ -180,7 +180,7 @@ class Exact {
             pose(*rays, rays->camera);
             if (rays->bias_std_m == 0) {
               rays->bias_std_m = errors_.depth_m;
-              biased.insert("depth_bias[" + push.name + "]");
+              biased.insert("depth_bias" + of_camera(push, rays->camera));
             }
           }
           if (auto* markers = std::get_if<Markers>(&more[s][i]); markers != nullptr && markers->rest_std_m == 0) {

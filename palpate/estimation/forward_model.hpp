@@ -253,10 +253,12 @@ class ForwardModel {
     Vec3 tare_axis = Vec3::Zero();  // zero: three unknowns, else one along this axis
   };
   const ToolErrors& errors_of(std::size_t s, std::size_t l) const { return tool_errors_[errors_of_[s][l]]; }
+  /// By how much a true force is more than its reading, apart from the scale: true = (1 + force_scale) * read + tare.
+  static Vec3 tare_n(const ToolErrors& errors, const VectorX& unknowns);
   /// What a tool whose motion is imposed presses with, and its derivatives.
   static Vec3 driven_force_n(const Body& body, const Load& load, const fem::ResponseState& at);
-  /// What the sensor reads of a true force, as a share of it: true = (1 + force_scale) * read, whether the force was given or is asked
-  /// for, so that pushes of both kinds share one scale.
+  /// What the sensor reads of a true force without tare, as a share of it: the same whether the force was given or is asked for, so
+  /// that pushes of both kinds share one scale.
   double read_of_true(const VectorX& unknowns) const;
   static Eigen::Matrix<double, 3, Eigen::Dynamic> d_driven_force(const Body& body, const Load& load, const fem::ResponseState& at);
   struct TrueForce;  // of a load: its reading without what the sensor errs by

@@ -243,11 +243,11 @@ ForwardModel::TrueForce ForwardModel::true_force(std::size_t s, std::size_t l, c
   if (force_scale_ >= 0) out.derivatives.emplace_back(force_scale_, measured);
   if (time_offset_ >= 0) out.derivatives.emplace_back(time_offset_, scale * straightened(load.force_rate_n_s));
   for (int k = 0; cross >= 0 && k < 2; ++k) out.derivatives.emplace_back(cross + k, -scale * read_along_n * across[static_cast<std::size_t>(k)]);
+  out.force_n += tare_n(errors, unknowns);
   if (errors.tare < 0) return out;
   const bool one_axis = errors.tare_axis.norm() > 0;
   for (int k = 0; k < (one_axis ? 1 : 3); ++k) {
     const Vec3 axis = one_axis ? errors.tare_axis : Vec3(Vec3::Unit(k));
-    out.force_n += unknowns(errors.tare + k) * axis;
     out.derivatives.emplace_back(errors.tare + k, axis);
   }
   return out;

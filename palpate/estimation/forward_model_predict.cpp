@@ -51,6 +51,11 @@ void ForwardModel::add_surface(std::size_t s, const VectorX& unknowns, StepPredi
 
 /// Of a rigid body all of it, whichever way its push goes: what a face without friction takes is along its normal. Of a platen whose
 /// nodes are moved the part along its motion.
+Vec3 ForwardModel::tare_n(const ToolErrors& errors, const VectorX& unknowns) {
+  if (errors.tare < 0) return Vec3::Zero();
+  return errors.tare_axis.norm() > 0 ? Vec3(unknowns(errors.tare) * errors.tare_axis) : Vec3(unknowns.segment<3>(errors.tare));
+}
+
 Vec3 ForwardModel::driven_force_n(const Body& body, const Load& load, const fem::ResponseState& at) {
   const int m = body.motion_column.at(load.tool), contact = m - body.node_motions;
   if (contact < 0) return at.reaction_n(m) * load.direction.normalized();
@@ -88,11 +93,8 @@ void ForwardModel::add_readings(std::size_t s, const Body& body, const Coefficie
     if (load.travel_m) {
       const int m = body.motion_column.at(load.tool);
       travel_m = c.motion(m) + support_compliance(unknowns) * given_way_along(s, load);
-      out.force_n[l] = read_share * driven_force_n(body, load, at);
+      out.force_n[l] = read_share * (driven_force_n(body, load, at) - tare_n(errors_of(s, l), unknowns));
       if (time_offset_ >= 0) out.force_n[l] -= unknowns(time_offset_) * load.force_rate_n_s;
-      const ToolErrors& errors = errors_of(s, l);
-      if (errors.tare < 0) continue;
-      out.force_n[l] += errors.tare_axis.norm() > 0 ? Vec3(unknowns(errors.tare) * errors.tare_axis) : Vec3(unknowns.segment<3>(errors.tare));
     } else {
       out.force_n[l] = load.force_n.value_or(Vec3::Zero());
       const std::vector<LoadPart> parts = load_parts(s, l, body, unknowns);
@@ -224,7 +226,8 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     if (!now.loads[l].travel_m) continue;
     if (force_scale_ >= 0) {
       const Index at_scale = reading_column(force_scale_);
-      out.d_force[l].col(at_scale) -= read_share * read_share * driven_force_n(body, now.loads[l], at);
+      out.d_force[l].col(at_scale) -=
+          read_share * read_share * (driven_force_n(body, now.loads[l], at) - tare_n(errors_of(s, l), unknowns));
     }
     if (time_offset_ >= 0) {
       const Index at_offset = reading_column(time_offset_);
@@ -236,7 +239,7 @@ StepPrediction ForwardModel::unchanged(std::size_t s, const VectorX& unknowns, W
     for (int k = 0; k < (along ? 1 : 3); ++k) {
       const Index at_tare = reading_column(errors.tare + k);
       const Vec3 axis = along ? errors.tare_axis : Vec3(Vec3::Unit(k));
-      out.d_force[l].col(at_tare) += axis;
+      out.d_force[l].col(at_tare) -= read_share * axis;
     }
   }
   return out;

@@ -137,7 +137,11 @@ TEST(SlantedTool, PressesAlongTheNormalOfASmoothFace) {
       EXPECT_GT(sideways, 0.15);
     }
     at(unknowns.named({"force_scale"}).at(0)) = 0.01;
+    const Vec3 tare_n(0.02, -0.03, 0.04);
+    at.segment<3>(unknowns.named({"force_tare[push]_x"}).at(0)) = tare_n;
     const StepPrediction scaled = model.predict(1, at);
+    // As of a force that is given: true = (1 + scale) read + tare.
+    EXPECT_LT((1.01 * scaled.force_n[0] + tare_n - force_n).norm(), 1e-6 * force_n.norm());
     for (int k = 0; k < unknowns.size(); ++k) {
       const double h = k <= poisson ? 1e-5 : 1e-3 * unknowns[k].prior_std;
       VectorX ahead = at, behind = at;

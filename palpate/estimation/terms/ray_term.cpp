@@ -9,6 +9,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/grazing.hpp"
+#include "palpate/estimation/names_of_unknowns.hpp"
 #include "palpate/estimation/terms/surface_terms.hpp"
 #include "palpate/geometry/ray_bundle.hpp"
 
@@ -401,7 +402,7 @@ std::unique_ptr<Term> make_ray_term(const RayObservation& observation, const Ter
   if (!(observation.rays.sigma_m.minCoeff() > 0)) throw Error("the depth's standard deviation must be positive", where);
   int bias = -1;
   if (observation.bias_std_m > 0) {
-    const std::string name = "depth_bias[" + context.model.push(context.step).name + "]";
+    const std::string name = "depth_bias" + of_camera(context.model.push(context.step), observation.camera);
     if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, observation.bias_std_m});
     bias = context.shared[name];
   }

@@ -22,7 +22,7 @@ namespace palpate::estimation {
 struct RayObservation {
   RayCloud rays;
   double pose_std_m = 0, pose_std_rad = 0;
-  double bias_std_m = 0;  ///< one common depth offset a push
+  double bias_std_m = 0;  ///< one common depth offset a push and camera
   std::optional<LensScatter> scatter = {};  ///< nothing: the lens spreads no light. One share for all frames
   /// The camera of several frames, whose pose errs alike in all of them, seen from itself; empty: this frame errs alone. What is
   /// common and what is the frame's own have a standard deviation of pose_std each: a calibration errs in the one way, an arm
