@@ -73,6 +73,7 @@ nlohmann::json json_of(const acquisition::PushPlan& plan, const acquisition::Pus
           {"stop", acquisition::to_words(report.stop)},
           {"message", report.message},
           {"steps", report.steps},
+          {"blank_images", report.blank_images},
           {"highest_force_n", report.highest_force_n},
           {"deepest_m", report.deepest_m},
           {"overshoot_n", report.overshoot_n},

@@ -174,8 +174,8 @@ LoopPush loop_push(const ExploredPush& push, const PushScene& scene) {
 
 MadePush made_push(const acquisition::PushReport& report) {
   return {acquisition::to_words(report.stop), report.message, acquisition::is_at_a_limit(report.stop), report.contact_m, report.highest_force_n,
-          report.deepest_m, report.overshoot_n, report.steps, report.unsettled, report.compared, report.came_back, report.changed_share,
-          report.drift_n, report.turned_rad, report.blind_retreat_m};
+          report.deepest_m, report.overshoot_n, report.steps, report.blank_images, report.unsettled, report.compared, report.came_back,
+          report.changed_share, report.drift_n, report.turned_rad, report.blind_retreat_m};
 }
 
 py::object push_with(const py::object& robot, const py::object& given, const py::dict& options, const py::object& on_step, const py::object& progress) {

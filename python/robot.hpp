@@ -42,7 +42,7 @@ struct MadePush {
   bool whole = false;
   Vec3 contact_m = Vec3::Zero();
   double highest_force_n = 0, deepest_m = 0, overshoot_n = 0;
-  int steps = 0;
+  int steps = 0, blank_images = 0;
   std::vector<int> unsettled;
   bool compared = false, came_back = true;
   double changed_share = 0, drift_n = 0, turned_rad = 0;
@@ -62,6 +62,7 @@ struct Noun<MadePush> {
     field("deepest_m", &MadePush::deepest_m, "");
     field("overshoot_n", &MadePush::overshoot_n, "of the highest force above the limit, where noise does not explain it");
     field("steps", &MadePush::steps, "that were recorded");
+    field("blank_images", &MadePush::blank_images, "without one pixel that has a depth: their steps have none");
     field("unsettled", &MadePush::unsettled, "steps whose force still crept");
     field("compared", &MadePush::compared, "images from before and after the push");
     field("came_back", &MadePush::came_back, "False: the object is not what it was; says nothing if not compared");

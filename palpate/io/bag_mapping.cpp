@@ -242,8 +242,11 @@ BagMapping read_mapping(const std::filesystem::path& path) {
   const YamlField top = YamlField::parse(context.folder.read(path.filename().string(), path.string()), path.string());
   YamlKeys keys(top);
   const YamlField format = keys.required("format", std::string("write 'format: ") + format_name + "'");
-  if (format.text() != format_name)
+  if (format.text() != format_name) {
+    if (format.text().starts_with("palpate-recording/"))
+      format.fail("this is a recording, not the mapping of a bag; give its folder as the recording");
     format.fail("'" + format.text().substr(0, 60) + "' is not a format that this version reads; it reads " + format_name);
+  }
   const YamlField topics = keys.required("topics", "say which topic holds what; `palpate info BAG` suggests it");
   const YamlField frames = keys.required("frames", "name the frames: {base: ..., tip: ...}");
   const YamlField steps = keys.required("steps", "say how steps are found: {by: detection}");

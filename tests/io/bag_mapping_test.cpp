@@ -53,6 +53,7 @@ TEST_F(Mapping, ErrorsNameFileLineFieldAndCure) {
     std::vector<const char*> said;
   } cases[] = {
       {"palpate-mapping/1", "palpate-mapping/9", {"mapping.yaml:1: format", "palpate-mapping/1"}},
+      {"palpate-mapping/1", "palpate-recording/1", {"mapping.yaml:1: format", "is a recording"}},
       {"frames: {base", "framse: {base", {"key 'frames' is missing", "is 'framse' in line"}},
       {"frames: {base: base", "frames: {bse: base", {"key 'base' is missing", "frames"}},
       {"wrench: /wrench", "wrench: /wrenhc", {"topics.wrench", "no topic '/wrenhc'", "did you mean '/wrench'"}},

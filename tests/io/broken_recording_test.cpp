@@ -320,6 +320,8 @@ TEST_F(BrokenRecording, WrongWords) {
   expect_refused("recording.yaml:15", "must not be negative");
   change_index("palpate-recording/1", "palpate-recording/2");
   expect_refused("recording.yaml:1: format", "palpate-recording/1");
+  change_index("palpate-recording/1", "palpate-mapping/1");
+  expect_refused("recording.yaml:1: format", "--mapping");
 }
 
 TEST_F(BrokenRecording, TravelInMillimetres) {

@@ -162,6 +162,10 @@ class Warnings(unittest.TestCase):
         report, words = self.warned("top: how large the object is nobody said", Gantry(), unknown, [0.52, 0.01, 0.5])
         self.assertEqual(report.blind_retreat_m, 0.15)
         self.assertIn("`blind_retreat_m`", words)  # and not the program's option
+        def blank(frame):
+            frame.depth_m[:] = 0
+        report, _ = self.warned("of the camera's images held no depth at all", Faulty(frame=blank))
+        self.assertGreaterEqual(report.blank_images, report.steps)
         report, words = self.warned("top: the force passed its limit by", Gantry(young_pa=2e8))
         self.assertGreater(report.overshoot_n, 1)
         self.assertIn("set a smaller increment_m or push_speed_m_s", words)
