@@ -16,6 +16,7 @@
 #include "palpate/estimation/self_check.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/identify.hpp"
+#include "palpate/recording_oddities.hpp"
 
 namespace palpate::cli {
 namespace {

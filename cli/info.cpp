@@ -19,6 +19,7 @@
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
 #include "palpate/io/recording_names.hpp"
+#include "palpate/recording_oddities.hpp"
 #include "palpate/sensing/static_scatter.hpp"
 
 namespace palpate::cli {

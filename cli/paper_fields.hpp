@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The answers of `palpate paper` as JSON, there and back without a loss: every struct names its fields once, for both ways.
+// The answers of `palpate paper` as JSON, there and back without a loss: every struct names its fields once, for both ways. A field that
+// earlier files of the same format have not is named with `Since::later`, and then left as it is.
 #pragma once
 
 #include <cmath>
@@ -13,6 +14,8 @@
 #include "cli/paper_trial.hpp"
 
 namespace palpate::cli {
+
+enum class Since { first, later };
 
 template <class Each>
 void fields(Each each, FitIteration& a) {
@@ -72,6 +75,11 @@ void fields(Each each, ErrorSurface& a) {
 }
 
 template <class Each>
+void fields(Each each, StartAnswer& a) {
+  each("young_modulus_pa", a.young_modulus_pa), each("poisson_ratio", a.poisson_ratio), each("paper", a.paper), each("palpate", a.palpate);
+}
+
+template <class Each>
 void fields(Each each, TrialAnswer& a) {
   each("seed", a.seed), each("failed", a.failed);
   each("true_young_modulus_pa", a.young_modulus_pa), each("true_poisson_ratio", a.poisson_ratio), each("tetrahedra", a.tetrahedra);
@@ -80,6 +88,7 @@ void fields(Each each, TrialAnswer& a) {
   each("samples_left_out", a.left_out), each("other_law", a.other_law), each("palpate_other_law", a.other), each("readings", a.readings), each("sites", a.sites);
   each("verdicts_without_regions", a.as_one_verdicts), each("unused_place", a.unused), each("registrations", a.pictures);
   each("views", a.views), each("samples", a.samples), each("error_surface", a.surface);
+  each("unused_stop", a.unused_stop, Since::later), each("other_starts", a.starts, Since::later);
 }
 
 template <class Each>
@@ -114,12 +123,12 @@ nlohmann::json written(const T& value) {
     return {{"columns", value.cols()}, {"values", values}};
   } else {
     nlohmann::json out = nlohmann::json::object();
-    fields([&](const char* name, auto& field) { out[name] = written(field); }, const_cast<T&>(value));
+    fields([&](const char* name, auto& field, Since = Since::first) { out[name] = written(field); }, const_cast<T&>(value));
     return out;
   }
 }
 
-/// @throws nlohmann::json::exception when a field is missing or of another kind
+/// @throws nlohmann::json::exception when a field that was there from the first is missing, or one is of another kind
 template <class T>
 void read_into(T& value, const nlohmann::json& from) {
   if constexpr (std::is_floating_point_v<T>) {
@@ -148,7 +157,10 @@ void read_into(T& value, const nlohmann::json& from) {
       value(i / columns, i % columns) = read;
     }
   } else {
-    fields([&](const char* name, auto& field) { read_into(field, from.at(name)); }, value);
+    const auto take = [&](const char* name, auto& field, Since since = Since::first) {
+      if (since == Since::first || from.contains(name)) read_into(field, from.at(name));
+    };
+    fields(take, value);
   }
 }
 

@@ -82,6 +82,10 @@ std::string surface_figure(const TrialAnswer& trial) {
   surface.error_m2.minCoeff(&lowest_row, &lowest_column);
   axes.dot(x_at(static_cast<double>(lowest_row)), y_at(static_cast<double>(lowest_column)), 7, {255, 255, 255});
   axes.dot(x_at(static_cast<double>(lowest_row)), y_at(static_cast<double>(lowest_column)), 5.5, lowest_colour);
+  for (const StartAnswer& from : trial.starts) {
+    path(from.paper, paper_colour);
+    path(from.palpate, own_colour);
+  }
   path(trial.paper, paper_colour);
   path(trial.palpate, own_colour);
   if (truth_known(trial)) axes.dot(std::log10(trial.young_modulus_pa), trial.poisson_ratio, 3, truth_colour);

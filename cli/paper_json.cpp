@@ -67,9 +67,14 @@ nlohmann::json json_of(const TrialAnswer& trial) {
   return out;
 }
 
+nlohmann::json json_of(const Foresight& one) {
+  return {{"seeds", one.seeds}, {"force_bias_percent", one.force_bias_percent}, {"force_rms_percent", one.force_rms_percent}, {"dent_m", one.dent_m}};
+}
+
 nlohmann::json json_of(const Score& score) {
   return {{"asked", score.asked},                       {"without_answer", score.without},         {"with_interval", score.with_interval},
           {"bias_percent", score.bias_percent},         {"spread_percent", score.spread_percent},  {"rms_percent", score.rms_percent},
+          {"median_percent", score.median_percent},
           {"poisson_bias", score.poisson_bias},         {"poisson_spread", score.poisson_spread},  {"poisson_rms", score.poisson_rms},
           {"inside_95", score.inside_95},               {"poisson_inside_95", score.poisson_inside_95},
           {"solves", score.solves},                     {"seconds", score.seconds},                {"most_load_cases", score.most_load_cases}};
@@ -86,6 +91,8 @@ nlohmann::json json_of(const SceneAnswers& answers) {
     out["trials"].back().erase("true_poisson_ratio");
   }
   if (answers.scene->apparent) return out;
+  const SceneForesight foresight = foresight_of(answers.trials);
+  out["predictions"] = {{"paper", json_of(foresight.paper)}, {"palpate", json_of(foresight.palpate)}, {"dent_if_nothing_moved_m", foresight.still_m}};
   const SceneScores scores = scores_of(answers.trials);
   out["scores"] = {{"paper", json_of(scores.paper)},
                    {"paper_linear_tetrahedra", json_of(scores.paper_coarse)},

@@ -36,9 +36,9 @@ MethodAnswer summary(const Identification& answer, double seconds) {
 }
 
 MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
-                      const OnProgress& progress) {
+                      const OnProgress& progress, estimation::PaperDistance distance) {
   const Watch watch;
-  const Identification answer = estimation::fit_as_in_paper(given.recording, given.object, given.inputs, options, progress, memory);
+  const Identification answer = estimation::fit_as_in_paper(given.recording, given.object, given.inputs, options, progress, memory, distance);
   return summary(answer, watch.seconds());
 }
 

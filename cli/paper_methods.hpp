@@ -8,6 +8,7 @@
 
 #include "cli/paper_inputs.hpp"
 #include "palpate/core/identification.hpp"
+#include "palpate/estimation/paper_method.hpp"
 
 namespace palpate::cli {
 
@@ -36,7 +37,9 @@ MethodAnswer no_answer();
 MethodAnswer summary(const Identification& answer, double seconds);
 
 MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
-                      const OnProgress& progress);
+                      const OnProgress& progress,
+                      estimation::PaperDistance distance = estimation::PaperDistance::nearest_vertex);
+
 /// @param whole   if given: all that was found
 /// @param fitted  if given: of which samples; loads too high for the model are left out (deep_loads.hpp)
 MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,

@@ -10,11 +10,11 @@
 namespace palpate::cli {
 namespace {
 
-/// "+3.1 % &plusmn; 2.0 %", "rms 3.7 %", a line each.
+/// "+3.1 % &plusmn; 2.0 %", "rms 3.7 %", "median 2.4 %", a line each.
 std::string errors(const Score& score) {
   if (score.answers == 0) return "no answer";
   return number(score.bias_percent, "{:+.1f} %") + (std::isfinite(score.spread_percent) ? number(score.spread_percent, " &plusmn; {:.1f} %") : "") +
-         number(score.rms_percent, "<br>rms {:.1f} %") +
+         number(score.rms_percent, "<br>rms {:.1f} %") + (score.answers > 1 ? number(score.median_percent, "<br>median {:.1f} %") : "") +
          (score.without > 0 ? fmt::format("<br>{} of {} unanswered", score.without, score.asked) : "");
 }
 
@@ -57,8 +57,8 @@ std::string overview_table(const std::vector<SceneAnswers>& scenes) {
                         number(known ? scores.paper.seconds : spread_of(paper).seconds, "{:.1f}"),
                         number(known ? scores.palpate.seconds : spread_of(palpate).seconds, "{:.1f}"));
   }
-  return html + "</table>\n<p class=\"small\">Errors of E: mean &plusmn; standard deviation of its logarithm over seeds (and sites), and "
-                "root mean square. Seconds a seed, by the clock.</p>\n";
+  return html + "</table>\n<p class=\"small\">Errors of E: mean &plusmn; standard deviation of its logarithm over seeds (and sites), "
+                "root mean square, and the median of its size. Seconds a seed, by the clock.</p>\n";
 }
 
 std::string seed_table(const SceneAnswers& answers) {

@@ -41,6 +41,44 @@ std::string found(const MethodAnswer& answer) {
          (answer.converged ? "" : ", without converging");
 }
 
+/// Share of the grid's inner points at which the error, over log E and nu, bends upwards whichever way one goes.
+std::string convexity(const ErrorSurface& surface) {
+  const MatrixX& e = surface.error_m2;
+  if (e.rows() < 3 || e.cols() < 3 || !e.allFinite()) return {};
+  Eigen::Index row = 0, column = 0;
+  e.minCoeff(&row, &column);
+  int inner = 0, convex = 0;
+  bool at_lowest = false;
+  for (Eigen::Index i = 1; i + 1 < e.rows(); ++i)
+    for (Eigen::Index k = 1; k + 1 < e.cols(); ++k) {
+      const double along_e = e(i + 1, k) - 2 * e(i, k) + e(i - 1, k), along_nu = e(i, k + 1) - 2 * e(i, k) + e(i, k - 1),
+                   mixed = 0.25 * (e(i + 1, k + 1) - e(i + 1, k - 1) - e(i - 1, k + 1) + e(i - 1, k - 1));
+      const bool bends = along_e > 0 && along_e * along_nu > mixed * mixed;
+      ++inner;
+      convex += bends;
+      at_lowest = at_lowest || (bends && i == row && k == column);
+    }
+  return fmt::format(" It is convex in (log E, &nu;) at {} of the {} inner points of the grid{}.", convex, inner,
+                     at_lowest ? ", the lowest among them" : row == 0 || row + 1 == e.rows() || column == 0 || column + 1 == e.cols()
+                                                                 ? "; the lowest is at its rim"
+                                                                 : ", not at the lowest");
+}
+
+/// Where both methods come to from elsewhere.
+std::string starts_table(const TrialAnswer& trial) {
+  if (trial.starts.empty()) return {};
+  std::string html = "<table><tr><th>start</th><th>the paper's method comes to</th><th>palpate comes to</th></tr>\n";
+  const auto place = [](double young_pa, double nu) { return std::isfinite(young_pa) ? pascal(young_pa) + fmt::format(", &nu; {:.3f}", nu) : "none"; };
+  const auto row = [&](const std::string& start, const MethodAnswer& paper, const MethodAnswer& palpate) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", start, place(paper.young_modulus_pa, paper.poisson_ratio),
+                        place(palpate.young_modulus_pa, palpate.poisson_ratio));
+  };
+  row("its own (as above)", trial.paper, trial.palpate);
+  for (const StartAnswer& from : trial.starts)
+    row(place(from.young_modulus_pa, from.poisson_ratio) + (&from == &trial.starts.back() ? ", the grid's lowest" : ""), from.paper, from.palpate);
+  return html + "</table>\n";
+}
+
 std::string grid_search(const TrialAnswer& trial) {
   const ErrorSurface& surface = trial.surface;
   if (surface.error_m2.size() == 0) return {};
@@ -50,12 +88,14 @@ std::string grid_search(const TrialAnswer& trial) {
   Eigen::Index row = 0, column = 0;
   surface.error_m2.minCoeff(&row, &column);
   return fmt::format("<p class=\"small\">Grid search: the smallest value of the paper's error function on {} is {:.4g} mm&sup2;, at E = {} and "
-                     "&nu; = {:.3f}; where the paper's method ended it is {:.4g} mm&sup2;, {}.</p>\n",
+                     "&nu; = {:.3f}; where the paper's method ended it is {:.4g} mm&sup2;, {}.{}</p>\n",
                      points, 1e6 * surface.smallest_m2(), pascal(surface.young_modulus_pa(row)), surface.poisson_ratio(column),
                      1e6 * surface.at_found_m2,
                      surface.at_found_m2 <= surface.smallest_m2() * 1.001
                          ? "and no point of the grid is lower by a thousandth: it reached the minimum of its own objective"
-                         : "so it did not reach the minimum of its own objective");
+                         : "so it did not reach the minimum of its own objective",
+                     convexity(surface)) +
+         starts_table(trial);
 }
 
 std::string section(const SceneAnswers& answers) {
@@ -69,13 +109,13 @@ std::string section(const SceneAnswers& answers) {
                                        first.sites.empty() ? "" : " at " + first.sites.front().site, first.poisson_ratio);
   html += fmt::format("{} quadratic tetrahedra. The paper's method {}; palpate {}.", first.tetrahedra, found(first.paper), found(first.palpate));
   if (!first.other_law.empty()) html += fmt::format(" With the {} law palpate {}.", first.other_law, found(first.other));
-  if (first.left_out > 0)
+  if (const std::size_t used = first.readings.size() - static_cast<std::size_t>(first.left_out); first.left_out > 0)
     html += fmt::format(" Both answer from the lower {} of {} samples: under the others the pad presses with more than {:.1f} E, where the simulated "
                         "patch caves in.",
-                        first.readings.size() - static_cast<std::size_t>(first.left_out), first.readings.size(), estimation::largest_pressure);
+                        used, first.readings.size(), estimation::largest_pressure);
   html += "</p>\n<p>Palpate's verdicts: " + listed(first.palpate.verdicts) +
           (first.other_law.empty() ? "" : "; with the " + first.other_law + " law: " + listed(first.other.verdicts)) + ".</p>\n";
-  html += site_table(first) + unused_table(scene, first) + sample_table(first, !scene.apparent && first.sites.empty());
+  html += site_table(first) + unused_table(scene, first) + foresight_table(answers) + sample_table(first, !scene.apparent && first.sites.empty());
   html += score_table(answers) + failed_table(answers.trials) + seed_table(answers);
   html += grid_search(first);
   html += figure(surface_figure(first), "The paper's error function over (E, &nu;), dark = small, with the paths of both methods; the large dot is the lowest point of the grid.");

@@ -42,6 +42,7 @@ struct Moments {
 Score score_of(const std::vector<Compared>& all, const std::vector<Effort>& efforts) {
   Score score;
   Moments young, poisson, solves, seconds;
+  std::vector<double> sizes;
   for (const Compared& one : all) {
     const MethodAnswer& answer = *one.answer;
     ++score.asked;
@@ -51,6 +52,7 @@ Score score_of(const std::vector<Compared>& all, const std::vector<Effort>& effo
     }
     ++score.answers;
     young.add(100 * std::log(answer.young_modulus_pa / one.young_modulus_pa));
+    sizes.push_back(100 * std::abs(std::log(answer.young_modulus_pa / one.young_modulus_pa)));
     poisson.add(answer.poisson_ratio - one.poisson_ratio);
     if (!std::isfinite(answer.lower_95_pa)) continue;
     ++score.with_interval;
@@ -62,6 +64,7 @@ Score score_of(const std::vector<Compared>& all, const std::vector<Effort>& effo
     seconds.add(effort.seconds);
     score.most_load_cases = std::max(score.most_load_cases, effort.load_cases);
   }
+  score.median_percent = median(sizes);
   score.bias_percent = young.mean(), score.spread_percent = young.spread(), score.rms_percent = young.rms();
   score.poisson_bias = poisson.mean(), score.poisson_spread = poisson.spread(), score.poisson_rms = poisson.rms();
   score.solves = solves.mean(), score.seconds = seconds.mean();
@@ -74,8 +77,10 @@ struct Answers {
   std::vector<Effort> efforts;
   void add(const TrialAnswer& trial, const MethodAnswer& answer) {
     compared.push_back({trial.young_modulus_pa, trial.poisson_ratio, &answer});
+    if (!answered(answer)) return;
     efforts.emplace_back().add(answer);
-    if (!answered(answer)) efforts.pop_back();
+    // The fit with the other law is of the samples that this one left: it took both.
+    if (&answer == &trial.other) efforts.back().add(trial.palpate);
   }
   Score score() const { return score_of(compared, efforts); }
 };
@@ -104,12 +109,6 @@ void add_sites(const TrialAnswer& trial, Answers& paper, Answers& palpate, Answe
 }
 
 std::string also(const std::string& names, const std::string& one) { return names + (names.empty() ? "" : ", ") + one; }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return nan;
-  std::sort(values.begin(), values.end());
-  return 0.5 * (values[values.size() / 2] + values[(values.size() - 1) / 2]);
-}
 
 }  // namespace
 
@@ -148,9 +147,36 @@ SceneScores scores_of(const std::vector<TrialAnswer>& trials) {
   return out;
 }
 
+SceneForesight foresight_of(const std::vector<TrialAnswer>& trials) {
+  SceneForesight out;
+  Moments paper_force, palpate_force, paper_dent, palpate_dent, still;
+  for (const TrialAnswer& trial : trials) {
+    const auto expected = [&](const UnusedStep& step) { return trial.other_law.empty() ? step.palpate : step.other; };
+    const auto forces = [&](const UnusedStep& step) { return std::isfinite(step.paper.force_n) && std::isfinite(expected(step).force_n); };
+    const auto dents = [&](const UnusedStep& step) { return std::isfinite(step.paper.dent_m) && std::isfinite(expected(step).dent_m); };
+    const auto last = std::find_if(trial.unused.rbegin(), trial.unused.rend(), [&](const UnusedStep& step) { return forces(step) || dents(step); });
+    if (last == trial.unused.rend()) continue;
+    if (forces(*last)) {
+      paper_force.add(100 * (last->paper.force_n / last->force_n - 1));
+      palpate_force.add(100 * (expected(*last).force_n / last->force_n - 1));
+    }
+    if (dents(*last)) {
+      paper_dent.add(last->paper.dent_m);
+      palpate_dent.add(expected(*last).dent_m);
+      still.add(last->dent_still_m);
+    }
+  }
+  const auto foresight = [](const Moments& force, const Moments& dent) {
+    return Foresight{std::max(force.count, dent.count), force.mean(), force.rms(), dent.rms()};
+  };
+  out.paper = foresight(paper_force, paper_dent), out.palpate = foresight(palpate_force, palpate_dent);
+  out.still_m = still.rms();
+  return out;
+}
+
 std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
   std::vector<double> shares, simulated, solved;
-  std::string worse, dear, apart, laws;
+  std::string worse, dear, apart, laws, errors, intervals;  // names of scenes
   int inside = 0, asked = 0;
   for (const SceneAnswers& scene : scenes) {
     if (scene.scene->apparent) continue;
@@ -159,7 +185,13 @@ std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
     asked += scores.palpate.asked;
     const std::string name(scene.scene->name);
     const std::string& law = scene.shown().other_law;
-    if (!law.empty()) laws = also(laws, fmt::format("palpate with the {} law in {}", law, name));
+    if (!law.empty()) {
+      const Score& same = scores.palpate_with_the_papers_law;
+      const std::string of_law = fmt::format("palpate with the {} law in {}", law, name);
+      laws = also(laws, of_law);
+      errors = also(errors, of_law + number(same.rms_percent, " (with the paper's method's law: {:.1f} %)"));
+      intervals = also(intervals, of_law + fmt::format(" (with the paper's method's law: {} of {} there)", same.inside_95, same.asked));
+    }
     if (scores.apart > 0) apart = also(apart, fmt::format("{} of {} in {}", scores.apart, scores.paper.asked, name));
     // Where the paper's method has no answer nothing is compared: that decides for neither.
     const Score &paper = scores.paper_compared, &palpate = scores.palpate_compared;
@@ -172,19 +204,19 @@ std::vector<Claim> claims_of(const std::vector<SceneAnswers>& scenes) {
     if (paper.most_load_cases > 0) solved.push_back(static_cast<double>(palpate.most_load_cases) / paper.most_load_cases);
   }
   if (asked == 0) return {};
-  const std::string by_law = laws.empty() ? "" : "; " + laws;
-  const std::string left_out = by_law + (apart.empty() ? "" : "; left out, for the paper's method has no answer: " + apart);
+  const auto after = [](const std::string& words) { return words.empty() ? "" : "; " + words; };
+  const std::string left_out = apart.empty() ? "" : "; left out, for the paper's method has no answer: " + apart;
   const double middle = median(shares), in = 100.0 * inside / asked;
   const bool any = !shares.empty();
   const auto scenes_named = [&](const std::string& names) { return !any ? "nothing to compare" : names.empty() ? std::string("in all") : "not in: " + names; };
-  return {{"palpate's rms error of E is smaller in every scene", any && worse.empty(), scenes_named(worse) + left_out},
+  return {{"palpate's rms error of E is smaller in every scene", any && worse.empty(), scenes_named(worse) + after(errors) + left_out},
           {"in the median scene it is at most half", middle <= 0.5,
            (!any                     ? "nothing to compare"
             : std::isfinite(middle) ? fmt::format("{:.2f} of the paper's method's", middle)
                                     : "palpate left out an answer there") +
-               left_out},
+               after(laws) + left_out},
           {"at least 88 % of the truths lie in palpate's 95 % intervals (no interval: not inside)", in >= 88,
-           fmt::format("{:.0f} % of {}", in, asked) + by_law},
+           fmt::format("{:.0f} % of {}", in, asked) + after(intervals)},
           {"palpate's finite elements are solved for at most a fifth as many load cases as the paper's method asks for simulations, "
            "each of which would be one without unit loads",
            any && dear.empty(),

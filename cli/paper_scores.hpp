@@ -22,9 +22,20 @@ struct Score {
   int asked = 0, answers = 0, without = 0;
   int with_interval = 0, inside_95 = 0, poisson_inside_95 = 0;  ///< of those asked: without an interval nothing is inside
   double bias_percent = 0, spread_percent = 0, rms_percent = 0;  ///< of log E; NaN: no answer at all
+  double median_percent = 0;                                     ///< of its size: a few answers far off are not in it
   double poisson_bias = 0, poisson_spread = 0, poisson_rms = 0;
   double solves = 0, seconds = 0;  ///< means over seeds that were answered, all sites together
   int most_load_cases = 0;         ///< in a seed: later ones take over what does not change
+};
+/// What a method expects of the highest force of the pushes that no method has seen, over the seeds. NaN: nothing to compare.
+struct Foresight {
+  int seeds = 0;
+  double force_bias_percent = no_value, force_rms_percent = no_value;  ///< of the force at the measured travel, over the true one
+  double dent_m = no_value;  ///< root mean square of the dents' rms distances
+};
+struct SceneForesight {
+  Foresight paper, palpate;
+  double still_m = no_value;  ///< dents, if nothing is expected to move
 };
 struct SceneScores {
   Score paper, paper_coarse, palpate;
@@ -38,6 +49,9 @@ struct SceneScores {
 const MethodAnswer& counted(const TrialAnswer& trial);
 /// Of an object with regions, every site's E counts.
 SceneScores scores_of(const std::vector<TrialAnswer>& trials);
+
+/// Of seeds in which both methods expect something. Palpate's is that of the answer that counts.
+SceneForesight foresight_of(const std::vector<TrialAnswer>& trials);
 
 /// A line of what the evaluation has to show.
 struct Claim {

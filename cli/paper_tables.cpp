@@ -98,7 +98,8 @@ std::string sample_table(const TrialAnswer& trial, bool truth_known) {
 }
 
 std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial) {
-  if (trial.unused.empty()) return {};
+  if (trial.unused.empty())
+    return trial.unused_stop.empty() ? std::string() : "<p>The push that was not to be used did not come about: " + escaped(trial.unused_stop) + "</p>\n";
   std::vector<std::string> names{"the paper's method", "palpate"};
   if (!trial.other_law.empty()) names.push_back("palpate, " + trial.other_law + " law");
   const bool travels = std::any_of(trial.unused.begin(), trial.unused.end(), [](const auto& step) { return std::isfinite(step.travel_m); });
@@ -134,6 +135,21 @@ std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial)
     html += "</tr>\n";
   }
   return html + "</table>\n";
+}
+
+std::string foresight_table(const SceneAnswers& answers) {
+  const SceneForesight all = foresight_of(answers.trials);
+  if (all.paper.seeds < 2) return {};
+  std::string html = "<table><tr><th>highest force of such a push</th><th>seeds</th><th>force at the measured travel: bias</th><th>rms</th>"
+                     "<th>dent, rms</th></tr>\n";
+  const auto row = [&](const std::string& name, const Foresight& one) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", name, one.seeds,
+                        number(one.force_bias_percent, "{:+.1f} %"), number(one.force_rms_percent, "{:.1f} %"), number(1000 * one.dent_m, "{:.2f} mm"));
+  };
+  row("the paper's method", all.paper);
+  row(answers.scene->other_law.empty() ? "palpate" : fmt::format("palpate, {} law", answers.scene->other_law), all.palpate);
+  return html + fmt::format("<tr><td>if nothing moved</td><td>{}</td><td></td><td></td><td>{}</td></tr></table>\n", all.paper.seeds,
+                            number(1000 * all.still_m, "{:.2f} mm"));
 }
 
 std::string failed_table(const std::vector<TrialAnswer>& trials) {
@@ -183,6 +199,27 @@ std::string apparent_table(const std::vector<TrialAnswer>& trials) {
 
 }  // namespace
 
+namespace {
+
+/// How many samples a seed had, and how deep those went that both methods answer from.
+std::string about_samples(const std::vector<TrialAnswer>& trials) {
+  std::vector<double> samples, used, deepest_mm;
+  for (const TrialAnswer& trial : trials) {
+    if (trial.readings.empty()) continue;
+    const std::size_t kept = trial.readings.size() - static_cast<std::size_t>(trial.left_out);
+    samples.push_back(static_cast<double>(trial.readings.size()));
+    used.push_back(static_cast<double>(kept));
+    double deepest = 0;
+    for (std::size_t k = 0; k < kept; ++k) deepest = std::max(deepest, 1000 * trial.readings[k].travel_m);
+    deepest_mm.push_back(deepest);
+  }
+  if (samples.empty()) return {};
+  return fmt::format("A seed has {:.0f} samples, of which {:.0f} are used{} (medians). ", median(samples), median(used),
+                     median(deepest_mm) > 0 ? fmt::format(", the deepest at {:.0f} mm", median(deepest_mm)) : "");
+}
+
+}  // namespace
+
 std::string score_table(const SceneAnswers& answers) {
   const std::vector<TrialAnswer>& trials = answers.trials;
   const TrialAnswer& shown = answers.shown();
@@ -196,8 +233,8 @@ std::string score_table(const SceneAnswers& answers) {
   html += score_row(shown.other_law.empty() ? "palpate" : "palpate with the " + shown.other_law + " law, which counts", scores.palpate, true);
   if (!shown.other_law.empty()) html += score_row("palpate with the law of the paper's method", scores.palpate_with_the_papers_law, true);
   return html + fmt::format("</table>\n<p class=\"small\">{} seed{}; errors of E as differences of its logarithm, spread: their standard "
-                            "deviation. Without an interval nothing is inside. {}</p>\n",
-                            trials.size(), trials.size() == 1 ? "" : "s", about_effort());
+                            "deviation. Without an interval nothing is inside. {}{}</p>\n",
+                            trials.size(), trials.size() == 1 ? "" : "s", about_samples(trials), about_effort());
 }
 
 std::string study_table(const StudyAnswer& answer) {

@@ -14,6 +14,8 @@ std::string site_table(const TrialAnswer& trial);
 /// E of the samples alone: mean and spread, and what one took.
 std::string sample_table(const TrialAnswer& trial, bool truth_known);
 std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial);
+/// The same at the highest force of each seed, over the seeds. Empty: there was no such push, or one seed alone.
+std::string foresight_table(const SceneAnswers& answers);
 /// Of an apparent modulus: no errors.
 std::string score_table(const SceneAnswers& answers);
 /// Seeds that ended with an error, and why.

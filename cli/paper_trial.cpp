@@ -119,6 +119,25 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
   return by_region;
 }
 
+/// Far off to either side, and from the lowest point of the grid: a method that reaches the minimum of its own objective comes to where it
+/// came to before.
+void answer_starts(const Prepared& given, const estimation::FitOptions& options, SharedModels& shared, TrialAnswer& out, const OnProgress& progress) {
+  Eigen::Index row = 0, column = 0;
+  out.surface.error_m2.minCoeff(&row, &column);
+  const double young_pa = std::isfinite(out.young_modulus_pa) ? out.young_modulus_pa : out.palpate.young_modulus_pa;
+  const std::pair<double, double> starts[] = {
+      {0.2 * young_pa, 0.1}, {5 * young_pa, 0.45}, {out.surface.young_modulus_pa(row), out.surface.poisson_ratio(column)}};
+  for (const auto& [start_pa, start_nu] : starts) {
+    estimation::FitOptions there = options;
+    there.young_start_pa = start_pa;
+    there.poisson_start = start_nu;
+    StartAnswer& from = out.starts.emplace_back();
+    from.young_modulus_pa = start_pa, from.poisson_ratio = start_nu;
+    from.paper = asked([&] { return by_paper(given, there, &shared.fine.paper, progress); });
+    from.palpate = asked([&] { return by_palpate(given, there, &shared.fine.palpate, progress); });
+  }
+}
+
 /// They are drawn on the error surface alone, and are half of what a seed's file would hold.
 void drop_paths(TrialAnswer& out) {
   for (MethodAnswer* answer : {&out.paper, &out.palpate, &out.paper_coarse, &out.other}) answer->path.clear();
@@ -143,6 +162,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   if (!keeps) shared = &of_this_seed;
   estimation::FitMemory *const mine = keeps ? &shared->fine.palpate : nullptr, *const others = keeps ? &shared->other.palpate : nullptr;
   out.seed = seed;
+  out.unused_stop = trial.unused_stop;
   if (!scene.apparent) {
     out.young_modulus_pa = trial.young_modulus_pa;
     out.poisson_ratio = trial.poisson_ratio;
@@ -214,6 +234,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   }
   if (options.surface_points > 1 && by_region.empty() && std::isfinite(out.paper.young_modulus_pa))
     out.surface = error_surface(given, out.paper, scene.apparent ? out.palpate.young_modulus_pa : out.young_modulus_pa, options.surface_points, fit, progress);
+  if (out.surface.error_m2.cols() > 1) answer_starts(given, fit, *shared, out, progress);
   if (out.surface.error_m2.size() == 0) drop_paths(out);
 }
 

@@ -57,6 +57,12 @@ struct RegistrationPicture {
   Points simulated_m, registered_m;  ///< thinned
 };
 
+/// What both methods come to from a start that is not the one they have by themselves.
+struct StartAnswer {
+  double young_modulus_pa = 0, poisson_ratio = 0;
+  MethodAnswer paper, palpate;
+};
+
 /// A picture as PNG, base64.
 struct PaperView {
   std::string what;
@@ -87,10 +93,12 @@ struct TrialAnswer {
   std::vector<SiteAnswer> sites;              ///< only of an object with regions
   std::vector<std::string> as_one_verdicts;   ///< of ours when it takes such an object for homogeneous; only where asked for
   std::vector<UnusedStep> unused;
+  std::string unused_stop;                    ///< why there is none
   std::vector<RegistrationPicture> pictures;  ///< only where asked for
   std::vector<PaperView> views;               ///< only where asked for
   std::vector<SampleAnswer> samples;          ///< each sample alone; only where asked for
   ErrorSurface surface;                       ///< only where asked for
+  std::vector<StartAnswer> starts;            ///< only beside a surface of more than one nu
 };
 
 struct TrialOptions {

@@ -48,6 +48,12 @@ std::string listed(const std::vector<std::string>& codes) {
   return all.empty() ? "none" : all;
 }
 
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  return 0.5 * (values[values.size() / 2] + values[(values.size() - 1) / 2]);
+}
+
 Spread spread_of(const std::vector<const MethodAnswer*>& answers) {
   Spread spread;
   double square = 0;

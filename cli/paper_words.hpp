@@ -14,6 +14,8 @@ std::string pascal(double young_modulus_pa);
 std::string of_truth(double found_pa, double truth_pa);
 std::string interval(const MethodAnswer& answer);
 std::string number(double value, const char* format);
+/// NaN: there are none
+double median(std::vector<double> values);
 /// As text of a page.
 std::string escaped(const std::string& words);
 /// "a, b (3 times)"

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <string_view>
@@ -17,6 +18,19 @@ namespace {
 
 using estimation::PushRanking;
 using estimation::RatedPush;
+
+/// Said where an interval is not that of what was pushed: the model is another, and no further push narrows that.
+std::string verdicts_in_the_way(const Identification& answer) {
+  constexpr const char* wrong[] = {"not_converged",      "model_does_not_fit", "nuisance_beyond_prior", "inverted_elements",
+                                   "beyond_small_strain", "two_equilibria",     "young_modulus_at_bound", "several_minima",
+                                   "not_homogeneous",    "not_linear",         "hysteresis",            "not_settled",
+                                   "object_moved",       "contact_slipped",    "contact_elsewhere",     "tool_radius_doubtful",
+                                   "boundary_suspected", "support_gives_way",  "pressure_beyond_model", "nu_not_explored"};
+  std::string codes;
+  for (const Verdict& verdict : answer.verdicts)
+    if (std::find(std::begin(wrong), std::end(wrong), verdict.code) != std::end(wrong)) codes += (codes.empty() ? "" : ", ") + verdict.code;
+  return codes;
+}
 
 std::vector<Parameter> parameters(const Identification& answer, const std::string& name) {
   std::vector<Parameter> found;
@@ -324,15 +338,29 @@ class Loop {
     next.young_moduli = parameters(answer, "young_modulus");
     next.poisson_ratio = parameters(answer, "poisson_ratio").front();
     next.found = estimation::expected_after(estimation::after_fit(out_.recording, answer), {});
-    out_.reached = young_modulus_half_width(next) <= options_.young_modulus_within &&
-                   poisson_ratio_half_width(next.poisson_ratio) <= options_.poisson_ratio_within;
+    look_at_goal(next);
     return true;
+  }
+
+  /// Narrow intervals are the goal where they can be believed.
+  void look_at_goal(const ExploredPush& last) {
+    const Identification& answer = out_.identified.answer;
+    narrow_ = young_modulus_half_width(last) <= options_.young_modulus_within &&
+              poisson_ratio_half_width(last.poisson_ratio) <= options_.poisson_ratio_within;
+    in_the_way_ = verdicts_in_the_way(answer);
+    out_.reached = narrow_ && answer.termination == Termination::converged && in_the_way_.empty();
+  }
+
+  /// Of narrow intervals; empty where another push may still do.
+  std::string words_of_goal() const {
+    const std::string narrow = std::string(out_.pushes.back().young_moduli.size() == 1 ? "both" : "all") + " intervals are as narrow as was asked for";
+    if (out_.reached) return narrow;
+    return in_the_way_.empty() ? "" : narrow + ", but not to be believed: " + in_the_way_;
   }
 
   void tell_of_last() {
     if (hooks_.on_push) hooks_.on_push(out_.pushes.back());
-    const bool two = out_.pushes.back().young_moduli.size() == 1;
-    if (out_.reached) out_.message = std::string(two ? "both" : "all") + " intervals are as narrow as was asked for";
+    if (narrow_) out_.message = words_of_goal();
   }
 
   /// Nobody pushes for it: what every push tells is known by now, and a list begins where this loop began.
@@ -346,6 +374,7 @@ class Loop {
     fresh.poisson_ratio = ranking.knowledge.poisson_ratio;
     fresh.log_ratio = ranking.knowledge.log_ratio;
     fresh.uncured = ranking.knowledge.uncured;
+    fresh = estimation::with_shared(std::move(fresh), ranking.knowledge.information.diagonal().tail(ranking.knowledge.shared));
     FixedLists lists;
     const int most = 10 * options_.max_pushes;
     lists.candidates = static_cast<int>(pushes.size());
@@ -357,10 +386,34 @@ class Loop {
 
   Explored end(const std::string& message) {
     out_.message = message;
+    const bool at_goal = narrow_ && message == words_of_goal();
     if (!out_.pushes.empty() && !out_.pushes.back().young_moduli.empty() && !is_stopped()) expect_fixed_lists();
-    if (options_.identify.fit.cross_checks && !out_.pushes.empty() && !is_stopped() && !estimate(true))
+    if (!options_.identify.fit.cross_checks || out_.pushes.empty() || is_stopped()) return std::move(out_);
+    if (estimate(true))
+      judge_at_last(at_goal);
+    else
       out_.message = "stopped on request in the last checks: " + message;
     return std::move(out_);
+  }
+
+  /// The last estimate has all checks: what they say, and unknowns that they add (a slip), decide whether the goal is reached.
+  void judge_at_last(bool was_at_goal) {
+    const Identification& answer = out_.identified.answer;
+    const bool before = std::exchange(out_.reached, false);
+    if (answer.parameters.empty()) {
+      out_.message = "the last estimate did not work out: " + answer.message;
+      return;
+    }
+    ExploredPush last;
+    last.young_moduli = parameters(answer, "young_modulus");
+    last.poisson_ratio = parameters(answer, "poisson_ratio").front();
+    look_at_goal(last);
+    if (narrow_ && (was_at_goal || (out_.reached && !before))) {
+      const std::string words = words_of_goal();
+      out_.message = words.empty() ? "the last estimate did not come to its end: " + answer.message : words;
+    } else if (was_at_goal) {
+      out_.message = "the intervals are wider than was asked for, once all checks are made";
+    }
   }
 
   acquisition::Robot& robot_;
@@ -371,6 +424,8 @@ class Loop {
   bool cancelled_ = false;  // by it
   std::vector<Push> earlier_;
   int number_ = 0;  // of the last push
+  bool narrow_ = false;     // the intervals of the last estimate
+  std::string in_the_way_;  // its verdicts for which they are not to be believed
   Explored out_;
 };
 

@@ -73,7 +73,8 @@ struct Explored {
   std::optional<FixedLists> fixed_lists;  ///< nothing: no estimate to expect them by, or stopped on request
   int fruitless = 0;     ///< pushes that found nothing to press on; they count, and their places are not tried again
                          ///< (of an earlier run those that recorded a step)
-  bool reached = false;  ///< the goal
+  /// The goal: the last estimate converged, its intervals are narrow, and no verdict says that they are not to be believed.
+  bool reached = false;
   std::string message;   ///< why it ended, in plain words
 };
 

@@ -18,6 +18,7 @@
 #include "palpate/identify.hpp"
 #include "palpate/sensing/arm_reach.hpp"
 #include "palpate/sensing/depth_render.hpp"
+#include "palpate/sensing/lens_scatter.hpp"
 #include "palpate/sensing/observe.hpp"
 
 namespace palpate {
@@ -87,7 +88,8 @@ const PointCloud* cloud_of(const Recording& recording) {
 }
 
 /// What a camera sees of the object at rest, with the weight of all the rays that the fit would use.
-std::optional<estimation::RayObservation> rays_of(DepthFrame camera, const TriMesh& surface,
+/// @param name  of the camera where it stands: what its calibration is wrong by is the same in every image of every push
+std::optional<estimation::RayObservation> rays_of(const std::string& name, DepthFrame camera, const TriMesh& surface,
                                                   const Environment& environment) {
   for (const Plane& plane : environment.planes)
     if (plane.normal.dot(camera.T_base_camera.translation() - plane.point_m) <= 0) return std::nullopt;
@@ -104,6 +106,9 @@ std::optional<estimation::RayObservation> rays_of(DepthFrame camera, const TriMe
   view.pose_std_m = camera.pose_std_m;
   view.pose_std_rad = camera.pose_std_rad;
   view.bias_std_m = camera.noise.bias_std_m;
+  view.camera = name;
+  view.R_base_camera = camera.T_base_camera.linear();
+  view.scatter = sensing::lens_scatter(camera);
   view.outline_margin_rad = estimation::outline_margin_px / std::min(camera.camera.fx_px, camera.camera.fy_px);
   return view;
 }
@@ -197,7 +202,7 @@ void add_views(PushScene& scene, const Recording& recording, const SuggestOption
     names.push_back(names.front() + " turned by " + std::to_string(std::lround(angle * 180 / EIGEN_PI)) + " degrees");
   }
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    auto rays = rays_of(cameras[i], surface, recording.environment);
+    auto rays = rays_of(names[i], cameras[i], surface, recording.environment);
     if (!rays) {
       scene.warnings.push_back(names[i] + " sees nothing of the object, or stands behind a plane");
       continue;

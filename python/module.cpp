@@ -61,8 +61,8 @@ py::list nouns() {
 }
 
 py::object read_recording(const py::object& path, const py::object& mapping) {
-  cli::LoadedRecording loaded = cli::load_recording(path_of(path), mapping.is_none() ? fs::path() : path_of(mapping));
-  cli::check_loaded(loaded.recording);
+  LoadedRecording loaded = cli::load_existing(path_of(path), mapping.is_none() ? fs::path() : path_of(mapping));
+  check_loaded(loaded.recording);
   std::vector<std::string>& warnings = loaded.recording.warnings;
   for (const acquisition::ClockOffset& clock : loaded.clocks)
     if (clock.usable) warnings.push_back("clock of " + clock.sensor + ": " + cli::to_words(clock));
@@ -82,7 +82,7 @@ py::object identify_recording(const py::object& given, const py::dict& options, 
   const IdentifyOptions asked = identify_options(from);
   from.all_taken();
   const Identified found = without_lock(progress, [&](const OnProgress& told) {
-    cli::check_loaded(recording, "palpate.check_recording");
+    check_loaded(recording, "palpate.check_recording");
     Identified answer = identify(recording, asked, told);
     if (answer.answer.termination != Termination::cancelled) name_push_for_poisson(recording, answer, asked.fit.threads, told);
     return answer;

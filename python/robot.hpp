@@ -110,7 +110,7 @@ struct Noun<Loop> {
     field("found", &Loop::found, "");
     field("pushes", &Loop::pushes, "");
     field("fruitless", &Loop::fruitless, "pushes that found nothing to press on");
-    field("reached", &Loop::reached, "the intervals are as narrow as was asked for");
+    field("reached", &Loop::reached, "the intervals are as narrow as was asked for, and no verdict says that they are not to be believed");
     field("message", &Loop::message, "why it ended");
   }
 };

@@ -88,6 +88,14 @@ MatrixX part_of(const VectorX& shares, const MatrixX& covariance) {
   return made_possible(part, -1e-9);
 }
 
+/// Without what all pushes share, each with its prior in the last rows: integrated out once, of all pushes together.
+MatrixX without_shared(const MatrixX& information, Index shared) {
+  if (shared == 0) return information;
+  const Index kept = information.rows() - shared;
+  const MatrixX cross = information.bottomLeftCorner(shared, kept);
+  return information.topLeftCorner(kept, kept) - cross.transpose() * information.bottomRightCorner(shared, shared).ldlt().solve(cross);
+}
+
 /// @param touched  false: nothing of E is known but what pushes that are planned would tell
 ExpectedSpread spread_of(const MatrixX& information, const MatrixX& uncured, bool touched) {
   const Index regions = information.rows() - 2;
@@ -206,10 +214,18 @@ Knowledge after_fit(const Recording& recording, const Identification& answer) {
   return known;
 }
 
+Knowledge with_shared(Knowledge known, const VectorX& information) {
+  const Index count = static_cast<Index>(information.size()), size = static_cast<Index>(known.information.rows()) - known.shared + count;
+  known.information.conservativeResizeLike(MatrixX::Zero(size, size));
+  known.information.bottomRightCorner(count, count) = information.asDiagonal();
+  known.shared = count;
+  return known;
+}
+
 ExpectedSpread expected_after(const Knowledge& knowledge, const std::vector<const RatedPush*>& pushes) {
   MatrixX information = knowledge.information;
   for (const RatedPush* push : pushes) information += push->information;
-  return spread_of(information, knowledge.uncured, knowledge.touched);
+  return spread_of(without_shared(information, knowledge.shared), knowledge.uncured, knowledge.touched);
 }
 
 PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, const std::string& tool,
@@ -226,10 +242,14 @@ PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, c
     if (progress && !progress("rate pushes", static_cast<double>(c) / static_cast<double>(information.count()))) break;
     std::vector<RatedPush> rated = information.rate(c);
     if (rated.empty()) ++ranking.out_of_view;
-    for (RatedPush& push : rated) {
-      push.expected = expected_after(knowledge, {&push});
-      ranking.pushes.push_back(std::move(push));
-    }
+    for (RatedPush& push : rated) ranking.pushes.push_back(std::move(push));
+  }
+  // What all pushes share, every push beside it.
+  ranking.knowledge = with_shared(knowledge, information.shared_information());
+  const MatrixX nothing = MatrixX::Zero(ranking.knowledge.information.rows(), ranking.knowledge.information.cols());
+  for (RatedPush& push : ranking.pushes) {
+    push.information.conservativeResizeLike(nothing);
+    push.expected = expected_after(ranking.knowledge, {&push});
   }
   std::stable_sort(ranking.pushes.begin(), ranking.pushes.end(), [&](const RatedPush& a, const RatedPush& b) {
     return a.expected.score(options.goal) < b.expected.score(options.goal);

@@ -42,7 +42,11 @@ struct Knowledge {
   double young_modulus_pa = 2e4, poisson_ratio = 0.3;  ///< where information is computed
   std::vector<std::string> regions;                    ///< R names; empty: one stiffness everywhere
   VectorX log_ratio;                                   ///< R - 1: where information is computed
-  MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, R - 1 log ratios, force scale), their priors included
+  MatrixX information = MatrixX::Zero(3, 3);           ///< of (log E, nu, R - 1 log ratios, force scale, `shared`), their priors included
+  /// Errors that all pushes share, as the force's scale (tool radius, compliance, density, supports, lens, a camera that stands): so many
+  /// are the last of `information` once pushes are ranked, each with its prior: planned pushes tell of them together. What they did in
+  /// pushes that were fitted is taken for an error of its own, since an answer does not say which way it went.
+  Index shared = 0;
   /// Covariance of (log E of every region, nu) that no push takes away: the mesh's, the unseen side's and the foot's. Empty: none.
   MatrixX uncured;
   bool touched = false;                                ///< false: nothing but priors, E is a guess
@@ -73,11 +77,11 @@ struct RatedPush {
   double seen_share = 0;    ///< of the surface around the tool, by that view
   ExpectedSpread expected;  ///< after the push
   int region = 0;           ///< that the tool presses on
-  MatrixX information;      ///< that it adds, as Knowledge's, every nuisance of its own integrated out
+  MatrixX information;      ///< that it adds, as that of PushRanking::knowledge, every nuisance of its own integrated out
 };
 
 struct PushRanking {
-  Knowledge knowledge;
+  Knowledge knowledge;  ///< that was given, with the errors that these pushes share
   PushGoal goal = PushGoal::both;
   ExpectedSpread so_far;              ///< infinite where nothing is known
   std::vector<RatedPush> pushes;      ///< best first
@@ -88,7 +92,7 @@ struct RankOptions {
   PushGoal goal = PushGoal::both;
   PushLimits limits;
   double least_seen_share = 0.2;  ///< of the surface around the tool
-  int threads = 1;
+  int threads = 1;                ///< 0: as many as the machine has
 };
 
 /// @param scene      supports, environment, tools and priors of the object; its pushes are not looked at
@@ -99,6 +103,10 @@ struct RankOptions {
 PushRanking rank_pushes(const Recording& scene, const SimulatedObject& object, const std::string& tool,
                         const std::vector<PushCandidate>& candidates, const SensorPlan& sensors, const Knowledge& knowledge,
                         const RankOptions& options, const OnProgress& progress = {});
+
+/// In place of errors that all pushes share, if there are any, those with this information by themselves (of a ranking, the last of its
+/// knowledge's diagonal).
+Knowledge with_shared(Knowledge known, const VectorX& information);
 
 /// What is expected after these pushes on top of what is known.
 ExpectedSpread expected_after(const Knowledge& knowledge, const std::vector<const RatedPush*>& pushes);

@@ -13,6 +13,7 @@
 #include "palpate/estimation/optimise.hpp"
 #include "palpate/estimation/solve_count.hpp"
 #include "palpate/geometry/nearest_vertices.hpp"
+#include "palpate/geometry/triangle_tree.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -32,16 +33,22 @@ Points points_of(const std::vector<TermInput>& inputs) {
   return points;
 }
 
-/// Besl and McKay's point-to-point ICP; returns the sum of squared distances to the nearest vertices at its end (eq. 6).
-double aligned_squared_distance(const geometry::NearestVertices& vertices, Points points,
-                                std::vector<geometry::NearestVertices::Memory>& memory) {
+struct Nearest {
+  Vec3 at_m;
+  double squared_distance_m2 = 0;
+};
+
+/// Besl and McKay's point-to-point ICP; returns the sum of squared distances to what is nearest at its end (eq. 6).
+/// @param nearest  of point number i, where it is now
+template <class F>
+double aligned_squared_distance(Points points, F nearest) {
   double last = std::numeric_limits<double>::infinity();
   for (int iteration = 0; iteration < 30; ++iteration) {
     Points targets(points.rows(), 3);
     double sum = 0;
     for (Index i = 0; i < points.rows(); ++i) {
-      const auto found = vertices.nearest(points.row(i), memory[static_cast<std::size_t>(i)]);
-      targets.row(i) = vertices.vertices_m().row(found.vertex);
+      const Nearest found = nearest(static_cast<std::size_t>(i), Vec3(points.row(i)));
+      targets.row(i) = found.at_m;
       sum += found.squared_distance_m2;
     }
     if (sum > last * (1 - 1e-6)) return sum;
@@ -73,13 +80,14 @@ struct PaperError::Impl {
   std::vector<Points> points;
   std::vector<geometry::NearestVertices> vertices;                      // a sample
   std::vector<std::vector<geometry::NearestVertices::Memory>> nearest;  // a point of a sample
+  std::vector<geometry::TriangleTree> surfaces;                         // a sample, in place of vertices
   SolveCount for_start;
   std::size_t count = 0;
   double start_pa = 0;
 };
 
 PaperError::PaperError(const Recording& given, const SimulatedObject& object, const Inputs& inputs,
-                       const FitOptions& options, FitMemory* memory)
+                       const FitOptions& options, FitMemory* memory, PaperDistance distance)
     : impl_(std::make_unique<Impl>()) {
   impl_->recording = given;
   impl_->recording.rest.surface_std_m = 0;
@@ -111,6 +119,7 @@ PaperError::PaperError(const Recording& given, const SimulatedObject& object, co
     const std::size_t s = with_points[(k * with_points.size() + with_points.size() / 2) / samples];
     impl_->steps.push_back(s);
     impl_->points.push_back(points_of(inputs[s]));
+    if (distance == PaperDistance::surface) impl_->surfaces.emplace_back(object.surface.rest());
     impl_->vertices.emplace_back(object.surface.rest().vertices_m);
     impl_->nearest.emplace_back(static_cast<std::size_t>(impl_->points.back().rows()));
     impl_->count += static_cast<std::size_t>(impl_->points.back().rows());
@@ -133,8 +142,21 @@ double PaperError::operator()(double young_modulus_pa, double poisson_ratio) {
   for (std::size_t k = 0; k < impl_->steps.size(); ++k) {
     const StepPrediction predicted = impl_->model->predict(impl_->steps[k], at, false);
     if (!predicted.converged) return std::numeric_limits<double>::infinity();
-    impl_->vertices[k].move(predicted.surface_m);
-    sum += aligned_squared_distance(impl_->vertices[k], impl_->points[k], impl_->nearest[k]);
+    if (!impl_->surfaces.empty()) {
+      geometry::TriangleTree& surface = impl_->surfaces[k];
+      surface.refit(predicted.surface_m);
+      sum += aligned_squared_distance(impl_->points[k], [&](std::size_t, const Vec3& point_m) {
+        const geometry::ClosestPoint found = surface.closest(point_m);
+        return Nearest{found.point_m, found.squared_distance_m2};
+      });
+      continue;
+    }
+    geometry::NearestVertices& vertices = impl_->vertices[k];
+    vertices.move(predicted.surface_m);
+    sum += aligned_squared_distance(impl_->points[k], [&](std::size_t i, const Vec3& point_m) {
+      const auto found = vertices.nearest(point_m, impl_->nearest[k][i]);
+      return Nearest{vertices.vertices_m().row(found.vertex), found.squared_distance_m2};
+    });
   }
   return sum / static_cast<double>(impl_->count);
 }
@@ -237,9 +259,9 @@ Descent descend(PaperError& error, Eigen::Vector2d start, const Bounds& bounds, 
 }  // namespace
 
 Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
-                               const FitOptions& options, const OnProgress& progress, FitMemory* memory) {
+                               const FitOptions& options, const OnProgress& progress, FitMemory* memory, PaperDistance distance) {
   check(options);
-  PaperError error(recording, object, inputs, options, memory);
+  PaperError error(recording, object, inputs, options, memory, distance);
   const double nu_start = recording.model.poisson_fixed.value_or(options.poisson_start);
   const Bounds bounds{std::min(recording.model.poisson_lower, recording.model.poisson_fixed.value_or(1)),
                       std::max(recording.model.poisson_upper, recording.model.poisson_fixed.value_or(-1)), !recording.model.poisson_fixed};

@@ -13,10 +13,14 @@ namespace palpate::estimation {
 /// Most samples (steps) that the baseline uses jointly, evenly spread: it re-simulates every one several times an iteration.
 inline constexpr std::size_t paper_samples = 10;
 
+/// What an observed point is measured to. The paper's are vertices; the surface between them shows what that does.
+enum class PaperDistance { nearest_vertex, surface };
+
 /// @param memory  used and filled, as by `fit`; nullptr: nothing is kept
 /// @throws Error when no step has a point cloud or a depth image: the paper's method knows no other observation.
 Identification fit_as_in_paper(const Recording& recording, const SimulatedObject& object, const Inputs& inputs,
-                               const FitOptions& options, const OnProgress& progress = {}, FitMemory* memory = nullptr);
+                               const FitOptions& options, const OnProgress& progress = {}, FitMemory* memory = nullptr,
+                               PaperDistance distance = PaperDistance::nearest_vertex);
 
 /// The numerical derivative of a function known at three places (place, value): where a side has no value (infinity: no
 /// equilibrium) the other one alone tells; 0 where neither does.
@@ -26,7 +30,7 @@ double slope(std::pair<double, double> behind, const std::pair<double, double>& 
 class PaperError {
  public:
   PaperError(const Recording& recording, const SimulatedObject& object, const Inputs& inputs, const FitOptions& options,
-             FitMemory* memory = nullptr);
+             FitMemory* memory = nullptr, PaperDistance distance = PaperDistance::nearest_vertex);
   ~PaperError();
   /// Infinity where a sample has no equilibrium.
   double operator()(double young_modulus_pa, double poisson_ratio);

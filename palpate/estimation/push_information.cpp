@@ -18,6 +18,7 @@
 namespace palpate::estimation {
 namespace {
 
+constexpr const char* candidate_name = "candidate ";  // and a number: how unknowns of one push are told from those of all
 constexpr double robust_efficiency = 0.95;  // of Tukey's biweight at the fit's usual cut
 
 Points points_of(const TermInput& view) {
@@ -133,6 +134,15 @@ struct PushInformation::Impl {
   double log_young_value = 0, poisson_value = 0;
   VectorX log_ratio;
   int force_scale = -1;
+  std::vector<int> all_share;  // unknowns that no push has for itself, in the order in which they came up
+
+  /// An error that comes again with every push: one would take from it what only another calibration can. The rest surface's has too many
+  /// numbers to be carried along.
+  bool is_shared(int unknown) const {
+    const std::string& name = unknowns[unknown].name;
+    const bool of_one = name.find(std::string("[") + candidate_name) != std::string::npos;
+    return unknown >= unknowns.parameter_count() && !of_one && !name.starts_with("rest_surface[");
+  }
 
   Push made_up(const PushCandidate& candidate, double highest_n, const std::string& name) const {
     Push push;
@@ -162,16 +172,25 @@ struct PushInformation::Impl {
     return at;
   }
 
-  /// Schur complement of all that is not (log E, nu, log ratios, force scale).
-  MatrixX marginal(const std::vector<const Block*>& blocks) const {
+  /// Schur complement of all that is not (log E, nu, log ratios, force scale, what all pushes share).
+  MatrixX marginal(const std::vector<const Block*>& blocks) {
     std::map<int, Index> at;
     for (int k = 0; k < unknowns.parameter_count(); ++k) at.emplace(k, k);
-    const Index scale = unknowns.parameter_count(), kept = scale + 1;
+    const Index scale = unknowns.parameter_count();
     if (force_scale >= 0) at.emplace(force_scale, scale);
-    Index size = kept;
+    std::vector<int> of_one;
     for (const Block* block : blocks)
-      for (const int unknown : block->unknowns)
-        if (!unknowns[unknown].fixed || unknown == poisson) size += at.emplace(unknown, size).second;
+      for (const int unknown : block->unknowns) {
+        if (unknowns[unknown].fixed || at.count(unknown) > 0) continue;
+        if (!is_shared(unknown))
+          of_one.push_back(unknown);
+        else if (std::find(all_share.begin(), all_share.end(), unknown) == all_share.end())
+          all_share.push_back(unknown);
+      }
+    Index size = scale + 1;
+    for (const int unknown : all_share) at.emplace(unknown, size++);
+    const Index kept = size;
+    for (const int unknown : of_one) size += at.emplace(unknown, size).second;
     MatrixX all = MatrixX::Zero(size, size);
     for (const Block* block : blocks) {
       for (std::size_t i = 0; i < block->unknowns.size(); ++i) {
@@ -245,7 +264,7 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
     const int region = region_at(small_strains, candidate.contact_m);
     highest_n = std::min(highest_n, limits.pressure_over_young * knowledge.young_modulus_of(region) * pressed_m2);
     if (candidate.thickness_m > 0) highest_n = std::min(highest_n, limits.thickness_share * candidate.thickness_m / give);
-    plan.planned.pushes.push_back(plan.made_up(candidate, highest_n, "candidate " + std::to_string(c)));
+    plan.planned.pushes.push_back(plan.made_up(candidate, highest_n, candidate_name + std::to_string(c)));
     plan.candidates.push_back(candidate);
     plan.region.push_back(region);
   }
@@ -259,6 +278,12 @@ PushInformation::~PushInformation() = default;
 
 std::size_t PushInformation::count() const { return impl_->candidates.size(); }
 int PushInformation::left_out() const { return impl_->left_out; }
+
+VectorX PushInformation::shared_information() const {
+  VectorX out(static_cast<Index>(impl_->all_share.size()));
+  for (Index k = 0; k < out.size(); ++k) out(k) = std::pow(impl_->unknowns[impl_->all_share[static_cast<std::size_t>(k)]].prior_std, -2);
+  return out;
+}
 
 std::vector<RatedPush> PushInformation::rate(std::size_t c) {
   Impl& plan = *impl_;

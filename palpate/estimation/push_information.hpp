@@ -20,6 +20,9 @@ class PushInformation {
 
   std::size_t count() const;  ///< candidates that the supports carry
   int left_out() const;       ///< the others
+  /// Of errors that all pushes share, by themselves, in the order in which pushes rated so far hold them (the last of their information;
+  /// those of earlier pushes hold fewer).
+  VectorX shared_information() const;
   /// One entry a view and force level; empty where no view shows the place. `expected` is left open.
   std::vector<RatedPush> rate(std::size_t candidate);
 

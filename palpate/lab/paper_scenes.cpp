@@ -26,9 +26,12 @@ Depth depth_of(const PaperScene& scene, const LabObject& object, const PushSite&
   return {scene.travel_m, 0.5 * start_n_m * scene.travel_m / scene.samples, scene.samples};
 }
 
+bool presses(const Step& step) { return !step.loads.empty(); }
+
 // One push of rising forces; `recorded` is called at every step of it. False: the user has had enough.
+// @param why  if given: what ended a push that never pressed
 bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& depth, Push& push, const std::function<void()>& recorded,
-             const OnProgress& progress, double done, double share) {
+             const OnProgress& progress, double done, double share, std::string* why = nullptr) {
   acquisition::PushOptions protocol;
   protocol.travel_limit_m = depth.travel_m;
   protocol.unloading_steps = 0;
@@ -51,6 +54,7 @@ bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& de
         return wanted && static_cast<int>(steps.size()) <= depth.samples;
       });
   push.steps = std::move(steps);
+  if (why != nullptr && std::none_of(push.steps.begin(), push.steps.end(), presses)) *why = report.message;
   // Asked to stop after the last sample, the arm stands where it is, deep in the object perhaps: no way to the next push.
   if (report.stop == acquisition::StopReason::user) {
     Pose T_base_out = Pose::Identity();
@@ -64,8 +68,6 @@ bool push_at(LabRobot& robot, const acquisition::PushPlan& plan, const Depth& de
     for (Load& load : step.loads) load.contact_m = plan.contact_m;
   return wanted;
 }
-
-bool presses(const Step& step) { return !step.loads.empty(); }
 
 // From the sample `first` on (the unloaded step is number 0) the tip was elsewhere, and what the arm's encoders read has come
 // deeper by what it lost; the recording goes on saying the first place.
@@ -204,7 +206,7 @@ PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const O
     trial.unused_force_n.push_back(robot.true_force_n());
     if (!trial.recording.supports.empty()) trial.unused_surface.push_back(robot.true_surface());
   };
-  push_at(robot, robot.plan_at(unused.contact_m, unused.direction), depth, trial.unused, truth, progress, 1 - share, share);
+  push_at(robot, robot.plan_at(unused.contact_m, unused.direction), depth, trial.unused, truth, progress, 1 - share, share, &trial.unused_stop);
   if (trial.recording.supports.empty()) {
     trial.recording.pushes.push_back(std::move(trial.unused));  // for as long as both are made free
     say_free(trial.recording, robot.object().foot_m.z(), depth.travel_m);

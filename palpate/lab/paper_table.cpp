@@ -110,7 +110,7 @@ constexpr std::array<PaperScene, 8> table{{
      .depth_sensor = "bumblebee",
      .force_sensor = "schunk_ftcl_050",
      .region_ratio = 1.4,
-     .unused = PaperPlace{{0.03, 0, 0.09}, {-0.4, 0.6, -0.69}}},
+     .unused = PaperPlace{{0.014, 0.004, 0.15}, {-0.2, 0, -0.98}}},
     {.name = "between",
      .title = "A free ball between two opposed pushes",
      .paper_says = "Objects are fixed, because forces that move an object have no equilibrium.",

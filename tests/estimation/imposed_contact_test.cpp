@@ -138,7 +138,7 @@ TEST(SlantedTool, PressesAlongTheNormalOfASmoothFace) {
     }
     at(unknowns.named({"force_scale"}).at(0)) = 0.01;
     const Vec3 tare_n(0.02, -0.03, 0.04);
-    at.segment<3>(unknowns.named({"force_tare[push]_x"}).at(0)) = tare_n;
+    at.segment<3>(unknowns.named({"force_tare[down]_x"}).at(0)) = tare_n;
     const StepPrediction scaled = model.predict(1, at);
     // As of a force that is given: true = (1 + scale) read + tare.
     EXPECT_LT((1.01 * scaled.force_n[0] + tare_n - force_n).norm(), 1e-6 * force_n.norm());

@@ -219,6 +219,24 @@ TEST(NextPush, ASequenceNeverGetsWorseAndForceScaleIsNotAveragedOut) {
   EXPECT_LT(after.log_young_std, 0.02);
 }
 
+// What a pad's radius, the same in every push, does to E is no noise: no number of pushes goes below what one of exact sensors leaves.
+TEST(NextPush, WhatAllPushesShareIsNotAveragedOut) {
+  const SimulatedObject object = block_object(1);
+  const auto candidates = block_candidates(1, 0);
+  SensorPlan sensors = block_sensors(object.surface.rest());
+  sensors.views.clear();  // dents that are seen would tell the radius
+  const auto after = [&](double radius_std_m, int pushes) {
+    Recording scene = block_on_table();
+    scene.tools[0].radius_std_m = radius_std_m;
+    const PushRanking ranking = rank_pushes(scene, object, "pad", candidates, sensors, before_touch(scene, true_young_pa), {});
+    EXPECT_EQ(ranking.knowledge.shared, radius_std_m > 0 ? 1 : 0);
+    return expected_after(ranking.knowledge, std::vector<const RatedPush*>(static_cast<std::size_t>(pushes), &ranking.pushes.front())).log_young_std;
+  };
+  const auto of_radius = [&](int pushes) { return std::sqrt(std::pow(after(1e-3, pushes), 2) - std::pow(after(0, pushes), 2)); };
+  EXPECT_GT(of_radius(1), 0.005);
+  EXPECT_GT(of_radius(20), 0.7 * of_radius(1));
+}
+
 TEST(NextPush, WithTheRatioOfTwoHalvesKnownAPushSaysWhatItSaysOfOneMaterial) {
   Recording scene = block_on_table();
   Region left, right;

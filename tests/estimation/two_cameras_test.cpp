@@ -50,8 +50,8 @@ TEST(DepthBias, IsEachCamerasOwn) {
     return at == answer.nuisances.end() ? 0.0 : at->value;
   };
   // Truth and fit are one mesh here: what is looked at is whose error is whose.
-  EXPECT_NEAR(found("depth_bias[push]"), far_m, 0.1e-3);
-  EXPECT_NEAR(found("depth_bias[push, camera 1]"), near_m, 0.1e-3);
+  EXPECT_NEAR(found("depth_bias[down]"), far_m, 0.1e-3);
+  EXPECT_NEAR(found("depth_bias[down, camera 1]"), near_m, 0.1e-3);
   EXPECT_NEAR(parameter(answer, "young_modulus").value / young_pa, 1, 0.02);
   EXPECT_LT(answer.fit.chi2_per_dof, 0.1);
 }

@@ -198,6 +198,21 @@ TEST(Explore, StoppedInTheLastChecksItKeepsTheEstimate) {
   EXPECT_EQ(found.identified.answer.parameters.front().value, found.pushes.back().young_moduli.front().value);
 }
 
+// Two halves that differ by two thirds, and nobody has said so: what is narrow is not E of anything.
+TEST(Explore, NarrowIntervalsThatAreNotToBeBelievedAreNoGoal) {
+  ExploreOptions options = loop_options();
+  options.max_pushes = 4;
+  options.identify.fit.cross_checks = true;
+  BlockRobot robot(1, 2.5);
+  Recording scene = robot.scene();
+  scene.regions.clear();
+  const Explored found = explored(robot, options, {}, &scene).found;
+  std::string codes;
+  for (const Verdict& verdict : found.identified.answer.verdicts) codes += verdict.code + " ";
+  EXPECT_FALSE(found.reached) << found.message;
+  EXPECT_NE(found.message.find("not to be believed: "), std::string::npos) << found.message << "; " << codes;
+}
+
 TEST(Explore, StoppedWhileItRanksPushesItDoesNotBlameTheCamera) {
   BlockRobot robot(1);
   const Explored found =

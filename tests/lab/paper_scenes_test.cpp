@@ -70,9 +70,6 @@ TEST(PaperScenes, AFaultChangesWhatItSaysAndNothingElse) {
   EXPECT_NEAR(tilted.recording.tools.at(0).radius_m, 0.5 * right.recording.tools.at(0).radius_m, 1e-12);
 }
 
-// The mirror image of the upper half is the lower one: the middle goes down by half of what the upper pad does. And near a pad
-// that is small against the ball, the ball gives way as a half space does: 16 p a (1 - nu^2) / (3 pi E) on the mean of the patch
-// (Johnson, Contact Mechanics, 3.4); seen from the other pad, twice that, less what the half space gives beyond the ball.
 // The arm stood 8 cm deep where it was asked to stop, ran into the object on its way to the unused place, and nothing was there to
 // be predicted.
 TEST(PaperScenes, ThePushAfterADeepOneIsMade) {
@@ -86,6 +83,23 @@ TEST(PaperScenes, ThePushAfterADeepOneIsMade) {
   EXPECT_GE(trial.unused.steps.size(), 3u);
 }
 
+/// Scenes in which a push at another place is predicted.
+class UnusedPlace : public testing::TestWithParam<std::string> {};
+
+TEST_P(UnusedPlace, IsPushed) {
+  PaperScene scene = paper_scene(GetParam());
+  scene.true_law = "linear";  // solved at once
+  scene.samples = 2;
+  const PaperTrial trial = make_paper_trial(scene, 1);
+  EXPECT_GE(trial.unused.steps.size(), 3u) << trial.unused_stop;
+  EXPECT_EQ(trial.unused_stop, "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, UnusedPlace, testing::Values("cow", "cube", "cube9cm", "ball", "teddy"));
+
+// The mirror image of the upper half is the lower one: the middle goes down by half of what the upper pad does. And near a pad
+// that is small against the ball, the ball gives way as a half space does: 16 p a (1 - nu^2) / (3 pi E) on the mean of the patch
+// (Johnson, Contact Mechanics, 3.4); seen from the other pad, twice that, less what the half space gives beyond the ball.
 TEST(OpposedBall, IsSqueezedFromBothSidesAlike) {
   ObjectOptions truth;
   truth.young_modulus_pa = 20e3;
