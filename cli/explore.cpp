@@ -130,7 +130,10 @@ int count(const Explored& run) { return static_cast<int>(run.pushes.size()) + ru
 std::string count_of(const Explored& run) { return fmt::format("{} push{}", count(run), count(run) == 1 ? "" : "es"); }
 
 /// What the goal took, as far as it is known.
-std::string needed(const Explored& run) { return (run.reached ? "" : "more than ") + count_of(run); }
+std::string needed(const Explored& run) {
+  const bool unbelieved = !run.reached && run.message.find("not to be believed") != std::string::npos;
+  return (run.reached || unbelieved ? "" : "more than ") + count_of(run) + (unbelieved ? ", and was not to be believed" : "");
+}
 
 /// What stands before the robot, and which law it is taken to have.
 Recording scene_of(const Options& given, const PushRobot& robot) {
@@ -154,7 +157,7 @@ void compare(Session& session, const Options& given, const Explored& found, nloh
     Options there = given;
     const std::uint64_t seed = session.seed + std::uint64_t(lab);
     there.explore.suggest.candidates.seed = there.explore.seed = seed;
-    there.explore.identify.fit.cross_checks = false;  // they are for verdicts, which nobody reads here
+    there.explore.identify.fit.cross_checks = false;  // a dozen labs: verdicts are those without them
     for (Order& one : orders) {
       if (lab == 0 && one.order == PushOrder::next_best) continue;
       session.say(fmt::format("{}, {}:", lab == 0 ? "the same lab" : fmt::format("the lab of seed {}", seed), one.name));

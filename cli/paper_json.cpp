@@ -50,6 +50,12 @@ nlohmann::json json_of(const TrialAnswer& trial) {
                                      {"palpate", step.palpate.dent_m},
                                      {"other_law", step.other.dent_m},
                                      {"still", step.dent_still_m}}}});
+  if (!trial.unused_stop.empty()) out["unused_place_not_pushed"] = trial.unused_stop;
+  for (const StartAnswer& from : trial.starts)
+    out["other_starts"].push_back({{"young_modulus_pa", from.young_modulus_pa},
+                                   {"poisson_ratio", from.poisson_ratio},
+                                   {"paper", json_of(from.paper)},
+                                   {"palpate", json_of(from.palpate)}});
   for (const RegistrationPicture& picture : trial.pictures)
     out["registrations"].push_back({{"young_modulus_pa", picture.young_modulus_pa}, {"rms_m", picture.rms_m}});
   for (const SampleAnswer& sample : trial.samples)
@@ -90,9 +96,9 @@ nlohmann::json json_of(const SceneAnswers& answers) {
     out["trials"].back().erase("true_young_modulus_pa");
     out["trials"].back().erase("true_poisson_ratio");
   }
-  if (answers.scene->apparent) return out;
   const SceneForesight foresight = foresight_of(answers.trials);
   out["predictions"] = {{"paper", json_of(foresight.paper)}, {"palpate", json_of(foresight.palpate)}, {"dent_if_nothing_moved_m", foresight.still_m}};
+  if (answers.scene->apparent) return out;
   const SceneScores scores = scores_of(answers.trials);
   out["scores"] = {{"paper", json_of(scores.paper)},
                    {"paper_linear_tetrahedra", json_of(scores.paper_coarse)},

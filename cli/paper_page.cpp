@@ -109,10 +109,10 @@ std::string section(const SceneAnswers& answers) {
                                        first.sites.empty() ? "" : " at " + first.sites.front().site, first.poisson_ratio);
   html += fmt::format("{} quadratic tetrahedra. The paper's method {}; palpate {}.", first.tetrahedra, found(first.paper), found(first.palpate));
   if (!first.other_law.empty()) html += fmt::format(" With the {} law palpate {}.", first.other_law, found(first.other));
-  if (const std::size_t used = first.readings.size() - static_cast<std::size_t>(first.left_out); first.left_out > 0)
+  if (first.left_out > 0)
     html += fmt::format(" Both answer from the lower {} of {} samples: under the others the pad presses with more than {:.1f} E, where the simulated "
                         "patch caves in.",
-                        used, first.readings.size(), estimation::largest_pressure);
+                        first.readings.size() - static_cast<std::size_t>(first.left_out), first.readings.size(), estimation::largest_pressure);
   html += "</p>\n<p>Palpate's verdicts: " + listed(first.palpate.verdicts) +
           (first.other_law.empty() ? "" : "; with the " + first.other_law + " law: " + listed(first.other.verdicts)) + ".</p>\n";
   html += site_table(first) + unused_table(scene, first) + foresight_table(answers) + sample_table(first, !scene.apparent && first.sites.empty());

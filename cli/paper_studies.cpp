@@ -85,10 +85,11 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
       const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress);
       ModelChoice choice = choice_of(scene);
       Prepared given = prepare(trial.recording, choice, nullptr, progress);
-      // A planar back side is taken for true by neither, and asked of both all the same.
-      const MethodAnswer ours = shape == lab::PaperShape::planar_back
-                                    ? by_palpate(given, options_of(study), nullptr, progress)
-                                    : by_palpate_on_better_shape(trial.recording, choice, given, options_of(study), nullptr, progress);
+      // Palpate does not take a planar back side for true, and is asked all the same; no finer mesh of it can be had.
+      const bool planar = shape == lab::PaperShape::planar_back;
+      if (planar) given.finer.reset();
+      const MethodAnswer ours = planar ? by_palpate(given, options_of(study), nullptr, progress)
+                                       : by_palpate_on_better_shape(trial.recording, choice, given, options_of(study), nullptr, progress);
       rows.push_back({what, trial.young_modulus_pa, trial.poisson_ratio, by_paper(given, options_of(study), nullptr, progress), ours});
     }
   }

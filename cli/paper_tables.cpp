@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "cli/paper_words.hpp"
 
@@ -197,24 +198,22 @@ std::string apparent_table(const std::vector<TrialAnswer>& trials) {
                             trials.size(), trials.size() == 1 ? "" : "s", about_effort());
 }
 
-}  // namespace
-
-namespace {
-
 /// How many samples a seed had, and how deep those went that both methods answer from.
 std::string about_samples(const std::vector<TrialAnswer>& trials) {
   std::vector<double> samples, used, deepest_mm;
   for (const TrialAnswer& trial : trials) {
     if (trial.readings.empty()) continue;
-    const std::size_t kept = trial.readings.size() - static_cast<std::size_t>(trial.left_out);
+    std::set<std::string> pushes;
+    for (const ForceReading& reading : trial.readings) pushes.insert(reading.push);
     samples.push_back(static_cast<double>(trial.readings.size()));
-    used.push_back(static_cast<double>(kept));
+    used.push_back(static_cast<double>(trial.readings.size() - static_cast<std::size_t>(trial.left_out)));
+    if (trial.left_out > 0 && pushes.size() > 1) continue;  // of which push is not kept
     double deepest = 0;
-    for (std::size_t k = 0; k < kept; ++k) deepest = std::max(deepest, 1000 * trial.readings[k].travel_m);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(used.back()); ++k) deepest = std::max(deepest, 1000 * trial.readings[k].travel_m);
     deepest_mm.push_back(deepest);
   }
   if (samples.empty()) return {};
-  return fmt::format("A seed has {:.0f} samples, of which {:.0f} are used{} (medians). ", median(samples), median(used),
+  return fmt::format("A seed has {:.0f} samples (all pushes together), of which {:.0f} are used{} (medians). ", median(samples), median(used),
                      median(deepest_mm) > 0 ? fmt::format(", the deepest at {:.0f} mm", median(deepest_mm)) : "");
 }
 

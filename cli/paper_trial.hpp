@@ -98,7 +98,7 @@ struct TrialAnswer {
   std::vector<PaperView> views;               ///< only where asked for
   std::vector<SampleAnswer> samples;          ///< each sample alone; only where asked for
   ErrorSurface surface;                       ///< only where asked for
-  std::vector<StartAnswer> starts;            ///< only beside a surface of more than one nu
+  std::vector<StartAnswer> starts;            ///< only beside a surface of more than one nu, and not of a shape that is a guess
 };
 
 struct TrialOptions {

@@ -144,7 +144,7 @@ std::vector<std::size_t> pushes_to_target(const Options& given, const estimation
   if (plan.reached) return plan.order;
   const std::string why =
       fmt::format("{} pushes come to E within {} and nu within {}, which is not as narrow as was asked for: no push takes away "
-                  "what is not known of the force's scale, the mesh, the unseen side and all else that they share (`palpate estimate --budget`)",
+                  "what is not known of the force's scale, the mesh, the unseen side and the foot, and what else they share only as far as they tell of it (`palpate estimate --budget`)",
                   longest_plan, percent_95(plan.expected.log_young_std), plain_95(plan.expected.poisson_std));
   session.warn(why);
   json["warnings"].push_back(why);

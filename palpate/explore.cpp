@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <random>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <variant>
@@ -19,18 +19,21 @@ namespace {
 using estimation::PushRanking;
 using estimation::RatedPush;
 
-/// Said where an interval is not that of what was pushed: the model is another, and no further push narrows that.
-std::string verdicts_in_the_way(const Identification& answer) {
-  constexpr const char* wrong[] = {"not_converged",      "model_does_not_fit", "nuisance_beyond_prior", "inverted_elements",
-                                   "beyond_small_strain", "two_equilibria",     "young_modulus_at_bound", "several_minima",
-                                   "not_homogeneous",    "not_linear",         "hysteresis",            "not_settled",
-                                   "object_moved",       "contact_slipped",    "contact_elsewhere",     "tool_radius_doubtful",
-                                   "boundary_suspected", "support_gives_way",  "pressure_beyond_model", "nu_not_explored"};
-  std::string codes;
+/// Those of the answer's verdicts that are listed, as words.
+std::string said_of(const Identification& answer, std::span<const char* const> codes) {
+  std::string said;
   for (const Verdict& verdict : answer.verdicts)
-    if (std::find(std::begin(wrong), std::end(wrong), verdict.code) != std::end(wrong)) codes += (codes.empty() ? "" : ", ") + verdict.code;
-  return codes;
+    if (std::find(codes.begin(), codes.end(), verdict.code) != codes.end()) said += (said.empty() ? "" : ", ") + verdict.code;
+  return said;
 }
+
+/// An interval is not that of what was pushed: the model is another, and no further push changes that.
+constexpr const char* model_is_wrong[] = {"model_does_not_fit", "nuisance_beyond_prior", "inverted_elements", "beyond_small_strain", "two_equilibria",
+                                          "young_modulus_at_bound", "not_homogeneous", "not_linear", "hysteresis", "not_settled", "object_moved",
+                                          "contact_slipped", "contact_elsewhere", "tool_radius_doubtful", "boundary_suspected", "support_gives_way",
+                                          "pressure_beyond_model"};
+/// An interval is not all that the data allow: another push may tell.
+constexpr const char* more_may_tell[] = {"several_minima", "nu_not_explored"};
 
 std::vector<Parameter> parameters(const Identification& answer, const std::string& name) {
   std::vector<Parameter> found;
@@ -347,8 +350,8 @@ class Loop {
     const Identification& answer = out_.identified.answer;
     narrow_ = young_modulus_half_width(last) <= options_.young_modulus_within &&
               poisson_ratio_half_width(last.poisson_ratio) <= options_.poisson_ratio_within;
-    in_the_way_ = verdicts_in_the_way(answer);
-    out_.reached = narrow_ && answer.termination == Termination::converged && in_the_way_.empty();
+    in_the_way_ = said_of(answer, model_is_wrong);
+    out_.reached = narrow_ && answer.termination == Termination::converged && in_the_way_.empty() && said_of(answer, more_may_tell).empty();
   }
 
   /// Of narrow intervals; empty where another push may still do.
@@ -410,7 +413,10 @@ class Loop {
     look_at_goal(last);
     if (narrow_ && (was_at_goal || (out_.reached && !before))) {
       const std::string words = words_of_goal();
-      out_.message = words.empty() ? "the last estimate did not come to its end: " + answer.message : words;
+      const std::string open = said_of(answer, more_may_tell);
+      out_.message = !words.empty() ? words
+                     : open.empty() ? "the last estimate did not come to its end: " + answer.message
+                                    : "the intervals are narrow, but not all that the data allow: " + open;
     } else if (was_at_goal) {
       out_.message = "the intervals are wider than was asked for, once all checks are made";
     }

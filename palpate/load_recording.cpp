@@ -66,7 +66,8 @@ acquisition::FromStreams recording_of(const io::MessageSource& bag, io::BagMappi
 LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
   std::error_code code;
   if (!fs::exists(path, code))
-    throw Error("there is no such file or folder; a recording is a folder with recording.yaml in it, or a bag (docs/recording-format.md)", path.string());
+    throw Error((code ? "cannot be looked at (" + code.message() + ")" : std::string("there is no such file or folder")) +
+                    "; a recording is a folder with recording.yaml in it, or a bag (docs/recording-format.md)", path.string());
   if (!io::is_bag(path)) {
     if (!given.empty()) throw Error("is a recording; only a bag needs a mapping", path.string());
     Recording recording = io::read_recording_unchecked(path);
@@ -76,7 +77,7 @@ LoadedRecording load_recording(const fs::path& path, const fs::path& given) {
   const fs::path file = given.empty() ? mapping_of(path) : given;
   if (file.empty()) {
     io::read_bag(path);  // or it only has the name of one, and says so
-    throw Error("is a bag: say what its topics mean with --mapping FILE; `palpate info` suggests one", path.string());
+    throw Error("is a bag: say what its topics mean by a mapping (`--mapping FILE`); `palpate info` suggests one", path.string());
   }
   io::BagMapping mapping = io::read_mapping(file);
   for (const io::MappedCamera& camera : mapping.cameras) check_noise(camera.like.noise.model, camera.noise_where);

@@ -77,7 +77,7 @@ struct Noun<DepthNoise> {
   static void fields(auto&& field) {
     field("model", &DepthNoise::model, "one of palpate.depth_sensors(), or 'constant'");
     field("sigma_m", &DepthNoise::sigma_m, "of 'constant'");
-    field("bias_std_m", &DepthNoise::bias_std_m, "prior of one common depth offset a push (0: none)");
+    field("bias_std_m", &DepthNoise::bias_std_m, "prior of one common depth offset a push and camera (0: none)");
     field("shared_std_m", &DepthNoise::shared_std_m, "error that neighbouring pixels share, beside the model's own");
     field("lens_scatter_std", &DepthNoise::lens_scatter_std, "prior on the share of the picture's light that the lens spreads over every pixel (time of flight); nan: the model's");
   }

@@ -29,7 +29,7 @@ struct Camera {
 struct DepthNoise {
   std::string model = "constant";
   double sigma_m = std::numeric_limits<double>::quiet_NaN();  ///< of `constant`; NaN = not given
-  double bias_std_m = 0.0;                                    ///< prior of one common depth offset a push (0 = none)
+  double bias_std_m = 0.0;                                    ///< prior of one common depth offset a push and camera (0 = none)
   double shared_std_m = 0.0;                                  ///< error that neighbouring pixels share, beside the model's own
   /// Prior on the share of the picture's light that the lens spreads over every pixel (time of flight); NaN = the model's
   double lens_scatter_std = std::numeric_limits<double>::quiet_NaN();

@@ -177,10 +177,11 @@ class Exact {
           };
           if (auto* cloud = std::get_if<PointCloud>(&more[s][i])) pose(*cloud, "");
           if (auto* rays = std::get_if<RayObservation>(&more[s][i])) {
+            const int before = frames;
             pose(*rays, rays->camera);
             if (rays->bias_std_m == 0) {
               rays->bias_std_m = errors_.depth_m;
-              biased.insert("depth_bias" + of_camera(push, rays->camera));
+              biased.insert("depth_bias" + of_camera(push, rays->camera, before));
             }
           }
           if (auto* markers = std::get_if<Markers>(&more[s][i]); markers != nullptr && markers->rest_std_m == 0) {

@@ -49,13 +49,13 @@ void ForwardModel::add_surface(std::size_t s, const VectorX& unknowns, StepPredi
   place_surface(s, unknowns, predicted.in_span->moved_m(), predicted);
 }
 
-/// Of a rigid body all of it, whichever way its push goes: what a face without friction takes is along its normal. Of a platen whose
-/// nodes are moved the part along its motion.
 Vec3 ForwardModel::tare_n(const ToolErrors& errors, const VectorX& unknowns) {
   if (errors.tare < 0) return Vec3::Zero();
   return errors.tare_axis.norm() > 0 ? Vec3(unknowns(errors.tare) * errors.tare_axis) : Vec3(unknowns.segment<3>(errors.tare));
 }
 
+/// Of a rigid body all of it, whichever way its push goes: what a face without friction takes is along its normal. Of a platen whose
+/// nodes are moved the part along its motion.
 Vec3 ForwardModel::driven_force_n(const Body& body, const Load& load, const fem::ResponseState& at) {
   const int m = body.motion_column.at(load.tool), contact = m - body.node_motions;
   if (contact < 0) return at.reaction_n(m) * load.direction.normalized();

@@ -59,10 +59,11 @@ std::string of_load(const Push& push, std::size_t step, std::size_t load) {
   return with(ending, same == 0 ? tool : tool + " " + std::to_string(same + 1));
 }
 
-std::string of_camera(const Push& push, const std::string& camera) {
+std::string of_frame(int before) { return before == 0 ? "frame" : "frame" + std::to_string(before + 1); }
+
+std::string of_camera(const Push& push, const std::string& camera, int before) {
+  if (camera.empty() && before > 0) return "[" + push.name + ", " + of_frame(before) + "]";
   return camera.empty() || camera == "0" ? "[" + push.name + "]" : "[" + push.name + ", camera " + camera + "]";
 }
-
-std::string of_frame(int before) { return before == 0 ? "frame" : "frame" + std::to_string(before + 1); }
 
 }  // namespace palpate::estimation

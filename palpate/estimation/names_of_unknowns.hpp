@@ -26,9 +26,10 @@ std::string of_contact(const Push& push, std::size_t step, const Load& load);
 /// Of what is a single load's: "[PUSH:STEP]" of the step's first one, "[PUSH:STEP, TOOL]" of a further one.
 std::string of_load(const Push& push, std::size_t step, std::size_t load);
 
-/// Of what a camera (RayObservation::camera) errs by all along a push: "[PUSH]" of the recording's first one, and of one without a name,
-/// "[PUSH, camera 3]" of another one.
-std::string of_camera(const Push& push, const std::string& camera);
+/// Of what a camera (RayObservation::camera) errs by all along a push: "[PUSH]" of the recording's first one, "[PUSH, camera 3]" of another
+/// one. Images without a camera's name are one camera's, but for further ones of the same step: "[PUSH, frame2]".
+/// @param before  how many clouds and images the step has before it
+std::string of_camera(const Push& push, const std::string& camera, int before);
 
 /// "frame", "frame2", ...: how the names of the poses of a step's clouds and depth images begin.
 /// @param before  how many of them the step has before it

@@ -235,7 +235,7 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
     plan.seen_m.push_back(points_of(view.sees));
     plan.spacing.push_back(spacing_m(object.surface.rest(), static_cast<Index>(plan.seen_m.back().rows())));
     const auto* rays = std::get_if<RayObservation>(&view.sees);
-    plan.rest_step = plan.rest_step || (rays != nullptr && rays->bias_std_m > 0);
+    plan.rest_step = plan.rest_step || (rays != nullptr && (rays->bias_std_m > 0 || rays->scatter));
   }
   SimulatedObject small_strains = object;
   small_strains.material = "linear";

@@ -409,7 +409,7 @@ std::optional<Verdict> nu_not_explored(const Posterior& posterior) {
   if (posterior.unsolved_below) where = number(*posterior.unsolved_below, "{:.3f}") + " and below";
   if (posterior.unsolved_above) where += (where.empty() ? "" : ", nor at ") + number(*posterior.unsolved_above, "{:.3f}") + " and above";
   return Verdict{"nu_not_explored", "No equilibrium of the object under these loads was found with a Poisson ratio of " + where +
-                                        ", though the data do not exclude it: the intervals of E and nu know nothing of what lies there. Press "
+                                        ", though the data do not exclude it: the intervals of E and nu know nothing of what lies there, or are continued there unseen. Press "
                                         "less deep, or say what nu may be (`--poisson-range`)."};
 }
 

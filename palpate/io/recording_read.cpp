@@ -145,7 +145,7 @@ Recording read_recording_unchecked(const fs::path& given) {
   const YamlField format = keys.required("format", std::string("write 'format: ") + format_name + "'");
   if (format.text() != format_name) {
     if (format.text().starts_with("palpate-mapping/"))
-      format.fail("this is the mapping of a bag; name the bag in its place, and the mapping by --mapping unless it is mapping.yaml beside the bag");
+      format.fail("this is the mapping of a bag; name the bag in its place, and this as its mapping (`--mapping`) unless it is mapping.yaml beside the bag");
     format.fail("'" + format.text().substr(0, 60) + "' is not a format that this version reads; it reads " + format_name);
   }
   recording.source = given.string();

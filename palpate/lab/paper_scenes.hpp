@@ -22,7 +22,7 @@ struct PaperTrial {
   double young_modulus_pa = 0, poisson_ratio = 0;  ///< of the whole object; of one with regions: of its first site's
   std::vector<double> site_young_pa;               ///< where each push acts
   Push unused;                                     ///< a push that is not in the recording, to be predicted; may have no steps
-  std::string unused_stop;                         ///< then why, in plain words
+  std::string unused_stop;                         ///< why it never pressed, in plain words; empty: it did
   std::vector<double> unused_force_n;              ///< what truly acted, a step
   std::vector<TriMesh> unused_surface;             ///< how the object truly was, a step; none of one that is free
 };

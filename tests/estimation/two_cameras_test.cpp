@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <tuple>
 
 #include "planned_scene.hpp"
 #include "pushed_block.hpp"

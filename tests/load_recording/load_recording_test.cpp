@@ -6,8 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "io/made_up_recording.hpp"
 #include "io/recording_folder.hpp"
 #include "palpate/core/error.hpp"

@@ -402,7 +402,7 @@ std::unique_ptr<Term> make_ray_term(const RayObservation& observation, const Ter
   if (!(observation.rays.sigma_m.minCoeff() > 0)) throw Error("the depth's standard deviation must be positive", where);
   int bias = -1;
   if (observation.bias_std_m > 0) {
-    const std::string name = "depth_bias" + of_camera(context.model.push(context.step), observation.camera);
+    const std::string name = "depth_bias" + of_camera(context.model.push(context.step), observation.camera, context.frame);
     if (context.shared.count(name) == 0) context.shared[name] = context.unknowns.add({name, "m", 0, observation.bias_std_m});
     bias = context.shared[name];
   }

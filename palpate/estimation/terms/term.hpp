@@ -106,7 +106,7 @@ struct TermContext {
   const ForwardModel& model;
   std::size_t step = 0;
   Unknowns& unknowns;
-  /// Unknowns that several terms share, by name (depth bias of a push, marker offsets): first index.
+  /// Unknowns that several terms share, by name (depth bias of a push and camera, marker offsets): first index.
   std::map<std::string, int>& shared;
   int frame = 0;  ///< of a cloud or depth image: how many of them the step has before it
 };
