@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "palpate/core/error.hpp"
 #include "palpate/lab/paper_scenes.hpp"
 
 namespace palpate::cli {
@@ -83,14 +84,19 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
       if (!wanted(progress, what)) return rows;
       scene.shape = shape;
       const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress);
-      ModelChoice choice = choice_of(scene);
-      Prepared given = prepare(trial.recording, choice, nullptr, progress);
-      // Palpate does not take a planar back side for true, and is asked all the same; no finer mesh of it can be had.
-      const bool planar = shape == lab::PaperShape::planar_back;
-      if (planar) given.finer.reset();
-      const MethodAnswer ours = planar ? by_palpate(given, options_of(study), nullptr, progress)
-                                       : by_palpate_on_better_shape(trial.recording, choice, given, options_of(study), nullptr, progress);
-      rows.push_back({what, trial.young_modulus_pa, trial.poisson_ratio, by_paper(given, options_of(study), nullptr, progress), ours});
+      StudyRow& row = rows.emplace_back(StudyRow{what, trial.young_modulus_pa, trial.poisson_ratio, no_answer(), no_answer()});
+      try {
+        ModelChoice choice = choice_of(scene);
+        Prepared given = prepare(trial.recording, choice, nullptr, progress);
+        // Palpate does not take a planar back side for true, and is asked all the same; no finer mesh of it can be had.
+        const bool planar = shape == lab::PaperShape::planar_back;
+        if (planar) given.finer.reset();
+        row.palpate = planar ? by_palpate(given, options_of(study), nullptr, progress)
+                             : by_palpate_on_better_shape(trial.recording, choice, given, options_of(study), nullptr, progress);
+        row.paper = by_paper(given, options_of(study), nullptr, progress);
+      } catch (const Error& error) {  // what one view shows may make no body: then neither has an answer
+        row.paper.failed = row.palpate.failed = error.what();
+      }
     }
   }
   return rows;

@@ -247,7 +247,9 @@ std::string study_table(const StudyAnswer& answer) {
                         number(row.paper.poisson_ratio, "{:.3f}"), of_truth(row.palpate.young_modulus_pa, row.young_modulus_pa),
                         interval(row.palpate), number(row.palpate.poisson_ratio, "{:.3f}"),
                         !interval_there ? "" : inside ? "yes" : "<b>no</b>",
-                        std::isfinite(row.palpate.young_modulus_pa) || !row.palpate.verdicts.empty() ? listed(row.palpate.verdicts) : "");
+                        !row.palpate.failed.empty() ? escaped("no answer: " + row.palpate.failed)
+                        : std::isfinite(row.palpate.young_modulus_pa) || !row.palpate.verdicts.empty() ? listed(row.palpate.verdicts)
+                                                                                                       : "");
   }
   return html + fmt::format("</table>\n<p class=\"small\">Seed {}; true &nu; {:.3f}.</p>\n", answer.seed,
                             answer.rows.empty() ? 0 : answer.rows.front().poisson_ratio);
