@@ -16,6 +16,7 @@ namespace palpate::reconstruction {
 namespace {
 
 constexpr double near_share = 0.15;  // of the body's size
+constexpr double far_share = 1;       // the same: beyond it a few points are of no use either, and make the cells wide for all others
 constexpr double least_share = 0.02;  // of all points
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -98,7 +99,7 @@ double cell_for(const std::vector<PointCloud>& clouds) {
   return (low.array() <= high.array()).all() ? 2 * std::max(2.2 * sigma_m, (high - low).norm() / 150) : 0;
 }
 
-/// One round: the foreign clusters, and how near they come.
+/// One round: the foreign clusters, and how near those come that are more than noise.
 std::set<Index> foreign_clusters(const Clusters& clusters, std::size_t all_points, const std::vector<Touch>& touched, double& nearest_m) {
   std::set<Index> body_clusters, foreign;
   // A side that no view shows may be touched, too: what is nearest to it may be something else.
@@ -114,14 +115,14 @@ std::set<Index> foreign_clusters(const Clusters& clusters, std::size_t all_point
       low = low.cwiseMin(body.back()), high = high.cwiseMax(body.back());
     }
   for (const auto& [cluster, cells] : clusters.members()) {
-    if (body_clusters.count(cluster) != 0 || static_cast<double>(clusters.points_of(cluster)) < least_share * static_cast<double>(all_points))
-      continue;
+    if (body_clusters.count(cluster) != 0) continue;
+    const bool few = static_cast<double>(clusters.points_of(cluster)) < least_share * static_cast<double>(all_points);
     double least_m = infinity;
     for (const Index cell : cells)
       for (const Vec3& own : body) least_m = std::min(least_m, (clusters.middle_m(cell) - own).norm());
-    if (least_m < near_share * (high - low).norm()) continue;
+    if (least_m < (few ? far_share : near_share) * (high - low).norm()) continue;
     foreign.insert(cluster);
-    nearest_m = std::min(nearest_m, least_m);
+    if (!few) nearest_m = std::min(nearest_m, least_m);
   }
   return foreign;
 }
@@ -147,7 +148,7 @@ ForeignPoints drop_foreign(std::vector<PointCloud>& clouds, const std::vector<To
       std::vector<Index> stay;
       for (Index i = 0; i < cloud.points_m.rows(); ++i)
         if (foreign.count(clusters.cluster_of(point++)) == 0) stay.push_back(i);
-      dropped += static_cast<std::size_t>(cloud.points_m.rows()) - stay.size();
+      dropped += std::isfinite(near_m) ? static_cast<std::size_t>(cloud.points_m.rows()) - stay.size() : 0;
       cloud = chosen_points(cloud, stay);
     }
   }

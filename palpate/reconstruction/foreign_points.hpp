@@ -15,8 +15,8 @@ struct ForeignPoints {
 };
 
 /// Leaves out points that hang together with nothing that was touched: further from it than 0.15 of its own size, and at least
-/// a fiftieth of all points, for fewer are noise that fusing bears. Nothing is left out where nothing was touched that the
-/// views show.
+/// a fiftieth of all points. Fewer are noise that fusing bears, unless they are further than its size, which makes cells wide: these
+/// are left out without a word. Nothing is left out where nothing was touched that the views show.
 ForeignPoints drop_foreign(std::vector<PointCloud>& clouds, const std::vector<Touch>& touched);
 
 }  // namespace palpate::reconstruction
