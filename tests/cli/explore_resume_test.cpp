@@ -19,9 +19,11 @@ namespace {
 
 using namespace palpate::io::test;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 const std::string scene = PALPATE_SOURCE_DIR "/examples/driver/soft_scene";
 constexpr int input = 3;
+constexpr int in_doubt = 1;
 
 class ExploreResume : public RunningProgram {
  protected:
@@ -41,6 +43,13 @@ class ExploreResume : public RunningProgram {
     return explore(PALPATE_SPRING_ROBOT, more);
   }
   nlohmann::json told() const { return nlohmann::json::parse(folder.get("out/exploration.json")); }
+  /// Its intervals are narrow. The mesh is too coarse for the edge of the patch, whose radius the answer may put in doubt.
+  void expect_narrow(const std::vector<std::string>& words) {
+    const int code = palpate(words);
+    ASSERT_LE(code, in_doubt) << said;
+    EXPECT_THAT(told().at("message").get<std::string>(), StartsWith("both intervals are as narrow as was asked for"));
+    EXPECT_EQ(told().at("reached").get<bool>(), code == 0) << said;
+  }
   Recording recorded() const { return read_recording_unchecked(folder.path() / "out/recording"); }
   /// @param steps  of this push that are told before
   void kill_at(const pid_t child, const std::string& push, int steps) {
@@ -66,11 +75,10 @@ TEST_F(ExploreResume, KilledUnderLoadItGoesOnAndComesToItsGoal) {
   EXPECT_THAT(said, HasSubstr("cannot go on: its model's material is linear, and this command has foam"));
   EXPECT_EQ(recorded().pushes.size(), 2u);
 
-  ASSERT_EQ(palpate(to_the_goal(PALPATE_SPRING_ROBOT, {"--resume"})), 0) << said;
+  ASSERT_NO_FATAL_FAILURE(expect_narrow(to_the_goal(PALPATE_SPRING_ROBOT, {"--resume"})));
   EXPECT_THAT(said, HasSubstr("push 2 was cut off: its "));
   EXPECT_THAT(said, HasSubstr("push 2 and all before it, by an earlier run: E "));
   const nlohmann::json after = told();
-  EXPECT_TRUE(after.at("reached").get<bool>());
   const std::size_t pushes = after.at("pushes").size();
   EXPECT_GE(pushes, 2u);  // as many as if nothing had been ...
   EXPECT_LE(pushes, 3u);  // ... or one more, for the one that was cut off says less
@@ -93,7 +101,7 @@ TEST_F(ExploreResume, KilledUnderLoadItGoesOnAndComesToItsGoal) {
 TEST_F(ExploreResume, KilledBeforeItPressedThePushIsChosenAnew) {
   kill_at(start(explore(PALPATE_PATIENT_ROBOT)), "push 1", 1);
   ASSERT_EQ(recorded().pushes.size(), 1u);
-  ASSERT_EQ(palpate(one_push({"--resume"})), 0) << said;
+  ASSERT_NO_FATAL_FAILURE(expect_narrow(one_push({"--resume"})));
   EXPECT_THAT(said, HasSubstr("push 1 was cut off before it pressed"));
   EXPECT_EQ(told().at("pushes").size(), 1u);
   EXPECT_EQ(told().at("pushes")[0].at("push"), "push 1");
