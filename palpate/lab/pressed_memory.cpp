@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -17,6 +19,7 @@ struct PressedMemory::States {
   TriMesh rest;
   Index nodes = 0;
   std::vector<State> pressed;  // one after the other, each from the one before
+  std::set<std::pair<std::size_t, double>> too_far;  // forces (of an object of `one_pa`) that after so many states are not a short way on
   int solved = 0;
   std::string name;
 
@@ -26,14 +29,20 @@ struct PressedMemory::States {
     if (!kept || kept->rows() < 1 || row({0, 0, rest.vertices_m}) != kept->row(0)) return;
     for (Eigen::Index k = 1; k < kept->rows(); ++k) {
       const Eigen::RowVectorXd of = kept->row(k);
-      pressed.push_back({of(0), of(1), Eigen::Map<const Points>(of.data() + 2, rest.vertices_m.rows(), 3)});
+      if (std::isnan(of(1)))
+        too_far.emplace(std::size_t(of(2)), of(0));
+      else
+        pressed.push_back({of(0), of(1), Eigen::Map<const Points>(of.data() + 2, rest.vertices_m.rows(), 3)});
     }
   }
   void keep(const Store& store) const {
     if (!store.keep) return;
-    MatrixX kept(Eigen::Index(pressed.size()) + 1, 2 + rest.vertices_m.size());
-    kept.row(0) = row({0, 0, rest.vertices_m});
-    for (std::size_t k = 0; k < pressed.size(); ++k) kept.row(Eigen::Index(k) + 1) = row(pressed[k]);
+    MatrixX kept = MatrixX::Zero(Eigen::Index(1 + pressed.size() + too_far.size()), 2 + rest.vertices_m.size());
+    Eigen::Index k = 0;
+    kept.row(k++) = row({0, 0, rest.vertices_m});
+    for (const State& state : pressed) kept.row(k++) = row(state);
+    for (const auto& [states, force_n] : too_far)
+      kept.row(k++).head(3) << force_n, std::numeric_limits<double>::quiet_NaN(), double(states);
     store.keep(name, kept);
   }
 
@@ -84,13 +93,20 @@ class Remembered : public Pressed {
   bool reach(double force_n, bool by_following) {
     const double one_n = rounded(force_n / young_modulus_pa_ * one_pa);
     auto& known = states_->pressed;
+    if (by_following && states_->too_far.contains({next_, one_n})) return false;
     if (next_ < known.size() && known[next_].force_n == one_n) {
       now_ = known[next_];
     } else {
-      if (!solve(one_n, by_following)) return false;
-      known.resize(next_);  // what was pressed otherwise
-      known.push_back(now_);
+      const bool there = solve(one_n, by_following);
+      if (there) {
+        known.resize(next_);  // what was pressed otherwise
+        std::erase_if(states_->too_far, [this](const auto& one) { return one.first > next_; });
+        known.push_back(now_);
+      } else {
+        states_->too_far.emplace(next_, one_n);
+      }
       states_->keep(store_);
+      if (!there) return false;
     }
     ++next_;
     force_n_ = force_n;

@@ -22,7 +22,8 @@ class PressedMemory {
   /// What presses the object as it is made with the given E.
   using Make = std::function<std::unique_ptr<Pressed>(double young_modulus_pa, const PushSite& at)>;
   /// Where states outlive the program. A row a state, the first one at rest: newton of an object of 10 kPa, m of travel, then x, y, z
-  /// of every vertex of the surface, m.
+  /// of every vertex of the surface, m. At the end, rows whose travel is NaN: forces that were too far to follow, and in the third
+  /// column after how many pressed states (finding that out takes as long as all of them).
   struct Store {
     std::function<std::optional<MatrixX>(const std::string& name)> load;
     std::function<void(const std::string& name, const MatrixX& states)> keep;  ///< after every search for equilibrium

@@ -101,6 +101,58 @@ TEST(PressedMemory, WhatIsKeptElsewhereOutlivesIt) {
   EXPECT_EQ(other.solved(), 3) << "states of another surface are not taken";
 }
 
+/// A spring of a newton a millimetre that is followed by short steps alone.
+class ShortSteps : public Pressed {
+ public:
+  void press(double force_n) override { force_n_ = force_n; }
+  bool follow(double force_n) override {
+    if (force_n - force_n_ > 1.5) return false;
+    press(force_n);
+    return true;
+  }
+  double force_n() const override { return force_n_; }
+  double travel_m() const override { return 1e-3 * force_n_; }
+  TriMesh surface() const override {
+    TriMesh out;
+    out.vertices_m = Points::Constant(3, 3, 1 - travel_m());
+    out.triangles = Triangles(1, 3);
+    out.triangles << 0, 1, 2;
+    return out;
+  }
+  Index nodes() const override { return 3; }
+
+ private:
+  double force_n_ = 0;
+};
+
+TEST(PressedMemory, WhatWasTooFarIsNotTriedAgain) {
+  const PushSite top{"top", Vec3(0, 0, 0.1), -Vec3::UnitZ(), 1};
+  std::map<std::string, MatrixX> kept;
+  const PressedMemory::Store store{[&](const std::string& name) { return kept.contains(name) ? std::optional(kept[name]) : std::nullopt; },
+                                   [&](const std::string& name, const MatrixX& states) { kept[name] = states; }};
+  const auto spring = [](double, const PushSite&) { return std::make_unique<ShortSteps>(); };
+  for (const int solved : {4, 0}) {
+    PressedMemory memory(store);
+    const auto object = memory.at("spring", 1e4, top, spring);
+    EXPECT_TRUE(object->follow(1));
+    EXPECT_FALSE(object->follow(3));
+    EXPECT_TRUE(object->follow(2));
+    EXPECT_TRUE(object->follow(3));
+    EXPECT_FALSE(object->follow(5));
+    EXPECT_EQ(object->force_n(), 3);
+    EXPECT_EQ(object->travel_m(), 3e-3);
+    object->press(5);
+    EXPECT_EQ(memory.solved(), solved);
+    EXPECT_EQ(kept.begin()->second.rows(), 1 + 4 + 2);
+  }
+  PressedMemory memory(store);  // another way has other folds
+  const auto otherwise = memory.at("spring", 1e4, top, spring);
+  EXPECT_TRUE(otherwise->follow(1));
+  EXPECT_TRUE(otherwise->follow(2.5));
+  EXPECT_FALSE(otherwise->follow(5));
+  EXPECT_EQ(kept.begin()->second.rows(), 1 + 2 + 2) << "one of the first way, after its first state, and one of this";
+}
+
 TEST(PressedMemory, ARecordingIsTheSameWithAndWithoutIt) {
   const PaperScene& scene = paper_scene("cube");
   PressedMemory memory;
