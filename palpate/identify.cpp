@@ -22,6 +22,7 @@
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/regions_by_site.hpp"
+#include "palpate/geometry/box_rims.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/stand_on.hpp"
@@ -150,8 +151,14 @@ reconstruction::BuildOptions fill_options(const Recording& recording) {
   options.mesh.finer = finer_under_tools(recording);
   options.finer_feet = true;
   for (const Support& support : recording.supports) {
-    if (!recording.rest.surface || (support.kind != SupportKind::plane && support.kind != SupportKind::table)) continue;
-    for (const auto& near : geometry::finer_at_feet(support.plane, *recording.rest.surface)) options.mesh.finer.push_back(near);
+    if (!recording.rest.surface) break;
+    std::vector<geometry::FinerNear> finer;
+    if (support.kind == SupportKind::plane || support.kind == SupportKind::table)
+      finer = geometry::finer_at_feet(support.plane, *recording.rest.surface);
+    if (support.kind == SupportKind::box || (support.kind == SupportKind::clamp && support.select == NodeSelection::box))
+      finer = geometry::finer_at_rims(support.box_min_m.array() - support.tolerance_m, support.box_max_m.array() + support.tolerance_m,
+                                      *recording.rest.surface);
+    options.mesh.finer.insert(options.mesh.finer.end(), finer.begin(), finer.end());
   }
   return options;
 }

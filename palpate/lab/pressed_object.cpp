@@ -15,6 +15,7 @@
 #include "palpate/fem/contact_statics.hpp"
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
+#include "palpate/geometry/box_rims.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/geometry/stand_on.hpp"
@@ -139,11 +140,6 @@ fem::RigidContact contact_of(const Support& support) {
 bool holds(const Support& support, const TetMesh& mesh, const Tetrahedra& faces, Index f) {
   const auto corner = [&](int k) { return Vec3(mesh.nodes_m.row(faces(f, k))); };
   const Vec3 a = corner(0), b = corner(1), c = corner(2);
-  if (support.kind == SupportKind::box) {
-    for (const Vec3& p : {a, b, c})
-      if (((p - support.box_min_m).array() < 0).any() || ((support.box_max_m - p).array() < 0).any()) return false;
-    return true;
-  }
   const Vec3& normal = support.plane.normal;
   const double tolerance_m = 0.02 * std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
   for (const Vec3& p : {a, b, c})
@@ -171,6 +167,12 @@ struct PressedObject::Impl {
           near.edge_m *= 5.0 / 6;
           filling.finer.push_back(near);
         }
+    for (const Support& support : options.supports)
+      if (!flat(support))
+        for (auto near : geometry::finer_at_rims(support.box_min_m, support.box_max_m, options.surface)) {
+          near.edge_m *= 0.5;
+          filling.finer.push_back(near);
+        }
     TetMesh linear = geometry::tetrahedralise(options.surface, filling).mesh;
     for (const Support& support : options.supports)
       if (flat(support)) geometry::stand_on(support.plane, options.surface, linear);
@@ -181,6 +183,10 @@ struct PressedObject::Impl {
     std::vector<fem::RigidContact> contacts;
     const Tetrahedra faces = fem::boundary_faces(mesh);
     for (const Support& support : options.supports) {
+      if (!flat(support)) {
+        for (const Index n : fem::support_nodes(mesh, support)) stays[std::size_t(n)] = held[std::size_t(n)] = 1;
+        continue;
+      }
       if (pushes_only(support)) contacts.push_back(contact_of(support));
       for (Index f = 0; f < faces.rows(); ++f) {
         if (!holds(support, mesh, faces, f)) continue;
