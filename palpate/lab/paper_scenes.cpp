@@ -7,6 +7,7 @@
 #include <string>
 
 #include "palpate/acquisition/push_protocol.hpp"
+#include "palpate/core/error.hpp"
 #include "palpate/lab/robot.hpp"
 
 namespace palpate::lab {
@@ -188,7 +189,9 @@ PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const O
     const int before_slip = scene.slip_m > 0 ? 1 : (depth.samples + 1) / 2;
     const int all = depth.samples;
     if (slip_m > 0) depth.samples = before_slip;
-    if (!push_at(robot, robot.plan(s), depth, push, nullptr, progress, share * static_cast<double>(s), share)) return trial;
+    std::string why;
+    if (!push_at(robot, robot.plan(s), depth, push, nullptr, progress, share * static_cast<double>(s), share, &why)) return trial;
+    if (!why.empty()) throw Error(why + ", so that there is nothing to estimate from", "push at " + sites[s].name);
     if (slip_m > 0) {
       Push aside;
       depth.samples = all;

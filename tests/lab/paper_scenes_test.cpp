@@ -72,6 +72,19 @@ TEST(PaperScenes, AFaultChangesWhatItSaysAndNothingElse) {
 
 // The arm stood 8 cm deep where it was asked to stop, ran into the object on its way to the unused place, and nothing was there to
 // be predicted.
+TEST(PaperScenes, APushThatNeverPressesIsSaidAndNotFitted) {
+  PaperScene scene = paper_scene("cow");
+  scene.object = "cube";
+  scene.unused.reset();
+  scene.young_modulus_pa = 1;  // a breath of a cube: what it pushes back with no sensor feels
+  try {
+    make_paper_trial(scene, 1);
+    FAIL() << "taken";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("push at top: no contact within "), std::string::npos) << error.what();
+  }
+}
+
 TEST(PaperScenes, ThePushAfterADeepOneIsMade) {
   PaperScene deep = paper_scene("foam9cm");
   deep.true_law = "linear";  // solved at once
