@@ -13,6 +13,7 @@ namespace {
 
 constexpr double far_prior = 12;         // standard deviations of its prior that no nuisance leaves: the search must come back
 constexpr double bends_more = 0.25;  // of log E: what linear theory takes a soft body for softer that bends away under its load
+constexpr double hardly_a_gain = 0.01;  // of half of chi-square: a seventh of a standard deviation
 constexpr std::size_t rough_steps = 5;  // of a long recording are enough to come near the optimum
 
 MatrixX pick(const MatrixX& matrix, const std::vector<int>& which) {
@@ -163,8 +164,11 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
       return best;
     }
   }
-  best.termination = Termination::max_iterations;
-  best.message = "stopped after " + std::to_string(options.max_iterations) + " iterations";
+  // Along a valley that hardly falls (nu of a single light push, say) small steps go on for long, and change nothing that counts.
+  const std::vector<int> moving = moving_unknowns(unknowns, best.unknowns, best.evaluation.gradient);
+  const bool there = newton_step(best.evaluation, moving).gain < hardly_a_gain && model.reuse_error() <= options.reuse_error;
+  best.termination = there ? Termination::converged : Termination::max_iterations;
+  best.message = there ? "converged" : "stopped after " + std::to_string(options.max_iterations) + " iterations";
   return best;
 }
 
