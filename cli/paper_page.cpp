@@ -150,7 +150,7 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vecto
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
       "<title>The paper's evaluation, remade</title><style>body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem "
-      "auto;padding:0 1rem;color:#16202c;background:#fff}table{border-collapse:collapse;display:block;overflow-x:auto}td,th{padding:.25rem "
+      "auto;padding:0 1rem;color:#16202c;background:#fff}table{border-collapse:collapse;display:block;overflow-x:auto;margin:1rem 0}td,th{padding:.25rem "
       ".7rem;border-bottom:1px solid #dfe3e8;text-align:right;white-space:nowrap}th{white-space:normal;vertical-align:bottom}"
       "td:first-child,th:first-child{text-align:left}td:last-child,td:first-child{white-space:normal;min-width:5rem}figure{margin:1rem 0}.views{display:flex;flex-wrap:wrap;gap:1rem}.view{margin:0;max-width:min(100%,40rem)}.view img{max-width:100%;height:auto;image-rendering:pixelated;border:1px solid #dfe3e8}svg{max-width:100%;height:auto}"
       ".words{min-width:16rem;max-width:24rem;text-align:left;white-space:normal}.small,figcaption{color:#55606e;font-size:.9rem}code{font-size:.9rem}</style>"

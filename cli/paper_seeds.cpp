@@ -121,7 +121,7 @@ std::string PaperRuns::command() const {
   if (first <= last) out += fmt::format(" --seed {} --seeds {}", first, last - first + 1);
   if (details_of != 1) out += fmt::format(" --details-of {}", details_of);
   if (scenes.size() + studies.size() < lab::paper_scenes().size() + cli::studies().size()) out += names;
-  return object.empty() ? out : out + " --object " + object;
+  return object.empty() ? out : out + " --object " + object + put;
 }
 
 SeedFolder::SeedFolder(const fs::path& out) : seeds_(out / "seeds") {}
@@ -205,6 +205,9 @@ void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
     runs.placed = object;
     runs.object = seed.at("object_name");
     if (!runs.object.empty()) {
+      const nlohmann::json& how = seed.at("options").at("object");
+      runs.put = fmt::format(" --object-up {}", how.at("up").get<std::string>());
+      if (how.at("size_m").get<double>() > 0) runs.put += fmt::format(" --object-size {}", how.at("size_m").get<double>());
       if (!runs.cow) runs.cow = std::make_shared<lab::PaperScene>(in_the_cows_place("", nullptr));
       scene = runs.cow.get();
     }
@@ -213,7 +216,10 @@ void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
   read_into(trial, seed.at("trial"));
   trial.seed = number;
   runs.quick = runs.quick || seed.at("quick").get<bool>();
-  if (seed.at("options").at("pictures").get<bool>()) runs.details_of = number;
+  if (seed.at("options").at("pictures").get<bool>())
+    runs.details_of = number;
+  else if (runs.details_of == number)
+    runs.details_of = 0;  // not even the one that has them where nobody asks
   const auto later = [&](const SceneAnswers& other) { return place_of(other.scene->name) >= place_of(name); };
   auto at = std::find_if(runs.scenes.begin(), runs.scenes.end(), later);
   if (at == runs.scenes.end() || at->scene->name != name) at = runs.scenes.insert(at, SceneAnswers{scene, {}});

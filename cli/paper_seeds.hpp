@@ -39,6 +39,7 @@ struct PaperRuns {
   std::set<int> threads;
   std::string object;                ///< in the cow's place; empty: none
   std::string placed;                ///< the same, and how it is put
+  std::string put;                   ///< options that put it so
   std::shared_ptr<lab::PaperScene> cow;  ///< its scene
   bool quick = false;
   std::uint64_t details_of = 1;      ///< seed that also has pictures and the like
