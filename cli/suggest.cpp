@@ -19,6 +19,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/estimation/target_plan.hpp"
 #include "palpate/io/recording.hpp"
+#include "palpate/recording_oddities.hpp"
 #include "palpate/report/words.hpp"
 
 namespace palpate::cli {
@@ -48,6 +49,9 @@ Known read(Session& session, const Options& given, std::vector<std::string>& war
   const bool is_result = fs::exists(given.given / "result.json", code) || given.given.filename() == "result.json";
   if (!is_result) {
     known.recording = load_recording_unchecked(session, given.given, given.mapping);
+    const auto said = std::ptrdiff_t(known.recording.warnings.size());  // as it was read
+    warn_of_oddities(known.recording);  // an estimate has told them
+    warnings.assign(known.recording.warnings.begin() + said, known.recording.warnings.end());
     if (!known.recording.pushes.empty())
       warnings.push_back("what the recording's pushes say is not used: run `palpate estimate` first and give its result");
     return known;

@@ -171,6 +171,18 @@ TEST_F(Suggest, OfAnObjectInRegionsEveryPushSaysWhichOfThemItPresses) {
   EXPECT_LE(1.96 * after["poisson_std"].get<double>(), 0.05);
 }
 
+TEST_F(Suggest, OddNumbersOfTheSceneAreSaid) {
+  Recording odd = box_on_table();
+  odd.environment.gravity_m_s2 = Vec3(0, 0, -5);
+  odd.density_kg_m3 = 100;
+  const std::string folder = (files_ / "odd").string();
+  io::write_recording(odd, folder);
+  const Answer answer = suggest(folder, "--for poisson-ratio --force-limit 2.5");
+  ASSERT_EQ(answer.exit_code, 0);
+  ASSERT_TRUE(answer.json.is_object());
+  EXPECT_THAT(answer.json["warnings"].dump(), testing::HasSubstr("on earth it is 9.81"));
+}
+
 TEST_F(Suggest, BeforeTheFirstTouchPushesAreSortedAndWithinTheLimits) {
   const Answer answer = suggest(folder_, "--for poisson-ratio --force-limit 2.5");
   ASSERT_EQ(answer.exit_code, 0);
