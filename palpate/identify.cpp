@@ -22,14 +22,13 @@
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/regions_by_site.hpp"
-#include "palpate/geometry/box_rims.hpp"
 #include "palpate/geometry/embedding.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
-#include "palpate/geometry/stand_on.hpp"
 #include "palpate/geometry/subdivide.hpp"
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/reconstruction/build_object.hpp"
+#include "palpate/reconstruction/finer_at_supports.hpp"
 #include "palpate/sensing/free_space.hpp"
 #include "palpate/sensing/images_at_rest.hpp"
 #include "palpate/sensing/observe.hpp"
@@ -150,16 +149,8 @@ reconstruction::BuildOptions fill_options(const Recording& recording) {
   if (recording.model.refine != "auto") return options;
   options.mesh.finer = finer_under_tools(recording);
   options.finer_feet = true;
-  for (const Support& support : recording.supports) {
-    if (!recording.rest.surface) break;
-    std::vector<geometry::FinerNear> finer;
-    if (support.kind == SupportKind::plane || support.kind == SupportKind::table)
-      finer = geometry::finer_at_feet(support.plane, *recording.rest.surface);
-    if (support.kind == SupportKind::box || (support.kind == SupportKind::clamp && support.select == NodeSelection::box))
-      finer = geometry::finer_at_rims(support.box_min_m.array() - support.tolerance_m, support.box_max_m.array() + support.tolerance_m,
-                                      *recording.rest.surface);
-    options.mesh.finer.insert(options.mesh.finer.end(), finer.begin(), finer.end());
-  }
+  if (!recording.rest.surface) return options;
+  for (const auto& near : reconstruction::finer_at_supports(recording.supports, *recording.rest.surface)) options.mesh.finer.push_back(near);
   return options;
 }
 

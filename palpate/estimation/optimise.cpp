@@ -166,7 +166,8 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
   }
   // Along a valley that hardly falls (nu of a single light push, say) small steps go on for long, and change nothing that counts.
   const std::vector<int> moving = moving_unknowns(unknowns, best.unknowns, best.evaluation.gradient);
-  const bool there = newton_step(best.evaluation, moving).gain < hardly_a_gain && model.reuse_error() <= options.reuse_error;
+  const double little = options.enough_gain > 0 ? std::min(options.enough_gain, hardly_a_gain) : hardly_a_gain;
+  const bool there = newton_step(best.evaluation, moving).gain < little && model.reuse_error() <= options.reuse_error;
   best.termination = there ? Termination::converged : Termination::max_iterations;
   best.message = there ? "converged" : "stopped after " + std::to_string(options.max_iterations) + " iterations";
   return best;

@@ -189,15 +189,19 @@ PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const O
     const int before_slip = scene.slip_m > 0 ? 1 : (depth.samples + 1) / 2;
     const int all = depth.samples;
     if (slip_m > 0) depth.samples = before_slip;
+    const auto must_press = [&](const std::string& why) {
+      if (!why.empty()) throw Error(why + ", so that there is nothing to estimate from", "push at " + sites[s].name);
+    };
     std::string why;
     if (!push_at(robot, robot.plan(s), depth, push, nullptr, progress, share * static_cast<double>(s), share, &why)) return trial;
-    if (!why.empty()) throw Error(why + ", so that there is nothing to estimate from", "push at " + sites[s].name);
+    must_press(why);
     if (slip_m > 0) {
       Push aside;
       depth.samples = all;
       const Vec3 place_m = sites[s].contact_m + slip_m * acquisition::tip_along(sites[s].direction).col(0);
-      if (!push_at(robot, robot.plan_at(place_m, sites[s].direction), depth, aside, nullptr, progress, share * static_cast<double>(s), share))
+      if (!push_at(robot, robot.plan_at(place_m, sites[s].direction), depth, aside, nullptr, progress, share * static_cast<double>(s), share, &why))
         return trial;
+      must_press(why);
       slip(push, aside, static_cast<std::size_t>(before_slip) + 1, deeper_m);
     }
     trial.recording.pushes.push_back(std::move(push));

@@ -13,6 +13,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/geometry/union_find.hpp"
 #include "palpate/reconstruction/facets.hpp"
+#include "palpate/reconstruction/finer_at_supports.hpp"
 #include "palpate/reconstruction/foreign_points.hpp"
 #include "palpate/reconstruction/fused_surface.hpp"
 #include "palpate/registration/views.hpp"
@@ -31,8 +32,6 @@ double mean_edge(const TriMesh& m) {
 bool is_plane(SupportKind kind) {
   return kind == SupportKind::plane || kind == SupportKind::table || kind == SupportKind::wall;
 }
-
-bool stands_on(SupportKind kind) { return kind == SupportKind::plane || kind == SupportKind::table; }
 
 bool found_by_place(SupportKind kind) {
   return kind == SupportKind::plane || kind == SupportKind::box || kind == SupportKind::table || kind == SupportKind::wall;
@@ -248,9 +247,7 @@ BuiltObject build_object(const std::vector<PointCloud>& views, const FuseOptions
   if (fused.inside) skin = fused_surface(fused, fine);
   BuildOptions filling = options;
   if (fused.inside && options.finer_feet)
-    for (const Support& s : supports)
-      if (stands_on(s.kind))
-        for (const auto& near : geometry::finer_at_feet(s.plane, skin)) filling.mesh.finer.push_back(near);
+    for (const auto& near : finer_at_supports(supports, skin)) filling.mesh.finer.push_back(near);
   BuiltObject out = fill(fused.inside ? skin : fused.facets, fused.inside ? Foot::found : Foot::loose, supports, filling, progress);
   const double floating = drop_floating(supports, out.model.volume);
   if (floating > 0)

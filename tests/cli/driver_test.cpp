@@ -17,8 +17,8 @@ namespace palpate::io {
 namespace {
 
 using namespace palpate::io::test;
+using testing::AnyOf;
 using testing::HasSubstr;
-using testing::StartsWith;
 
 const std::string scene = PALPATE_SOURCE_DIR "/examples/driver/scene";
 
@@ -103,9 +103,10 @@ TEST_F(Driver, ExploresAHalfSpaceWhoseModulusComesOut) {
   ASSERT_TRUE(answer.is_object()) << folder.get("err");
   ASSERT_EQ(answer.at("pushes").size(), 1u);
   EXPECT_EQ(answer.at("fruitless"), 0);
-  EXPECT_THAT(answer.at("message").get<std::string>(), StartsWith("both intervals are as narrow as was asked for"));
   // The coarse mesh blurs the edge of the pad: its radius may come to be in doubt, and then the goal is not reached.
-  const bool in_doubt = answer.at("message").get<std::string>().find("not to be believed: tool_radius_doubtful") != std::string::npos;
+  const std::string narrow = "both intervals are as narrow as was asked for", doubted = narrow + ", but not to be believed: tool_radius_doubtful";
+  EXPECT_THAT(answer.at("message").get<std::string>(), AnyOf(narrow, doubted));
+  const bool in_doubt = answer.at("message") == doubted;
   EXPECT_EQ(answer.at("reached").get<bool>(), !in_doubt) << folder.get("err");
   EXPECT_EQ(code, in_doubt ? 1 : 0) << folder.get("err");
   EXPECT_THAT(folder.get("err"), HasSubstr(" after 1 push. Next: "));

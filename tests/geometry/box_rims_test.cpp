@@ -46,6 +46,40 @@ TEST(FinerAtRims, EachLegHasItsOwn) {
   }
 }
 
+TEST(FinerAtRims, ASoupOfTrianglesHasTheSame) {
+  const TriMesh bars = two_bars();
+  TriMesh soup;
+  soup.vertices_m.resize(3 * bars.triangles.rows(), 3);
+  soup.triangles.resize(bars.triangles.rows(), 3);
+  for (Index t = 0; t < bars.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      soup.vertices_m.row(3 * t + k) = bars.vertices_m.row(bars.triangles(t, k));
+      soup.triangles(t, k) = int(3 * t + k);
+    }
+  const auto of_soup = finer_at_rims({-1, -1, -0.01}, {1, 1, 0.03}, soup), of_mesh = finer_at_rims({-1, -1, -0.01}, {1, 1, 0.03}, bars);
+  ASSERT_EQ(of_soup.size(), of_mesh.size());
+  for (std::size_t k = 0; k < of_soup.size(); ++k) EXPECT_NEAR(of_soup[k].edge_m, of_mesh[k].edge_m, 1e-12);
+}
+
+TEST(FinerAtRims, TheTwoOfABarThatIsHeldInTheMiddleAreApart) {
+  const auto finer = finer_at_rims({-1, -1, 0.04}, {1, 1, 0.06}, lab::box_surface({0, 0, 0}, {0.02, 0.02, 0.1}, 1));  // sides of two triangles
+  ASSERT_FALSE(finer.empty());
+  for (const FinerNear& one : finer) {
+    EXPECT_NEAR(std::abs(one.point_m.z() - 0.05), 0.01, 1e-12);
+    EXPECT_NEAR(one.edge_m, 0.12 * 0.08 / (2 * std::sqrt(EIGEN_PI)), 1e-9);
+  }
+}
+
+TEST(FinerAtRims, WhatOnlyGrazesASideIsNone) {
+  TriMesh bars = two_bars();
+  for (Index v = 0; v < bars.vertices_m.rows(); ++v)
+    if (bars.vertices_m.row(v).isApprox(Eigen::RowVector3d(0.02, 0.02, 0))) bars.vertices_m(v, 2) = -1e-4;  // a burr below the box
+  const auto burr = finer_at_rims({-1, -1, -5e-5}, {1, 1, 0.03}, bars);
+  ASSERT_FALSE(burr.empty());
+  for (const FinerNear& one : burr) EXPECT_NEAR(one.point_m.z(), 0.03, 1e-12);
+  EXPECT_TRUE(finer_at_rims({-1, -1, -1}, {1, 1, -1e-4}, bars).empty()) << "touches the side with one vertex";
+}
+
 TEST(FinerAtRims, NoneWhereTheSurfaceIsInsideOrOutside) {
   EXPECT_TRUE(finer_at_rims({-1, -1, -1}, {1, 1, 1}, two_bars()).empty());
   EXPECT_TRUE(finer_at_rims({2, 2, 2}, {3, 3, 3}, two_bars()).empty());

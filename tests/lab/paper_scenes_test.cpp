@@ -70,8 +70,6 @@ TEST(PaperScenes, AFaultChangesWhatItSaysAndNothingElse) {
   EXPECT_NEAR(tilted.recording.tools.at(0).radius_m, 0.5 * right.recording.tools.at(0).radius_m, 1e-12);
 }
 
-// The arm stood 8 cm deep where it was asked to stop, ran into the object on its way to the unused place, and nothing was there to
-// be predicted.
 TEST(PaperScenes, APushThatNeverPressesIsSaidAndNotFitted) {
   PaperScene scene = paper_scene("cow");
   scene.object = "cube";
@@ -85,6 +83,8 @@ TEST(PaperScenes, APushThatNeverPressesIsSaidAndNotFitted) {
   }
 }
 
+// The arm stood 8 cm deep where it was asked to stop, ran into the object on its way to the unused place, and nothing was there to
+// be predicted.
 TEST(PaperScenes, ThePushAfterADeepOneIsMade) {
   PaperScene deep = paper_scene("foam9cm");
   deep.true_law = "linear";  // solved at once
