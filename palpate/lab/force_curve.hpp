@@ -30,6 +30,10 @@ class ForceCurve {
   };
   Place at(double travel_m) {
     while (travels_.back() < travel_m && !(proportional_ && travels_.size() > 1)) {
+      if (step_n_ < still * forces_.back()) {
+        go_on_at_limit(travel_m);
+        continue;
+      }
       press_on();
       forces_.push_back(object_->force_n());
       travels_.push_back(object_->travel_m());
@@ -53,6 +57,25 @@ class ForceCurve {
   }
 
  private:
+  // A foam bears no more than some force, and steps towards it get shorter without end. A little further it gives way under that
+  // force as it did last.
+  void go_on_at_limit(double travel_m) {
+    constexpr double a_little = 1.05;
+    const std::size_t last = travels_.size() - 1;
+    if (limit_m_ == 0) limit_m_ = travels_[last];
+    if (travel_m > a_little * limit_m_)
+      throw Error("the true object bears no more than " + std::to_string(forces_[last]) + " N, " + std::to_string(1000 * limit_m_) +
+                      " mm deep: press less deep",
+                  "LabRobot");
+    std::size_t before = last;
+    while (before > 0 && travels_[last] - travels_[before] < 0.1 * step_m_) --before;
+    const double share = (a_little * limit_m_ - travels_[last]) / (travels_[last] - travels_[before]);
+    TriMesh further = surfaces_[last];
+    further.vertices_m += share * (surfaces_[last].vertices_m - surfaces_[before].vertices_m);
+    forces_.push_back(forces_[last]);
+    travels_.push_back(a_little * limit_m_);
+    surfaces_.push_back(std::move(further));
+  }
   // Where a fold is near, a whole step may be beyond it: the object is followed in smaller ones, and looked for elsewhere last.
   void press_on() {
     constexpr int most_halvings = 3;
@@ -61,8 +84,9 @@ class ForceCurve {
     object_->press(forces_.back() + step_n_);
   }
 
+  static constexpr double still = 1e-4;  // of the force: a fold is passed in steps of a thousandth and more
   std::unique_ptr<Pressed> object_;
-  double step_n_, step_m_;
+  double step_n_, step_m_, limit_m_ = 0;
   bool proportional_;
   std::vector<double> forces_, travels_;
   std::vector<TriMesh> surfaces_;

@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "palpate/core/error.hpp"
 #include "palpate/lab/pressed_block.hpp"
 
 namespace palpate::lab {
@@ -117,6 +118,48 @@ TEST(ForceCurve, ABlockThatIsNotFollowedIsLeftAsItWas) {
   EXPECT_FALSE(in_steps.follow(400));
   EXPECT_EQ(in_steps.travel_m(), travel_m);
   EXPECT_EQ(in_steps.force_n(), 16);
+}
+
+/// Softens until it bears no more: 10 N at 50 mm. A short way is half of what is left to that.
+class Softening : public Pressed {
+ public:
+  explicit Softening(int& presses) : presses_(presses) {}
+  void press(double force_n) override {
+    ++presses_;
+    if (force_n >= most_n) throw Error("found no equilibrium", "Softening");
+    force_n_ = force_n;
+  }
+  bool follow(double force_n) override {
+    if (most_n - force_n < 0.5 * (most_n - force_n_)) return false;
+    press(force_n);
+    return true;
+  }
+  double force_n() const override { return force_n_; }
+  double travel_m() const override { return 0.05 * (1 - std::sqrt(1 - force_n_ / most_n)); }
+  TriMesh surface() const override {
+    TriMesh out;
+    out.vertices_m = Points::Constant(3, 3, -travel_m());
+    out.triangles = Triangles(1, 3);
+    out.triangles << 0, 1, 2;
+    return out;
+  }
+  Index nodes() const override { return 3; }
+
+ private:
+  static constexpr double most_n = 10;
+  int& presses_;
+  double force_n_ = 0;
+};
+
+TEST(ForceCurve, EndsAtTheMostThatTheObjectBears) {
+  int presses = 0;
+  ForceCurve curve(std::make_unique<Softening>(presses), 0.5, 0.003);
+  EXPECT_NEAR(curve.force_n(curve.at(0.03)), 10 * (1 - 0.4 * 0.4), 0.02);
+  EXPECT_NEAR(curve.force_n(curve.at(0.051)), 10, 0.01);
+  EXPECT_NEAR(curve.surface(curve.at(0.051)).vertices_m(0, 0), -0.051, 1e-6);
+  EXPECT_LT(presses, 60);
+  EXPECT_THROW(curve.at(0.06), Error);
+  EXPECT_NEAR(curve.force_n(curve.at(0.03)), 10 * (1 - 0.4 * 0.4), 0.02) << "and what was known is";
 }
 
 }  // namespace
