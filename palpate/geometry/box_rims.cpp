@@ -15,7 +15,7 @@
 namespace palpate::geometry {
 namespace {
 
-constexpr double share = 0.12;          // of the root of the area that a rim goes around, as a circle of its length
+constexpr double share = 0.12;  // of the root of the area that a rim goes around, as a circle of its length
 constexpr double hardly_a_rim = 0.05;  // of the longest: where a foot only grazes a side, or a scan is rough there
 
 /// Where a triangle goes through one side of the box.
@@ -38,8 +38,8 @@ std::optional<Piece> within(const Vec3& low, const Vec3& high, Piece piece) {
     to = std::min(to, std::max(a, b));
   }
   if (from >= to) return {};
-  piece.from_m = start + from * way;
-  piece.to_m = start + to * way;
+  if (from > 0) piece.from_m = start + from * way;  // else to the last digit, by which the next triangle knows it
+  if (to < 1) piece.to_m = start + to * way;
   return piece;
 }
 
