@@ -20,6 +20,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
+const fs::path docs = fs::path(PALPATE_SOURCE_DIR) / "docs";
+
+PaperRuns kept_in(const fs::path& folder) {
+  const test::TemporaryFolder files("paper_kept");
+  const SeedFolder joined(files / "joined");
+  joined.take_from(folder);
+  return joined.collect();
+}
+
 std::string contents(const fs::path& file) {
   std::stringstream text;
   text << std::ifstream(file).rdbuf();
@@ -45,11 +54,7 @@ std::string prediction_row(const SceneAnswers& scene) {
 }
 
 TEST(PaperKept, TheTableIsMadeOfTheSeedsThatAreKept) {
-  const test::TemporaryFolder files("paper_kept");
-  const fs::path docs = fs::path(PALPATE_SOURCE_DIR) / "docs";
-  const SeedFolder joined(files / "joined");
-  joined.take_from(docs / "paper");
-  const PaperRuns runs = joined.collect();
+  const PaperRuns runs = kept_in(docs / "paper");
   ASSERT_FALSE(runs.scenes.empty());
   const std::string told = contents(docs / "benchmarks.md");
   for (const SceneAnswers& scene : runs.scenes) {
@@ -66,11 +71,7 @@ TEST(PaperKept, TheTableIsMadeOfTheSeedsThatAreKept) {
 }
 
 TEST(PaperKept, SoIsTheRowOfAMeshInTheCowsPlace) {
-  const test::TemporaryFolder files("paper_kept_spot");
-  const fs::path docs = fs::path(PALPATE_SOURCE_DIR) / "docs";
-  const SeedFolder joined(files / "joined");
-  joined.take_from(docs / "paper" / "spot");
-  const PaperRuns runs = joined.collect();
+  const PaperRuns runs = kept_in(docs / "paper" / "spot");
   ASSERT_EQ(runs.scenes.size(), 1u);
   EXPECT_EQ(runs.command(), "palpate paper -o OUT --quick --seed 1 --seeds 100 --details-of 0 --scene cow --object spot_crane.obj --object-up y --object-size 0.28");
   const SceneAnswers& scene = runs.scenes[0];
@@ -121,11 +122,7 @@ std::vector<std::string> rows_of(const SceneAnswers& scene) {
 }
 
 TEST(PaperKept, SoAreTheTablesOfSeedsInDetail) {
-  const test::TemporaryFolder files("paper_details");
-  const fs::path docs = fs::path(PALPATE_SOURCE_DIR) / "docs";
-  const SeedFolder joined(files / "joined");
-  joined.take_from(docs / "paper" / "details");
-  const PaperRuns runs = joined.collect();
+  const PaperRuns runs = kept_in(docs / "paper" / "details");
   EXPECT_EQ(runs.scenes.size(), lab::paper_scenes().size());
   EXPECT_EQ(runs.studies.size(), studies().size());
   const std::string told = contents(docs / "benchmarks.md");
