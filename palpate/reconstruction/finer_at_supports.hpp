@@ -8,7 +8,7 @@
 
 namespace palpate::reconstruction {
 
-/// Where a volume must be fine enough to be held as its surface is: at its feet on bonded planes and tables, around what is in boxes.
+/// Where a volume must be fine enough to be held as its surface is: at its feet on planes and tables, around what boxes hold.
 std::vector<geometry::FinerNear> finer_at_supports(const std::vector<Support>& supports, const TriMesh& surface);
 
 }  // namespace palpate::reconstruction
