@@ -34,7 +34,10 @@ class ForceCurve {
         go_on_at_limit(travel_m);
         continue;
       }
-      press_on();
+      if (!press_on()) {
+        step_n_ = 0;
+        continue;
+      }
       forces_.push_back(object_->force_n());
       travels_.push_back(object_->travel_m());
       surfaces_.push_back(object_->surface());
@@ -77,14 +80,22 @@ class ForceCurve {
     surfaces_.push_back(std::move(further));
   }
   // Where a fold is near, a whole step may be beyond it: the object is followed in smaller ones, and looked for elsewhere last.
-  void press_on() {
+  // @return whether there is an equilibrium so short a step on
+  bool press_on() {
     constexpr int most_halvings = 3;
     for (int halvings = 0; halvings < most_halvings; ++halvings, step_n_ *= 0.5)
-      if (object_->follow(forces_.back() + step_n_)) return;
-    object_->press(forces_.back() + step_n_);
+      if (object_->follow(forces_.back() + step_n_)) return true;
+    try {
+      object_->press(forces_.back() + step_n_);
+      return true;
+    } catch (const Error&) {
+      if (step_n_ > near_limit * forces_.back()) throw;
+      return false;
+    }
   }
 
-  static constexpr double still = 1e-4;  // of the force: a fold is passed in steps of a thousandth and more
+  // Of the force. A fold is passed in steps of a thousandth and more.
+  static constexpr double still = 1e-4, near_limit = 1e-3;
   std::unique_ptr<Pressed> object_;
   double step_n_, step_m_, limit_m_ = 0;
   bool proportional_;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/core/error.hpp"
+
 namespace palpate::lab {
 
 struct PressedMemory::States {
@@ -19,7 +21,8 @@ struct PressedMemory::States {
   TriMesh rest;
   Index nodes = 0;
   std::vector<State> pressed;  // one after the other, each from the one before
-  std::set<std::pair<std::size_t, double>> too_far;  // forces (of an object of `one_pa`) that after so many states are not a short way on
+  // Forces (of an object of `one_pa`) that after so many states are not a short way on; less than 0: not found from rest either.
+  std::set<std::pair<std::size_t, double>> too_far;
   int solved = 0;
   std::string name;
 
@@ -94,6 +97,8 @@ class Remembered : public Pressed {
     const double one_n = rounded(force_n / young_modulus_pa_ * one_pa);
     auto& known = states_->pressed;
     if (by_following && states_->too_far.contains({next_, one_n})) return false;
+    if (!by_following && states_->too_far.contains({next_, -one_n}))
+      throw Error("the true object was found to have no equilibrium under " + std::to_string(force_n) + " N: press less deep", states_->name);
     if (next_ < known.size() && known[next_].force_n == one_n) {
       now_ = known[next_];
     } else {
@@ -118,11 +123,23 @@ class Remembered : public Pressed {
     if (!object_) object_ = make_(one_pa, at_);
     for (; stands_ < next_; ++stands_, ++states_->solved) object_->press(states_->pressed[stands_].force_n);
     if (by_following && !object_->follow(one_n)) return false;
-    if (!by_following) object_->press(one_n);
+    if (!by_following) press_or_remember(one_n);
     ++states_->solved;
     stands_ = next_ + 1;
     now_ = {one_n, object_->travel_m(), object_->surface().vertices_m};
     return true;
+  }
+
+  void press_or_remember(double one_n) {
+    try {
+      object_->press(one_n);
+    } catch (const Error&) {
+      object_.reset();  // it may stand anywhere
+      stands_ = 0;
+      states_->too_far.emplace(next_, -one_n);
+      states_->keep(store_);
+      throw;
+    }
   }
 
   std::shared_ptr<PressedMemory::States> states_;

@@ -23,7 +23,7 @@ class PressedMemory {
   using Make = std::function<std::unique_ptr<Pressed>(double young_modulus_pa, const PushSite& at)>;
   /// Where states outlive the program. A row a state, the first one at rest: newton of an object of 10 kPa, m of travel, then x, y, z
   /// of every vertex of the surface, m. At the end, rows whose travel is NaN: forces that were too far to follow, and in the third
-  /// column after how many pressed states (finding that out takes as long as all of them).
+  /// column after how many pressed states (finding that out takes as long as all of them); negative ones have no equilibrium at all.
   struct Store {
     std::function<std::optional<MatrixX>(const std::string& name)> load;
     std::function<void(const std::string& name, const MatrixX& states)> keep;  ///< after every search for equilibrium

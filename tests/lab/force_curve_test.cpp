@@ -162,5 +162,39 @@ TEST(ForceCurve, EndsAtTheMostThatTheObjectBears) {
   EXPECT_NEAR(curve.force_n(curve.at(0.03)), 10 * (1 - 0.4 * 0.4), 0.02) << "and what was known is";
 }
 
+/// Not found beyond some force, neither on its way nor from rest.
+class Lost : public Softening {
+ public:
+  Lost(int& presses, int& lost, double most_found_n) : Softening(presses), lost_(lost), most_found_n_(most_found_n) {}
+  void press(double force_n) override {
+    if (force_n > most_found_n_) {
+      ++lost_;
+      throw Error("found no equilibrium", "Lost");
+    }
+    Softening::press(force_n);
+  }
+  bool follow(double force_n) override { return force_n <= most_found_n_ && Softening::follow(force_n); }
+
+ private:
+  int& lost_;
+  double most_found_n_;
+};
+
+TEST(ForceCurve, EndsWhereASearchJustBeyondTheLastFindsNothing) {
+  int presses = 0, lost = 0;
+  ForceCurve softening(std::make_unique<Softening>(presses), 0.5, 0.001);
+  const auto place = softening.at(0.045);
+  const double last_n = softening.force_n({place.below + 1, 0}), most_n = last_n + 1e-5, limit_m = 0.05 * (1 - std::sqrt(1 - last_n / 10));
+  ForceCurve near(std::make_unique<Lost>(presses, lost, most_n), 0.5, 0.001);
+  EXPECT_NEAR(near.force_n(near.at(1.01 * limit_m)), last_n, 1e-9);
+  EXPECT_EQ(lost, 1);
+  EXPECT_THROW(near.at(1.1 * limit_m), Error);
+  EXPECT_EQ(lost, 1) << "once is enough";
+
+  ForceCurve far(std::make_unique<Lost>(presses, lost, 7.8), 0.5, 0.003);
+  EXPECT_THROW(far.at(0.04), Error) << "the same in a long step is an object that was not found";
+  EXPECT_NEAR(far.force_n(far.at(0.02)), 10 * (1 - 0.6 * 0.6), 0.02);
+}
+
 }  // namespace
 }  // namespace palpate::lab

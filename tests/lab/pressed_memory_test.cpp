@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/core/error.hpp"
 #include "palpate/lab/paper_scenes.hpp"
 #include "palpate/lab/pressed_block.hpp"
 
@@ -101,10 +102,13 @@ TEST(PressedMemory, WhatIsKeptElsewhereOutlivesIt) {
   EXPECT_EQ(other.solved(), 3) << "states of another surface are not taken";
 }
 
-/// A spring of a newton a millimetre that is followed by short steps alone.
+/// A spring of a newton a millimetre that is followed by short steps alone, and bears 6 N.
 class ShortSteps : public Pressed {
  public:
-  void press(double force_n) override { force_n_ = force_n; }
+  void press(double force_n) override {
+    if (force_n > 6) throw Error("no equilibrium", "ShortSteps");
+    force_n_ = force_n;
+  }
   bool follow(double force_n) override {
     if (force_n - force_n_ > 1.5) return false;
     press(force_n);
@@ -151,6 +155,29 @@ TEST(PressedMemory, WhatWasTooFarIsNotTriedAgain) {
   EXPECT_TRUE(otherwise->follow(2.5));
   EXPECT_FALSE(otherwise->follow(5));
   EXPECT_EQ(kept.begin()->second.rows(), 1 + 2 + 2) << "one of the first way, after its first state, and one of this";
+}
+
+TEST(PressedMemory, WhatWasNotFoundIsNotSearchedForAgain) {
+  const PushSite top{"top", Vec3(0, 0, 0.1), -Vec3::UnitZ(), 1};
+  std::map<std::string, MatrixX> kept;
+  const PressedMemory::Store store{[&](const std::string& name) { return kept.contains(name) ? std::optional(kept[name]) : std::nullopt; },
+                                   [&](const std::string& name, const MatrixX& states) { kept[name] = states; }};
+  int made = 0;
+  const auto spring = [&](double, const PushSite&) { return ++made, std::make_unique<ShortSteps>(); };
+  for (const int solved : {3, 0}) {
+    PressedMemory memory(store);
+    const auto object = memory.at("spring", 1e4, top, spring);
+    object->press(4);
+    EXPECT_FALSE(object->follow(7));
+    EXPECT_THROW(object->press(7), Error);
+    EXPECT_EQ(object->force_n(), 4);
+    EXPECT_EQ(object->travel_m(), 4e-3);
+    object->press(5.5);  // from rest over 4 N, for it was lost
+    EXPECT_EQ(object->travel_m(), 5.5e-3);
+    EXPECT_EQ(memory.solved(), solved);
+    EXPECT_EQ(kept.begin()->second.rows(), 1 + 2 + 2);
+  }
+  EXPECT_EQ(made, 3) << "two at first, for the state at rest the last time";
 }
 
 TEST(PressedMemory, ARecordingIsTheSameWithAndWithoutIt) {
