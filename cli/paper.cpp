@@ -48,6 +48,7 @@ int join(Session& session, const PaperArguments& arguments) {
 /// What each stands for is in the tables; without names: all.
 void choose(const PaperArguments& arguments, std::uint64_t seed, PaperPlan& plan) {
   plan.study_seed = seed;
+  plan.study_seeds = std::max(arguments.seeds, 1);  // of those that are named: many only when asked for
   for (const std::string& name : arguments.scenes) {
     if (const Study* study = study_of(name)) {
       plan.studies.push_back(study);
@@ -60,6 +61,7 @@ void choose(const PaperArguments& arguments, std::uint64_t seed, PaperPlan& plan
   // Once, and not in every piece of a run.
   if (plan.details_of < seed || plan.details_of - seed >= static_cast<std::uint64_t>(plan.seeds)) return;
   plan.study_seed = plan.details_of;
+  plan.study_seeds = 1;
   for (const Study& study : studies()) plan.studies.push_back(&study);
 }
 
@@ -79,6 +81,7 @@ int remake(Session& session, const PaperArguments& arguments) {
     plan.object = {fs::path(arguments.object).filename().string(), io::sha256_hex(io::read_file(arguments.object)), arguments.file.up,
                    arguments.file.size_m};
     own = in_the_cows_place(plan.object.name, &surface);
+    lab::object_from_surface(surface, plan.object.name, {});  // that it is one is said before anything is run
     const auto cow = std::find_if(plan.scenes.begin(), plan.scenes.end(), [&](const auto* scene) { return scene->name == own.name; });
     if (cow == plan.scenes.end())
       throw Error("takes the place of the cow, which is not among the scenes: add --scene cow", "--object " + arguments.object);
@@ -108,7 +111,7 @@ Run verbs::paper(CLI::App& app) {
   for (const Study& study : studies()) scenes += fmt::format("\n{}: {}", study.name, study.title);
   app.add_option("-o,--output", arguments->output, "folder for paper.html, paper.json and seeds/, a file a seed; a run that was stopped goes on from these")->required();
   app.add_flag("--quick", arguments->quick, "one seed a scene and a coarse error surface: minutes a scene in place of many hours");
-  app.add_option("--seeds", arguments->seeds, "seeds a scene, from --seed on (default: 100, with --quick 1)")->check(positive_number());
+  app.add_option("--seeds", arguments->seeds, "seeds a scene, from --seed on (default: 100, with --quick 1; of a study that --scene names: 1)")->check(positive_number());
   app.add_option("--details-of", arguments->details_of,
                  "the seed of each scene that also gets pictures, samples alone, the grid search and cross-checks (0: none)")
       ->capture_default_str();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_json.hpp"
 
+#include <algorithm>
+
 namespace palpate::cli {
 namespace {
 
@@ -118,6 +120,19 @@ nlohmann::json json_of(const StudyAnswer& answer) {
                            {"true_poisson_ratio", row.poisson_ratio},
                            {"paper", json_of(row.paper)},
                            {"palpate", json_of(row.palpate)}});
+  return out;
+}
+
+nlohmann::json json_of(std::span<const StudyAnswer> sorted) {
+  nlohmann::json out = nlohmann::json::array();
+  while (!sorted.empty()) {
+    const auto end = std::find_if(sorted.begin(), sorted.end(), [&](const StudyAnswer& one) { return one.study != sorted.front().study; });
+    const auto seeds = static_cast<std::size_t>(end - sorted.begin());
+    out.push_back({{"study", sorted.front().study->name}, {"seeds", seeds}, {"rows", nlohmann::json::array()}});
+    for (const StudyScore& row : scores_of(sorted.first(seeds)))
+      out.back()["rows"].push_back({{"what", row.what}, {"paper", json_of(row.paper)}, {"palpate", json_of(row.palpate)}, {"verdicts", row.verdicts}});
+    sorted = sorted.subspan(seeds);
+  }
   return out;
 }
 

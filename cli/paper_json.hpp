@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "cli/paper_scores.hpp"
 #include "cli/paper_studies.hpp"
@@ -11,5 +12,7 @@ namespace palpate::cli {
 
 nlohmann::json json_of(const SceneAnswers& answers);
 nlohmann::json json_of(const StudyAnswer& answer);
+/// Over the seeds of each study. @param sorted  those of one study together
+nlohmann::json json_of(std::span<const StudyAnswer> sorted);
 
 }  // namespace palpate::cli

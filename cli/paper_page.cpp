@@ -143,10 +143,18 @@ std::string claims(const std::vector<SceneAnswers>& scenes) {
                             least < 100 ? ": too few to say so; a full run has 100" : "");
 }
 
+/// @param seeds  of one study; that of the details is shown, or else the first
+std::string study_section(std::span<const StudyAnswer> seeds, std::uint64_t details_of) {
+  const auto detailed = std::find_if(seeds.begin(), seeds.end(), [&](const StudyAnswer& one) { return one.seed == details_of; });
+  const StudyAnswer& shown = detailed != seeds.end() ? *detailed : seeds.front();
+  return fmt::format("<h2 id=\"{}\">{}</h2>\n<p>{}</p>\n", shown.study->name, shown.study->title, shown.study->about) + study_score_table(seeds) +
+         study_table(shown) + (shown.failed.empty() ? "" : "<p>It ended with an error: " + escaped(shown.failed) + "</p>\n");
+}
+
 }  // namespace
 
 std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& version,
-                       const std::string& command, const std::set<int>& threads) {
+                       const std::string& command, const std::set<int>& threads, std::uint64_t details_of) {
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
       "<title>The paper's evaluation, remade</title><style>body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem "
@@ -168,9 +176,10 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vecto
   html += claims(scenes);
   if (!scenes.empty()) html += overview_table(scenes);
   for (const SceneAnswers& scene : scenes) html += section(scene);
-  for (const StudyAnswer& answer : studies)
-    html += fmt::format("<h2 id=\"{}\">{}</h2>\n<p>{}</p>\n", answer.study->name, answer.study->title, answer.study->about) + study_table(answer) +
-            (answer.failed.empty() ? "" : "<p>It ended with an error: " + escaped(answer.failed) + "</p>\n");
+  for (std::size_t from = 0, to = 0; from < studies.size(); from = to) {
+    for (to = from; to < studies.size() && studies[to].study == studies[from].study;) ++to;
+    html += study_section(std::span(studies).subspan(from, to - from), details_of);
+  }
   return html + "</body></html>\n";
 }
 

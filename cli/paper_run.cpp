@@ -48,11 +48,14 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
     const std::uint64_t seed = plan.first_seed + static_cast<std::uint64_t>(k);
     return SeedAsked{std::string(scene.name), seed, options_of(plan, scene, seed), plan.object, plan.quick};
   };
-  const auto asked_of_study = [&](const Study& study) { return SeedAsked{std::string(study.name), plan.study_seed, {}, {}, plan.quick}; };
+  const auto asked_of_study = [&](const Study& study, int k) {
+    return SeedAsked{std::string(study.name), plan.study_seed + static_cast<std::uint64_t>(k), {}, {}, plan.quick};
+  };
   int there = 0;
   for (const lab::PaperScene* scene : plan.scenes)
     for (int k = 0; k < plan.seeds; ++k) there += folder.has(asked_of(*scene, k));
-  for (const Study* study : plan.studies) there += folder.has(asked_of_study(*study));
+  for (const Study* study : plan.studies)
+    for (int k = 0; k < plan.study_seeds; ++k) there += folder.has(asked_of_study(*study, k));
   if (there > 0) work.say(fmt::format("{} seeds are there already: going on", there));
   const auto add = [&](const nlohmann::json& seed) {
     add_seed(runs, seed, "the seed that was just run");
@@ -83,16 +86,20 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
     }
   }
   for (const Study* study : plan.studies) {
-    if (work.stopped() || folder.has(asked_of_study(*study))) continue;
-    StudyAnswer answer{study, plan.study_seed, {}, {}, 0};
-    try {
-      work.study(*study, {plan.study_seed, plan.threads}, answer);
-    } catch (const std::exception& error) {
-      answer.failed = error.what();
+    for (int k = 0; k < plan.study_seeds && !work.stopped(); ++k) {
+      const SeedAsked asked = asked_of_study(*study, k);
+      if (folder.has(asked)) continue;
+      StudyAnswer answer{study, asked.seed, {}, {}, 0};
+      try {
+        work.study(*study, {asked.seed, plan.threads}, answer);
+      } catch (const std::exception& error) {
+        answer.failed = error.what();
+      }
+      if (work.stopped()) break;
+      work.say(fmt::format("{} seed {}: {}; {:.0f} s", study->name, answer.seed,
+                           answer.failed.empty() ? fmt::format("{} rows", answer.rows.size()) : "failed: " + answer.failed, answer.seconds));
+      add(folder.keep(asked, answer, plan.threads));
     }
-    if (work.stopped()) break;
-    if (!answer.failed.empty()) work.say(fmt::format("{} seed {}: failed: {}", study->name, answer.seed, answer.failed));
-    add(folder.keep(asked_of_study(*study), answer, plan.threads));
   }
   return runs;
 }

@@ -11,8 +11,8 @@ namespace palpate::cli {
 struct PaperPlan {
   std::vector<const lab::PaperScene*> scenes;
   std::vector<const Study*> studies;
-  std::uint64_t first_seed = 1, study_seed = 1;
-  int seeds = 1;                 ///< a scene
+  std::uint64_t first_seed = 1, study_seed = 1;  ///< of scenes, and of studies
+  int seeds = 1, study_seeds = 1;                ///< a scene, and a study
   std::uint64_t details_of = 1;  ///< the seed of each scene that also gets pictures, samples alone, grid search and cross-checks
   bool quick = false;
   int threads = 1;

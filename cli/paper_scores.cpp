@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "cli/paper_words.hpp"
 
@@ -81,6 +82,11 @@ struct Answers {
     efforts.emplace_back().add(answer);
     // The fit with the other law is of the samples that this one left: it took both.
     if (&answer == &trial.other) efforts.back().add(trial.palpate);
+  }
+  void add(const StudyRow& row, const MethodAnswer& answer) {
+    if (!answered(answer) && answer.failed.empty() && answer.verdicts.empty()) return;
+    compared.push_back({row.young_modulus_pa, row.poisson_ratio, &answer});
+    if (answered(answer)) efforts.emplace_back().add(answer);
   }
   Score score() const { return score_of(compared, efforts); }
 };
@@ -171,6 +177,26 @@ SceneForesight foresight_of(const std::vector<TrialAnswer>& trials) {
   };
   out.paper = foresight(paper_force, paper_dent), out.palpate = foresight(palpate_force, palpate_dent);
   out.still_m = still.rms();
+  return out;
+}
+
+std::vector<StudyScore> scores_of(std::span<const StudyAnswer> seeds) {
+  std::vector<StudyScore> out;
+  std::vector<std::pair<Answers, Answers>> answers;  // a row: of the paper's method and of palpate
+  for (const StudyAnswer& seed : seeds) {
+    for (const StudyRow& row : seed.rows) {
+      auto at = std::find_if(out.begin(), out.end(), [&](const StudyScore& one) { return one.what == row.what; });
+      const auto k = static_cast<std::size_t>(at - out.begin());
+      if (at == out.end()) {
+        out.emplace_back().what = row.what;
+        answers.emplace_back();
+      }
+      answers[k].first.add(row, row.paper);
+      answers[k].second.add(row, row.palpate);
+      for (const std::string& code : std::set<std::string>(row.palpate.verdicts.begin(), row.palpate.verdicts.end())) ++out[k].verdicts[code];
+    }
+  }
+  for (std::size_t k = 0; k < out.size(); ++k) out[k].paper = answers[k].first.score(), out[k].palpate = answers[k].second.score();
   return out;
 }
 

@@ -2,9 +2,12 @@
 // Errors of both methods over the seeds of a scene, and what the evaluation has to show.
 #pragma once
 
+#include <map>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "cli/paper_studies.hpp"
 #include "cli/paper_trial.hpp"
 
 namespace palpate::cli {
@@ -52,6 +55,15 @@ SceneScores scores_of(const std::vector<TrialAnswer>& trials);
 
 /// Of seeds in which both methods expect something. Palpate's is that of the answer that counts.
 SceneForesight foresight_of(const std::vector<TrialAnswer>& trials);
+
+/// A row of a study over its seeds. Who was not asked is in no number.
+struct StudyScore {
+  std::string what;
+  Score paper, palpate;
+  std::map<std::string, int> verdicts;  ///< seeds in which palpate said so
+};
+/// @param seeds  of one study
+std::vector<StudyScore> scores_of(std::span<const StudyAnswer> seeds);
 
 /// A line of what the evaluation has to show.
 struct Claim {

@@ -234,8 +234,9 @@ json write_page(const PaperRuns& runs, const fs::path& out) {
   json told = {{"command", command}, {"palpate", runs.version}, {"threads", runs.threads}, {"scenes", json::array()}, {"studies", json::array()}};
   for (const SceneAnswers& each : runs.scenes) told["scenes"].push_back(json_of(each));
   for (const StudyAnswer& each : runs.studies) told["studies"].push_back(json_of(each));
+  told["study_scores"] = json_of(std::span(runs.studies));
   io::write_file(out / "paper.json", told.dump(2) + "\n");
-  io::write_file(out / "paper.html", paper_page(runs.scenes, runs.studies, runs.version, command, runs.threads));
+  io::write_file(out / "paper.html", paper_page(runs.scenes, runs.studies, runs.version, command, runs.threads, runs.details_of));
   return told;
 }
 

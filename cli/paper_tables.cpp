@@ -255,4 +255,27 @@ std::string study_table(const StudyAnswer& answer) {
                             answer.rows.empty() ? 0 : answer.rows.front().poisson_ratio);
 }
 
+std::string study_score_table(std::span<const StudyAnswer> seeds) {
+  if (seeds.size() < 2) return {};
+  std::string html = "<table><tr><th>model or fault</th><th>rms of E, the paper's method</th><th>palpate</th><th>bias of E, the paper's method</th>"
+                     "<th>palpate</th><th>rms of &nu;, the paper's method</th><th>palpate</th><th>E in palpate's 95 %</th><th>no answer</th>"
+                     "<th>palpate's verdicts, seeds with them</th></tr>\n";
+  std::string failed;
+  for (const StudyScore& row : scores_of(seeds)) {
+    std::string said;
+    for (const auto& [code, count] : row.verdicts) said += fmt::format("{}{} ({})", said.empty() ? "" : ", ", code, count);
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{} / {}</td><td>{}</td></tr>\n",
+                        row.what, number(row.paper.rms_percent, "{:.1f} %"), number(row.palpate.rms_percent, "{:.1f} %"),
+                        number(row.paper.bias_percent, "{:+.1f} %"), number(row.palpate.bias_percent, "{:+.1f} %"),
+                        number(row.paper.poisson_rms, "{:.3f}"), number(row.palpate.poisson_rms, "{:.3f}"),
+                        row.palpate.asked > 0 ? fmt::format("{} of {}", row.palpate.inside_95, row.palpate.asked) : "", row.paper.without,
+                        row.palpate.without, row.palpate.asked == 0 ? "" : said.empty() ? "none" : said);
+  }
+  for (const StudyAnswer& seed : seeds)
+    if (!seed.failed.empty()) failed += fmt::format(" Seed {} ended with an error: {}.", seed.seed, escaped(seed.failed));
+  return html + fmt::format("</table>\n<p class=\"small\">{} seeds; errors of E as differences of its logarithm. No answer: the paper's method / palpate. "
+                            "Without an interval nothing is inside.{}</p>\n",
+                            seeds.size(), failed);
+}
+
 }  // namespace palpate::cli

@@ -2,6 +2,7 @@
 // Tables of the page of `palpate paper`, as HTML; empty where a trial has nothing for one.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "cli/paper_scores.hpp"
@@ -21,5 +22,7 @@ std::string score_table(const SceneAnswers& answers);
 /// Seeds that ended with an error, and why.
 std::string failed_table(const std::vector<TrialAnswer>& trials);
 std::string study_table(const StudyAnswer& answer);
+/// The same over the seeds of one study. Empty: there is one alone.
+std::string study_score_table(std::span<const StudyAnswer> seeds);
 
 }  // namespace palpate::cli

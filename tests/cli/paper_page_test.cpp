@@ -7,6 +7,8 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <span>
 #include <utility>
 
 #include "cli/paper_json.hpp"
@@ -181,6 +183,26 @@ TEST(PaperPage, SaysWhereAStudysIntervalMisses) {
   EXPECT_NE(cells(wrong).find("(+20 %)"), std::string::npos);
   EXPECT_EQ(cells(no_answer()).find(">yes<"), std::string::npos);
   EXPECT_NE(cells(right).find("<td>none</td></tr>"), std::string::npos) << "no verdicts is said";
+}
+
+TEST(PaperPage, ScoresAStudyOverItsSeeds) {
+  const Study& study = studies().front();
+  const auto seed = [&](std::uint64_t number, double paper_pa, MethodAnswer palpate, std::vector<std::string> verdicts) {
+    palpate.verdicts = std::move(verdicts);
+    return StudyAnswer{&study, number, {{"one", 10e3, 0.3, answer(paper_pa, nan, nan, 9), palpate}, {"another", 10e3, 0.3, answer(10e3, nan, nan, 9), no_answer()}}, {}, 0};
+  };
+  const std::vector<StudyAnswer> seeds{seed(1, 10e3 * std::exp(0.3), answer(10.4e3, 9.8e3, 11e3, 90), {"a", "a"}),
+                                       seed(2, 10e3 * std::exp(-0.4), answer(12e3, 11e3, 13e3, 90), {"a", "b"})};
+  const auto scores = scores_of(std::span(seeds));
+  ASSERT_EQ(scores.size(), 2u);
+  EXPECT_NEAR(scores[0].paper.rms_percent, std::sqrt(0.5 * (30 * 30 + 40 * 40)), 1e-9);
+  EXPECT_NEAR(scores[0].paper.bias_percent, -5, 1e-9);
+  EXPECT_EQ(scores[0].palpate.inside_95, 1);
+  EXPECT_EQ(scores[0].palpate.asked, 2);
+  EXPECT_EQ(scores[0].verdicts, (std::map<std::string, int>{{"a", 2}, {"b", 1}}));
+  EXPECT_EQ(scores[1].palpate.asked, 0) << "palpate was not asked";
+  EXPECT_NE(study_score_table(seeds).find("<td>1 of 2</td>"), std::string::npos);
+  EXPECT_EQ(study_score_table(std::span(seeds).first(1)), "");
 }
 
 TEST(PaperPage, NamesAVerdictOnceAndCountsIt) {

@@ -218,6 +218,36 @@ TEST(PaperRun, AFailedSeedIsARowAndTheRunGoesOn) {
   EXPECT_EQ(told.at("scenes").at(1).at("trials").at(1).at("failed"), "the pad went <through> it");
 }
 
+TEST(PaperRun, AStudyThatIsAskedForSeveralSeedsIsToldOverThem) {
+  const test::TemporaryFolder files("paper_study_seeds");
+  MadeUp run;
+  run.plan.scenes.clear();
+  run.plan.study_seed = 5;
+  run.plan.study_seeds = 3;
+  run.work.study = [&](const Study&, const StudyOptions& options, StudyAnswer& out) {
+    ++run.made;
+    if (options.seed == 6) throw std::runtime_error("no <such> mesh");
+    out.rows = {{"row", 1e4, 0.3, answer(1.1e4, 0.2), answer(1e4, 0.3)}};
+    out.rows[0].palpate.verdicts = {"contact_slipped", "contact_slipped"};
+  };
+  const PaperRuns runs = run_plan(run.plan, run.work, files / "out");
+  EXPECT_EQ(run.made, 3);
+  ASSERT_EQ(runs.studies.size(), 3u);
+  EXPECT_THAT(runs.command(), HasSubstr("--seed 5 --seeds 3"));
+  const std::string page = contents(files / "out" / "paper.html");
+  EXPECT_THAT(page, HasSubstr("contact_slipped (2)"));
+  EXPECT_THAT(page, HasSubstr("Seed 6 ended with an error: no &lt;such&gt; mesh"));
+  EXPECT_EQ(page.find("<h2"), page.rfind("<h2")) << "one section for all of its seeds";
+  const auto told = nlohmann::json::parse(contents(files / "out" / "paper.json")).at("study_scores").at(0);
+  EXPECT_EQ(told.at("seeds"), 3);
+  EXPECT_EQ(told.at("rows").at(0).at("paper").at("asked"), 2);
+
+  MadeUp again;
+  again.plan = run.plan;
+  run_plan(again.plan, again.work, files / "out");
+  EXPECT_EQ(again.made, 0);
+}
+
 TEST(PaperRun, SeedsOfOtherOptionsAreRefusedByName) {
   const test::TemporaryFolder files("paper_options");
   MadeUp run;

@@ -74,4 +74,16 @@ TEST(Paper, UnknownSceneIsNamedWithTheOnesThereAre) {
   EXPECT_EQ(palpate("--quiet paper --quick --scene penguin -o /nonexistent/out 2>/dev/null"), 3);
 }
 
+TEST(Paper, AnOpenMeshInTheCowsPlaceIsRefusedBeforeAnythingIsRun) {
+  const palpate::test::TemporaryFolder files("paper_open");
+  const fs::path mesh = files / "open.obj", said = files / "said";
+  std::ofstream(mesh) << "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n";
+  EXPECT_EQ(palpate("paper --quick --object " + mesh.string() + " -o " + (files / "out").string() + " 2>" + said.string()), 3);
+  std::stringstream words;
+  words << std::ifstream(said).rdbuf();
+  EXPECT_NE(words.str().find("open.obj"), std::string::npos) << words.str();
+  EXPECT_NE(words.str().find("must be closed"), std::string::npos) << words.str();
+  EXPECT_FALSE(fs::exists(files / "out"));
+}
+
 }  // namespace
