@@ -46,7 +46,7 @@ std::string surface_figure(const TrialAnswer& trial) {
   const Index rows = static_cast<Index>(surface.error_m2.rows()), columns = static_cast<Index>(surface.error_m2.cols());
   Axes axes(*canvas, width_pt, height_pt, "log10 E (Pa)",
             {std::log10(surface.young_modulus_pa(0)), std::log10(surface.young_modulus_pa(rows - 1))}, "Poisson ratio",
-            {surface.poisson_ratio(0), surface.poisson_ratio(columns - 1)});
+            {std::min(0.0, surface.poisson_ratio(0)), std::max(0.5, surface.poisson_ratio(columns - 1))});  // where searches may go
   const double low = std::log(surface.smallest_m2());
   double high = low;
   for (double e : surface.error_m2.reshaped())
@@ -69,13 +69,21 @@ std::string surface_figure(const TrialAnswer& trial) {
       canvas->box(corner, opposite.x - corner.x + 0.3, opposite.y - corner.y + 0.3, {tone(40, 245), tone(90, 246), tone(140, 248)});
     }
   const auto path = [&](const MethodAnswer& method, report::Colour colour) {
-    std::vector<Spot> spots;
+    std::vector<Spot> spots;  // as long as it is in the picture
+    const auto draw = [&] {
+      if (spots.size() > 1) axes.line(spots, colour, 1.4);
+      spots.clear();
+    };
     for (const FitIteration& at : method.path) {
       const double x = std::log10(at.young_modulus_pa), y = at.poisson_ratio;
-      if (x < x_at(0) || x > x_at(static_cast<double>(rows)) || y < y_at(0) || y > y_at(static_cast<double>(columns))) continue;
-      spots.push_back({x, y});
+      if (x >= x_at(0) && x <= x_at(static_cast<double>(rows)) && y >= 0 && y <= 0.5) {
+        spots.push_back({x, y});
+        if (&at == &method.path.front()) axes.dot(x, y, 2, colour);
+      } else {
+        draw();
+      }
     }
-    if (spots.size() > 1) axes.line(spots, colour, 1.4);
+    draw();
     axes.dot(std::log10(method.young_modulus_pa), method.poisson_ratio, 4, colour);
   };
   Eigen::Index lowest_row = 0, lowest_column = 0;
@@ -160,6 +168,11 @@ std::string samples_figure(const TrialAnswer& trial) {
   joint(trial.paper);
   joint(trial.palpate);
   if (truth_known(trial)) values.push_back(trial.young_modulus_pa / 1000);
+  for (const SiteAnswer& site : trial.sites) {
+    values.push_back(site.young_modulus_pa / 1000);
+    joint(site.paper);
+    joint(site.palpate);
+  }
   if (values.empty()) return {};
   const double most_kpa = 4 * *std::max_element(values.begin(), values.end());  // a sample that says nothing must not hide the others
   for (const SampleAnswer& sample : trial.samples)
@@ -169,13 +182,24 @@ std::string samples_figure(const TrialAnswer& trial) {
   const double count = static_cast<double>(trial.samples.size());
   const Range range = report::range_of(values, true);
   Axes axes(*canvas, width_pt, height_pt, "sample, all pushes one after the other", {0, count + 1}, "E (kPa)", range);
-  const auto level = [&](double young_pa, report::Colour colour, bool dashed) {
-    if (std::isfinite(young_pa)) axes.line(std::vector<Spot>{{0.0, young_pa / 1000}, {count + 1, young_pa / 1000}}, colour, 1, dashed);
+  const auto level = [&](double from, double to, double young_pa, report::Colour colour, bool dashed) {
+    if (std::isfinite(young_pa) && young_pa / 1000 < range.to)
+      axes.line(std::vector<Spot>{{from, young_pa / 1000}, {to, young_pa / 1000}}, colour, 1, dashed);
   };
-  if (truth_known(trial)) level(trial.young_modulus_pa, truth_colour, true);
-  if (trial.sites.empty()) {
-    level(trial.paper.young_modulus_pa, paper_colour, false);
-    level(trial.palpate.young_modulus_pa, own_colour, false);
+  const auto levels = [&](double from, double to, double truth_pa, const MethodAnswer& paper, const MethodAnswer& palpate) {
+    if (truth_known(trial)) level(from, to, truth_pa, truth_colour, true);
+    level(from, to, paper.young_modulus_pa, paper_colour, false);
+    level(from, to, palpate.young_modulus_pa, own_colour, false);
+  };
+  if (trial.sites.empty()) levels(0, count + 1, trial.young_modulus_pa, trial.paper, trial.palpate);
+  // Each push is of a site of its own.
+  std::size_t place = 0;
+  for (std::size_t from = 0, to = 0; from < trial.samples.size() && place < trial.sites.size(); from = to, ++place) {
+    for (to = from; to < trial.samples.size() && trial.samples[to].push == trial.samples[from].push;) ++to;
+    const SiteAnswer& site = trial.sites[place];
+    levels(static_cast<double>(from) + 0.5, static_cast<double>(to) + 0.5, site.young_modulus_pa, site.paper, site.palpate);
+    const Spot foot = axes.at(0.5 * static_cast<double>(from + to) + 0.5, range.from);
+    canvas->text({foot.x, foot.y - 5}, site.site, 9, report::Align::centre, report::soft);
   }
   for (std::size_t i = 0; i < trial.samples.size(); ++i) {
     const SampleAnswer& sample = trial.samples[i];
@@ -191,11 +215,33 @@ std::string samples_figure(const TrialAnswer& trial) {
   return canvas->bytes();
 }
 
+namespace {
+
+/// Where the pictures differ most, with as much around it; of surfaces that cannot be compared, all.
+std::pair<Vec3, Vec3> differing_part(const std::vector<RegistrationPicture>& pictures) {
+  const Points& first = pictures.front().simulated_m;
+  const Points& last = pictures.back().simulated_m;
+  Vec3 low = first.colwise().minCoeff(), high = first.colwise().maxCoeff();
+  if (first.rows() != last.rows()) return {low, high};
+  const VectorX moved_m = (first - last).rowwise().norm();
+  Vec3 from = high, to = low;
+  for (Index i = 0; i < static_cast<Index>(first.rows()); ++i) {
+    if (!(moved_m(i) > 0.6 * moved_m.maxCoeff())) continue;
+    const Vec3 at = first.row(i);
+    from = from.cwiseMin(at), to = to.cwiseMax(at);
+  }
+  if ((to - from).minCoeff() < 0) return {low, high};
+  const Vec3 half = Vec3::Constant(std::max((to - from).maxCoeff(), 0.15 * (high - low).maxCoeff()));
+  const Vec3 middle = 0.5 * (from + to);
+  return {low.cwiseMax(middle - half), high.cwiseMin(middle + half)};
+}
+
+}  // namespace
+
 std::string registration_figure(const TrialAnswer& trial) {
   if (trial.pictures.empty()) return {};
   constexpr double side_pt = 210, rows_pt = 190;
-  const auto& first = trial.pictures.front().simulated_m;
-  const Vec3 low = first.colwise().minCoeff(), high = first.colwise().maxCoeff();
+  const auto [low, high] = differing_part(trial.pictures);
   // Along the object's longer horizontal side, and upwards.
   const int across = high.x() - low.x() > high.y() - low.y() ? 0 : 1;
   const double scale = std::min((side_pt - 20) / (high(across) - low(across)), (rows_pt - 40) / (high.z() - low.z()));
@@ -205,11 +251,14 @@ std::string registration_figure(const TrialAnswer& trial) {
     const RegistrationPicture& picture = trial.pictures[k];
     const double left = 10 + side_pt * static_cast<double>(k % 2), foot = rows_pt * static_cast<double>(k / 2 + 1) - 14;
     const auto dots = [&](const Points& points_m, double radius, report::Colour colour) {
-      for (Index i = 0; i < static_cast<Index>(points_m.rows()); ++i)
-        canvas->dot({left + scale * (points_m(i, across) - low(across)), foot - scale * (points_m(i, 2) - low.z())}, radius, colour);
+      for (Index i = 0; i < static_cast<Index>(points_m.rows()); ++i) {
+        const double x_m = points_m(i, across), z_m = points_m(i, 2);
+        if ((points_m.row(i).transpose().array() < low.array()).any() || (points_m.row(i).transpose().array() > high.array()).any()) continue;
+        canvas->dot({left + scale * (x_m - low(across)), foot - scale * (z_m - low.z())}, radius, colour);
+      }
     };
-    dots(picture.simulated_m, 0.9, report::rule);
-    dots(picture.registered_m, 0.8, paper_colour);
+    dots(picture.simulated_m, 1.6, report::faint);
+    dots(picture.registered_m, 1.1, paper_colour);
     canvas->text({left, foot - rows_pt + 28},
                  "E = " + report::quantity(picture.young_modulus_pa, "Pa") + ", rms " + fmt::format("{:.2f} mm", 1000 * picture.rms_m), 9,
                  report::Align::left, report::ink);

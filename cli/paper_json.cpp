@@ -83,6 +83,8 @@ nlohmann::json json_of(const Score& score) {
   return {{"asked", score.asked},                       {"without_answer", score.without},         {"with_interval", score.with_interval},
           {"bias_percent", score.bias_percent},         {"spread_percent", score.spread_percent},  {"rms_percent", score.rms_percent},
           {"median_percent", score.median_percent},
+          {"far_off", score.far_off},                   {"near_bias_percent", score.near_bias_percent},
+          {"near_rms_percent", score.near_rms_percent},
           {"poisson_bias", score.poisson_bias},         {"poisson_spread", score.poisson_spread},  {"poisson_rms", score.poisson_rms},
           {"inside_95", score.inside_95},               {"poisson_inside_95", score.poisson_inside_95},
           {"solves", score.solves},                     {"seconds", score.seconds},                {"most_load_cases", score.most_load_cases}};

@@ -15,6 +15,9 @@ std::string errors(const Score& score) {
   if (score.answers == 0) return "no answer";
   return number(score.bias_percent, "{:+.1f} %") + (std::isfinite(score.spread_percent) ? number(score.spread_percent, " &plusmn; {:.1f} %") : "") +
          number(score.rms_percent, "<br>rms {:.1f} %") + (score.answers > 1 ? number(score.median_percent, "<br>median {:.1f} %") : "") +
+         (score.far_off > 0 ? fmt::format("<br>without {} off by a factor of ten and more: {}, rms {}", score.far_off,
+                                          number(score.near_bias_percent, "{:+.1f} %"), number(score.near_rms_percent, "{:.1f} %"))
+                            : "") +
          (score.without > 0 ? fmt::format("<br>{} of {} unanswered", score.without, score.asked) : "");
 }
 
@@ -58,20 +61,21 @@ std::string overview_table(const std::vector<SceneAnswers>& scenes) {
                         number(known ? scores.palpate.seconds : spread_of(palpate).seconds, "{:.1f}"));
   }
   return html + "</table>\n<p class=\"small\">Errors of E: mean &plusmn; standard deviation of its logarithm over seeds (and sites), "
-                "root mean square, and the median of its size. Seconds a seed, by the clock.</p>\n";
+                "root mean square, and the median of its size. Seconds a seed, by the clock: medians.</p>\n";
 }
 
 std::string seed_table(const SceneAnswers& answers) {
   const bool known = !answers.scene->apparent;
   std::string html = fmt::format("<details><summary>All seeds one by one ({})</summary>\n<table><tr><th>seed</th>{}<th>the paper's method</th><th>its "
-                                 "&nu;</th><th>palpate</th><th>95 %</th><th>its &nu;</th><th>s: the paper's method</th><th>s: palpate</th><th>s: "
+                                 "&nu;</th><th>palpate{}</th><th>95 %</th><th>its &nu;</th><th>s: the paper's method</th><th>s: palpate</th><th>s: "
                                  "truth, model, all</th></tr>\n",
-                                 answers.trials.size(), known ? "<th>true E</th><th>true &nu;</th>" : "");
+                                 answers.trials.size(), known ? "<th>true E</th><th>true &nu;</th>" : "",
+                                 answers.scene->other_law.empty() ? "" : fmt::format(", {} law", answers.scene->other_law));
   for (const TrialAnswer& trial : answers.trials) {
     const std::string all = fmt::format("<td>{:.0f}, {:.0f}, {:.0f}</td></tr>\n", trial.truth_s, trial.model_s, trial.total_s);
     const std::string failed = trial.failed.empty() ? "" : ", failed";
     if (trial.sites.empty())
-      html += seed_row(fmt::format("{}{}", trial.seed, failed), trial, trial.young_modulus_pa, trial.paper, trial.palpate, known) + all;
+      html += seed_row(fmt::format("{}{}", trial.seed, failed), trial, trial.young_modulus_pa, trial.paper, counted(trial), known) + all;
     for (const SiteAnswer& site : trial.sites)
       html += seed_row(fmt::format("{}, {}{}", trial.seed, site.site, failed), trial, site.young_modulus_pa, site.paper, site.palpate, known) +
               (&site == &trial.sites.front() ? all : "<td></td></tr>\n");

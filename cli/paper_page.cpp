@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
+#include <string_view>
 
 #include "cli/paper_figures.hpp"
 #include "cli/paper_overview.hpp"
@@ -25,6 +27,16 @@ std::string view_figures(const std::vector<PaperView>& views) {
                         scale * view.width, scale * view.height, view.png, view.what);
   }
   return html.empty() ? html : "<div class=\"views\">" + html + "</div>\n";
+}
+
+/// Which of the paper's figures shows the same of this scene. @param candidates  "4" or "5 (a)"
+std::string as_in_the_paper(std::string_view of_scene, std::initializer_list<std::string_view> candidates) {
+  for (const std::string_view candidate : candidates)
+    for (std::size_t from = 0, to = 0; from < of_scene.size(); from = to + 2) {
+      to = std::min(of_scene.find(", ", from), of_scene.size());
+      if (of_scene.substr(from, to - from) == candidate.substr(0, candidate.find(' '))) return fmt::format("As fig. {} of the paper. ", candidate);
+    }
+  return {};
 }
 
 std::string figure(const std::string& svg, const std::string& caption) {
@@ -87,13 +99,16 @@ std::string grid_search(const TrialAnswer& trial) {
                                  : fmt::format("{} values of E at its &nu;", surface.error_m2.rows());
   Eigen::Index row = 0, column = 0;
   surface.error_m2.minCoeff(&row, &column);
+  const Eigen::Index flat = (surface.error_m2.array() <= 1.01 * surface.smallest_m2()).count();
   return fmt::format("<p class=\"small\">Grid search: the smallest value of the paper's error function on {} is {:.4g} mm&sup2;, at E = {} and "
-                     "&nu; = {:.3f}; where the paper's method ended it is {:.4g} mm&sup2;, {}.{}</p>\n",
+                     "&nu; = {:.3f}; where the paper's method ended it is {:.4g} mm&sup2;, {}. {} of the {} points are within a hundredth of "
+                     "the smallest{}.{}</p>\n",
                      points, 1e6 * surface.smallest_m2(), pascal(surface.young_modulus_pa(row)), surface.poisson_ratio(column),
                      1e6 * surface.at_found_m2,
                      surface.at_found_m2 <= surface.smallest_m2() * 1.001
                          ? "and no point of the grid is lower by a thousandth: it reached the minimum of its own objective"
                          : "so it did not reach the minimum of its own objective",
+                     flat, surface.error_m2.size(), flat > 5 ? ": it says little of where the minimum is" : "",
                      convexity(surface)) +
          starts_table(trial);
 }
@@ -118,15 +133,18 @@ std::string section(const SceneAnswers& answers) {
   html += site_table(first) + unused_table(scene, first) + foresight_table(answers) + sample_table(first, !scene.apparent && first.sites.empty());
   html += score_table(answers) + failed_table(answers.trials) + seed_table(answers);
   html += grid_search(first);
-  html += figure(surface_figure(first), "The paper's error function over (E, &nu;), dark = small, with the paths of both methods; the large dot is the lowest point of the grid.");
-  html += figure(error_figure(first), "The paper's error function over E alone, at the &nu; where its method ended.");
+  const auto as = [&](auto... candidates) { return as_in_the_paper(scene.figures, {candidates...}); };
+  html += figure(surface_figure(first), as("4") + "The paper's error function over (E, &nu;), dark = small, with the paths of both methods; the large dot is the lowest point of the grid, the smallest ones are where they began.");
+  html += figure(error_figure(first), as("5 (b)") + "The paper's error function over E alone, at the &nu; where its method ended.");
   html += figure(registration_figure(first),
-                 std::string("What the camera saw of the hardest push, registered with the surface that each E gives; the last is ") +
+                 as("3", "6", "7", "10") + "What the camera saw of the hardest push that is used, registered with the surface that each E gives, where these differ most (grey: the surface); the last is " +
                      (scene.apparent ? "the one that palpate found." : "the true one."));
+  if (!first.views.empty()) html += "<p class=\"small\">" + as("1", "2") + "What the camera saw, and what was made of it.</p>\n";
   html += view_figures(first.views);
-  html += figure(force_figure(first), "Measured force over travel.");
+  html += figure(force_figure(first), as("5 (a)") + "Measured force over travel.");
   html += figure(samples_figure(first),
-                 first.sites.empty() ? "E from every sample alone; the lines are E from all samples jointly." : "E from every sample alone.");
+                 as("5 (c)", "8", "9") + "E from samples alone" + (first.other_law.empty() ? "" : ", by palpate with the law of the paper's method") +
+                     (first.sites.empty() ? "; the lines are E from all samples jointly." : ", of the object as one stuff; the lines are of all samples, palpate's of all regions at once, dashed: the truth."));
   return html;
 }
 
@@ -168,7 +186,8 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vecto
       "Manipulation Robot</i>, IROS 2010. Its experiments, made again by palpate {} on objects of the software lab, whose E is "
       "known (but for the balloon's). The paper's method is its algorithm 1: iterative closest points, squared distance to the nearest "
       "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, starts (where the first has no equilibrium: a "
-      "quarter and four times of its E) and threads ({}); a second row gives it linear tetrahedra, as the paper had. Palpate also gets what the "
+      "quarter and four times of its E) and threads ({}); in scenes of small strains a second row gives it linear tetrahedra, as the paper had. "
+      "Both are fitted to all samples jointly, where the paper averaged fits of one sample each (tables of samples alone do that). Palpate also gets what the "
       "paper's method has no use for: the tool's travel, the unloaded frame, and what is known of the sensors' noise (of depths, forces, "
       "encoders and the camera's pose). Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the "
       "object at rest (where a push goes deeper: its depth). Where a scene does not say otherwise, the truth is linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",

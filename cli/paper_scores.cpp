@@ -42,8 +42,8 @@ struct Moments {
 
 Score score_of(const std::vector<Compared>& all, const std::vector<Effort>& efforts) {
   Score score;
-  Moments young, poisson, solves, seconds;
-  std::vector<double> sizes;
+  Moments young, near, poisson, solves;
+  std::vector<double> sizes, seconds;
   for (const Compared& one : all) {
     const MethodAnswer& answer = *one.answer;
     ++score.asked;
@@ -52,8 +52,13 @@ Score score_of(const std::vector<Compared>& all, const std::vector<Effort>& effo
       continue;
     }
     ++score.answers;
-    young.add(100 * std::log(answer.young_modulus_pa / one.young_modulus_pa));
-    sizes.push_back(100 * std::abs(std::log(answer.young_modulus_pa / one.young_modulus_pa)));
+    const double off_percent = 100 * std::log(answer.young_modulus_pa / one.young_modulus_pa);
+    young.add(off_percent);
+    sizes.push_back(std::abs(off_percent));
+    if (std::abs(off_percent) > 100 * std::log(10.0))
+      ++score.far_off;
+    else
+      near.add(off_percent);
     poisson.add(answer.poisson_ratio - one.poisson_ratio);
     if (!std::isfinite(answer.lower_95_pa)) continue;
     ++score.with_interval;
@@ -62,13 +67,14 @@ Score score_of(const std::vector<Compared>& all, const std::vector<Effort>& effo
   }
   for (const Effort& effort : efforts) {
     solves.add(effort.solves);
-    seconds.add(effort.seconds);
+    seconds.push_back(effort.seconds);
     score.most_load_cases = std::max(score.most_load_cases, effort.load_cases);
   }
   score.median_percent = median(sizes);
   score.bias_percent = young.mean(), score.spread_percent = young.spread(), score.rms_percent = young.rms();
+  score.near_bias_percent = near.mean(), score.near_rms_percent = near.rms();
   score.poisson_bias = poisson.mean(), score.poisson_spread = poisson.spread(), score.poisson_rms = poisson.rms();
-  score.solves = solves.mean(), score.seconds = seconds.mean();
+  score.solves = solves.mean(), score.seconds = median(seconds);
   return score;
 }
 

@@ -26,8 +26,11 @@ struct Score {
   int with_interval = 0, inside_95 = 0, poisson_inside_95 = 0;  ///< of those asked: without an interval nothing is inside
   double bias_percent = 0, spread_percent = 0, rms_percent = 0;  ///< of log E; NaN: no answer at all
   double median_percent = 0;                                     ///< of its size: a few answers far off are not in it
+  int far_off = 0;                                               ///< by more than a factor of ten
+  double near_bias_percent = 0, near_rms_percent = 0;            ///< of the others
   double poisson_bias = 0, poisson_spread = 0, poisson_rms = 0;
-  double solves = 0, seconds = 0;  ///< means over seeds that were answered, all sites together
+  /// Over seeds that were answered, all sites together: mean, and median (the clock goes on while a machine does other work).
+  double solves = 0, seconds = 0;
   int most_load_cases = 0;         ///< in a seed: later ones take over what does not change
 };
 /// What a method expects of the highest force of the pushes that no method has seen, over the seeds. NaN: nothing to compare.

@@ -171,7 +171,7 @@ namespace {
 
 /// What is to be known of "simulated", "solved" and seconds.
 std::string about_effort() {
-  return "Seeds share what was solved for where the object is the same: seconds are of what was left to do. Simulated: samples at one (E, "
+  return "Seeds share what was solved for where the object is the same: seconds are of what was left to do, by the clock, whatever else the machine did. Simulated: samples at one (E, "
          "&nu;) that the method asks for, of a seed that it answers, all sites together. Solved: load cases that the finite elements had to be "
          "solved for, at most in a seed. In small strains both methods make every sample up of unit loads solved at a few &nu;, so that the "
          "machine is not what tells them apart (the paper ran a simulation each time); palpate's are with those of its finer mesh and of the "
@@ -225,7 +225,7 @@ std::string score_table(const SceneAnswers& answers) {
   if (answers.scene->apparent) return apparent_table(trials);
   const bool by_site = !shown.sites.empty();
   std::string html = "<table><tr><th>method</th><th>bias of E</th><th>spread of E</th><th>rms of E</th><th>E in 95 %</th><th>bias of &nu;</th><th>rms of "
-                     "&nu;</th><th>&nu; in 95 %</th><th>no answer</th><th>simulated</th><th>solved</th><th>s</th></tr>\n";
+                     "&nu;</th><th>&nu; in 95 %</th><th>no answer</th><th>simulated</th><th>solved</th><th>s, median</th></tr>\n";
   const SceneScores scores = scores_of(trials);
   if (!by_site && scores.paper_coarse.answers > 0) html += score_row("the paper's method, linear tetrahedra", scores.paper_coarse, false);
   html += score_row(by_site ? "the paper's method on palpate's mesh, by site" : "the paper's method on palpate's mesh", scores.paper, false);

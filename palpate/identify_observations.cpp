@@ -69,6 +69,22 @@ std::vector<std::string> cameras_of(const std::vector<const DepthFrame*>& frames
   return names;
 }
 
+/// How many clouds of the recording are the first of their step, the second, ...
+std::vector<int> clouds_at(const Recording& recording) {
+  std::vector<int> count;
+  for (const auto& push : recording.pushes) {
+    for (const auto& step : push.steps) {
+      std::size_t at = 0;
+      for (const auto& observation : step.observations) {
+        if (!std::holds_alternative<PointCloud>(observation)) continue;
+        if (count.size() == at) count.push_back(0);
+        ++count[at++];
+      }
+    }
+  }
+  return count;
+}
+
 }  // namespace
 
 estimation::Inputs observe(const Recording& recording, std::vector<Points>* masked_m) {
@@ -79,6 +95,7 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
       for (const auto& observation : step.observations)
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) frames.push_back(frame);
   const std::vector<std::string> cameras = cameras_of(frames);
+  const std::vector<int> clouds = clouds_at(recording);
   std::size_t frame_number = 0;
   const auto [low_m, high_m] = surroundings(recording);
   const std::vector<Plane> planes = half_spaces(recording);
@@ -88,6 +105,7 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
     for (const auto& step : push.steps) {
       auto& terms = inputs.emplace_back();
       if (masked_m != nullptr) masked_m->emplace_back(0, 3);
+      std::size_t cloud_number = 0;
       for (const auto& observation : step.observations) {
         if (const auto* frame = std::get_if<DepthFrame>(&observation)) {
           const auto masked = sensing::with_mask(arm.without_arm(*frame, push, step), sensing::mask_planes(*frame, recording.environment.planes));
@@ -99,7 +117,11 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
                                                      frame->T_base_camera.linear(),
                                                      estimation::outline_margin_px / std::min(frame->camera.fx_px, frame->camera.fy_px)});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
-          terms.push_back(sensing::points_of_object(arm.without_arm(*cloud, push, step), planes, low_m, high_m));
+          PointCloud of_object = sensing::points_of_object(arm.without_arm(*cloud, push, step), planes, low_m, high_m);
+          // No cloud says whose it is: the first one of every step is taken for one camera's, the second for another's.
+          if (of_object.camera.empty() && clouds[cloud_number] > 1) of_object.camera = "clouds " + std::to_string(cloud_number);
+          ++cloud_number;
+          terms.push_back(std::move(of_object));
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {
           terms.push_back(*markers);
         } else if (const auto* travel = std::get_if<ToolTravel>(&observation)) {

@@ -175,7 +175,7 @@ class Exact {
             if (seen.pose_std_m == 0) offsets[camera].insert(name), seen.pose_std_m = errors_.camera_m;
             if (seen.pose_std_rad == 0) turns[camera].insert(name), seen.pose_std_rad = errors_.camera_rad;
           };
-          if (auto* cloud = std::get_if<PointCloud>(&more[s][i])) pose(*cloud, "");
+          if (auto* cloud = std::get_if<PointCloud>(&more[s][i])) pose(*cloud, cloud->camera);
           if (auto* rays = std::get_if<RayObservation>(&more[s][i])) {
             const int before = frames;
             pose(*rays, rays->camera);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -53,6 +54,16 @@ std::string prediction_row(const SceneAnswers& scene) {
                      force(all.palpate), 1000 * all.paper.dent_m, 1000 * all.palpate.dent_m, 1000 * all.still_m);
 }
 
+/// | model or fault | seeds | rms of E, the paper's method / palpate | mean | inside, E / nu | verdicts and in how many seeds |
+std::string study_row(const StudyScore& row, std::size_t seeds) {
+  std::string verdicts;
+  for (const auto& [code, count] : row.verdicts) verdicts += fmt::format("{}`{}` {}", verdicts.empty() ? "" : ", ", code, count);
+  if (row.palpate.asked == 0) return fmt::format("| {} | {} | {:.1f} % / - | {:+.1f} % / - | - | - |", row.what, seeds, row.paper.rms_percent, row.paper.bias_percent);
+  return fmt::format("| {} | {} | {:.1f} % / {:.1f} % | {:+.1f} / {:+.1f} % | {} / {} of {} | {} |", row.what, seeds, row.paper.rms_percent,
+                     row.palpate.rms_percent, row.paper.bias_percent, row.palpate.bias_percent, row.palpate.inside_95,
+                     row.palpate.poisson_inside_95, row.palpate.asked, verdicts.empty() ? "none" : verdicts);
+}
+
 TEST(PaperKept, TheTableIsMadeOfTheSeedsThatAreKept) {
   const PaperRuns runs = kept_in(docs / "paper");
   ASSERT_FALSE(runs.scenes.empty());
@@ -63,6 +74,14 @@ TEST(PaperKept, TheTableIsMadeOfTheSeedsThatAreKept) {
       EXPECT_NE(told.find(prediction_row(scene) + "\n"), std::string::npos) << "docs/benchmarks.md lacks this row:\n" << prediction_row(scene);
     }
     for (std::size_t k = 0; k < scene.trials.size(); ++k) EXPECT_EQ(scene.trials[k].seed, k + 1) << scene.scene->name << ": a seed was left out";
+  }
+  for (std::size_t from = 0, to = 0; from < runs.studies.size(); from = to) {
+    for (to = from; to < runs.studies.size() && runs.studies[to].study == runs.studies[from].study; ++to)
+      EXPECT_EQ(runs.studies[to].seed, to - from + 1) << runs.studies[to].study->name << ": a seed was left out";
+    for (const StudyScore& one : scores_of(std::span(runs.studies).subspan(from, to - from))) {
+      const std::string wanted = study_row(one, to - from);
+      EXPECT_NE(told.find(wanted + "\n"), std::string::npos) << "docs/benchmarks.md lacks this row:\n" << wanted;
+    }
   }
   for (const Claim& claim : claims_of(runs.scenes)) {
     const std::string line = fmt::format("| {} | {} | {} |", claim.what, claim.holds ? "yes" : "no", claim.found);

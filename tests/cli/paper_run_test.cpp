@@ -125,14 +125,14 @@ TEST(PaperRun, PiecesJoinedAreTheWhole) {
   two.plan.studies.clear();
   run_plan(one.plan, one.work, files / "one");
   run_plan(two.plan, two.work, files / "two");
-  EXPECT_THAT(contents(files / "two" / "paper.html"), Not(HasSubstr("E from every sample"))) << "these belong to the first seed of all";
+  EXPECT_THAT(contents(files / "two" / "paper.html"), Not(HasSubstr("E from samples alone"))) << "these belong to the first seed of all";
   const SeedFolder joined(files / "joined");
   joined.take_from(files / "two");
   joined.take_from(files / "one");
   joined.take_from(files / "one");  // the same again is the same
   write_page(joined.collect(), files / "joined");
   EXPECT_EQ(page_of(files / "joined"), page_of(files / "whole"));
-  EXPECT_THAT(contents(files / "joined" / "paper.html"), HasSubstr("E from every sample"));
+  EXPECT_THAT(contents(files / "joined" / "paper.html"), HasSubstr("E from samples alone"));
 
   MadeUp other;
   other.plan.seeds = 1;

@@ -39,6 +39,13 @@ TermInput cloud(const Scene& scene) {
   return cloud;
 }
 
+/// One of several clouds of a camera.
+TermInput cloud_of_a_camera(const Scene& scene) {
+  PointCloud one = std::get<PointCloud>(cloud(scene));
+  one.camera = "clouds 0";
+  return one;
+}
+
 TermInput rays(const Scene& scene) {
   RayObservation observation;
   const Points points = points_near(scene.surface_m, scene.triangles, 6e-4);
@@ -154,6 +161,7 @@ const std::vector<Case> cases{
     {"cloud_tip", cloud, 0, true},
     {"cloud_plate", cloud, 2, true},
     {"cloud_unloaded", cloud, 1, true, false},
+    {"cloud_of_a_camera_disc", cloud_of_a_camera, 3, true},
     {"rays_disc", rays, 3, true},
     {"travel_disc", travel_of_disc, 3, true},
     {"markers_tip", markers, 0, true},

@@ -14,14 +14,16 @@ namespace {
 
 class CloudTerm : public Term {
  public:
-  CloudTerm(const PointCloud& cloud, std::shared_ptr<const geometry::TriangleTree> rest, int pose)
+  CloudTerm(const PointCloud& cloud, std::shared_ptr<const geometry::TriangleTree> rest, int pose, int camera)
       : points_m_(cloud.points_m),
         pose_(pose),
+        camera_(camera),
         rest_tree_(std::move(rest)),
         rest_(rest_tree_->mesh()),
         hints_(static_cast<std::size_t>(cloud.points_m.rows()), -1) {
     sigma_m_ = cloud.sigma_m.size() == 1 ? VectorX::Constant(points_m_.rows(), cloud.sigma_m(0)).eval() : cloud.sigma_m;
     centre_m_ = points_m_.colwise().mean();
+    middle_m_ = rest_.vertices_m.colwise().mean();
     typical_ = sigma_m_.mean();
     // Neighbours may err together: cells of a tenth of the object.
     const double cell_m = 0.1 * (rest_.vertices_m.colwise().maxCoeff() - rest_.vertices_m.colwise().minCoeff()).norm();
@@ -34,7 +36,7 @@ class CloudTerm : public Term {
   TermRows rows(const StepPrediction& predicted, const VectorX& unknowns, const TermView& view) const override {
     if (!tree_) tree_.emplace(*rest_tree_);
     tree_->refit(predicted.surface_m);
-    const RigidMap frame = frame_pose(unknowns, pose_, centre_m_);
+    const RigidMap frame = frame_pose(unknowns, pose_, centre_m_), camera = frame_pose(unknowns, camera_, middle_m_);
     const Index count = static_cast<Index>(predicted.columns.size());
     TermRows rows;
     rows.unknowns = predicted.columns;
@@ -53,7 +55,7 @@ class CloudTerm : public Term {
     const MatrixX slopes = predicted.d_surface.transpose();  // a vertex's in one place
     VectorX slope(count);
     for (Index i = 0; i < points_m_.rows(); ++i) {
-      const Vec3 point = frame.apply(points_m_.row(i));
+      const Vec3 seen = camera.apply(points_m_.row(i)), point = frame.apply(seen);
       const auto hit = tree_->closest(point, hints_[static_cast<std::size_t>(i)]);
       hints_[static_cast<std::size_t>(i)] = hit.triangle;
       const auto triangle = rest_.triangles.row(hit.triangle);
@@ -69,7 +71,10 @@ class CloudTerm : public Term {
         slope.noalias() -= slopes.middleCols<3>(3 * triangle(k)) * (hit.barycentric(k) / sigma_m_(i) * normal);
       rows.jacobian.row(i).head(count) = slope.transpose();
       field.subtract(rows.jacobian, i, triangle, hit.barycentric, normal / sigma_m_(i));
-      if (pose_ >= 0) rows.jacobian.row(i).segment<6>(count) = frame.slope(normal / sigma_m_(i), points_m_.row(i));
+      if (pose_ >= 0) rows.jacobian.row(i).segment<6>(count) = frame.slope(normal / sigma_m_(i), seen);
+      if (camera_ >= 0)
+        rows.jacobian.row(i).segment<6>(count + (pose_ >= 0 ? 6 : 0)) =
+            camera.slope(frame.rotation().transpose() * normal / sigma_m_(i), points_m_.row(i));
       rows.observed_m.row(i) = point;
       rows.met_m.row(i) = hit.point_m;
       if (view.surface_slopes)
@@ -80,6 +85,7 @@ class CloudTerm : public Term {
   std::vector<int> own_unknowns() const override {
     std::vector<int> own;
     for (int k = 0; pose_ >= 0 && k < 6; ++k) own.push_back(pose_ + k);
+    for (int k = 0; camera_ >= 0 && k < 6; ++k) own.push_back(camera_ + k);
     return own;
   }
   double typical_sigma() const override { return typical_; }
@@ -88,9 +94,9 @@ class CloudTerm : public Term {
   Points points_m_;
   VectorX sigma_m_;
   std::vector<int> cell_;
-  Vec3 centre_m_ = Vec3::Zero();
+  Vec3 centre_m_ = Vec3::Zero(), middle_m_ = Vec3::Zero();  // of the cloud and of the object
   double typical_ = 0;
-  int pose_;
+  int pose_, camera_;  // unknowns of this cloud and of all of its camera's, along the base frame's axes: a cloud says no others
   std::shared_ptr<const geometry::TriangleTree> rest_tree_;
   const TriMesh& rest_;
   mutable std::optional<geometry::TriangleTree> tree_;  // refitted to the surface that is asked about; none yet: never asked
@@ -107,7 +113,8 @@ std::unique_ptr<Term> make_cloud_term(const PointCloud& cloud, const TermContext
   }
   if (!(cloud.sigma_m.minCoeff() > 0)) throw Error("sigma_m must be positive", where);
   return std::make_unique<CloudTerm>(cloud, context.model.rest_tree(),
-                                     add_frame_pose(context, cloud.pose_std_m, cloud.pose_std_rad));
+                                     add_frame_pose(context, cloud.pose_std_m, cloud.pose_std_rad),
+                                     add_camera_pose(context, cloud.camera, cloud.pose_std_m, cloud.pose_std_rad));
 }
 
 }  // namespace palpate::estimation
