@@ -127,6 +127,25 @@ void tell(Session& session, const std::vector<LawFit>& laws) {
   }
 }
 
+/// Whoever states no standard deviations has narrow intervals: what is not in them, in one line.
+void tell_exact(Session& session, const Identification& answer) {
+  constexpr std::size_t most_named = 4;
+  constexpr double least_percent = 0.05;
+  std::vector<BudgetEntry> exact = answer.budget_if;
+  std::erase_if(exact, [](const BudgetEntry& one) { return !(one.young_modulus_percent > least_percent); });
+  if (exact.empty()) return;
+  std::stable_sort(exact.begin(), exact.end(), [](const auto& a, const auto& b) { return a.young_modulus_percent > b.young_modulus_percent; });
+  std::string names;
+  double squares = 0;
+  for (std::size_t k = 0; k < exact.size(); ++k) {
+    squares += exact[k].young_modulus_percent * exact[k].young_modulus_percent;
+    if (k < most_named) names += (k > 0 ? ", " : "") + exact[k].input;
+  }
+  if (exact.size() > most_named) names += fmt::format(" and {} more", exact.size() - most_named);
+  session.say(fmt::format("taken as exact     {}: were each off by a typical size, E would be off by {:.2g} % (--budget says which and how to state it)",
+                          names, std::sqrt(squares)));
+}
+
 void tell(Session& session, const Options& given, const Identification& answer) {
   for (const auto& parameter : answer.parameters) {
     const bool young = parameter.name == "young_modulus" && parameter.region.empty();
@@ -168,6 +187,7 @@ void tell(Session& session, const Options& given, const Identification& answer) 
     for (const auto& entry : answer.budget_if)
       session.say(fmt::format("  {:<24} {}   if off by {} (in the interval with {})", entry.input, budget_words(entry), entry.off_by, entry.field));
   }
+  if (!given.budget) tell_exact(session, answer);
   for (const auto& verdict : answer.verdicts) session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
 }
 

@@ -181,6 +181,14 @@ double Objective::residual_scale() const {
   return *middle / 0.6745;
 }
 
+namespace {
+
+ResidualSummary::Readings& readings_like(const TermRows& rows, ResidualSummary& summary) {
+  return rows.observed_m.rows() > 0 ? summary.markers : rows.unit == "N" ? summary.forces : rows.unit == "m" ? summary.travels : summary.torques;
+}
+
+}  // namespace
+
 ResidualSummary Objective::summarise(const Loss& loss) const {
   ResidualSummary summary;
   double between = 0, total = 0;
@@ -191,6 +199,11 @@ ResidualSummary Objective::summarise(const Loss& loss) const {
       const TermRows& rows = rows_[s][t];
       const bool chosen = choice != nullptr && t < choice->size() && (*choice)[t].size() == static_cast<std::size_t>(rows.residual.size());
       CellSums cell_sums(rows.cell);
+      if (!rows.robust) {
+        ResidualSummary::Readings& readings = readings_like(rows, summary);
+        readings.rows += static_cast<std::size_t>(rows.residual.size());
+        readings.chi2 += rows.residual.squaredNorm();
+      }
       for (Index i = 0; i < rows.residual.size(); ++i) {
         const double r = rows.residual(i);
         if (chosen && (*choice)[t][static_cast<std::size_t>(i)] == grazes) continue;

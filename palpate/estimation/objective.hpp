@@ -26,6 +26,12 @@ struct ResidualSummary {
   double sum_squared_m2 = 0;     ///< of length residuals inside the cut
   std::size_t lengths = 0;
   double variance_inflation = 1; ///< of cell means: above 1 where neighbours err together
+  /// Of one kind of reading beside the surface: few of them do not show in the sum over its many points.
+  struct Readings {
+    std::size_t rows = 0;
+    double chi2 = 0;
+  };
+  Readings travels, forces, torques, markers;
 };
 
 class Objective {

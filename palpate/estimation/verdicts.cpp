@@ -98,11 +98,34 @@ void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
   }
 }
 
+/// "residuals of travels are 5.1, of torques 3", where chance has such squares once in ten thousand fits at most: the chi-square
+/// quantile by Wilson and Hilferty (1931), of as many degrees of freedom as there are readings, and half a variance beyond it.
+std::string readings_that_do_not_fit(const ResidualSummary& residuals) {
+  constexpr double once_in_ten_thousand = 3.72, beyond = 0.5;
+  std::string out;
+  for (const auto& [what, readings] : {std::pair("travels", residuals.travels), std::pair("forces", residuals.forces),
+                                       std::pair("torques", residuals.torques), std::pair("markers", residuals.markers)}) {
+    if (readings.rows == 0) continue;
+    const double rows = static_cast<double>(readings.rows), spread = 2 / (9 * rows), mean_square = readings.chi2 / rows;
+    if (!(mean_square > beyond + std::pow(1 - spread + once_in_ten_thousand * std::sqrt(spread), 3))) continue;
+    out += (out.empty() ? "residuals of " : ", of ") + std::string(what) + (out.empty() ? " are " : " ") + number(std::sqrt(mean_square), "{:.2g}");
+  }
+  return out;
+}
+
 void judge_fit(const VerdictInput& in, std::vector<Verdict>& out) {
   const auto& r = in.residuals;
   const double outlier_share = r.points > 0 ? static_cast<double>(r.outliers) / static_cast<double>(r.points) : 0;
   const double rows = static_cast<double>(r.rows) / r.variance_inflation;
   const double limit = 1.5 + 4 * std::sqrt(2 / std::max(rows, 1.0));
+  const std::string apart = readings_that_do_not_fit(r);
+  if (in.answer.fit.chi2_per_dof <= limit && !apart.empty()) {
+    out.push_back({"model_does_not_fit",
+                   "The model does not fit all that was measured: " + apart +
+                       " times what their standard deviations allow, which the many points of the surface outweigh. Check what "
+                       "these readings mean (sign, unit, where travel begins, which tool), their sigma, and what is told of the tool (its "
+                       "compliance, its radius)."});
+  }
   if (in.answer.fit.chi2_per_dof > limit) {
     out.push_back({"model_does_not_fit",
                    "The model does not fit: residuals are " + number(std::sqrt(in.answer.fit.chi2_per_dof), "{:.2g}") +

@@ -347,6 +347,35 @@ TEST(DisplacedClamp, HeldFixedItDoesNotFitAndThatIsSaid) {
   EXPECT_TRUE(says(answer, "model_does_not_fit")) << answer.fit.chi2_per_dof;
 }
 
+TEST(Readings, ThatContradictTheSurfaceAreSaidThoughItsPointsOutweighThem) {
+  constexpr double sigma_m = 1e-4;
+  Recording recording = pushed_block_recording();
+  auto& steps = recording.pushes[0].steps;
+  const Step like = steps.back();
+  steps.clear();
+  for (int k = 1; k <= 6; ++k) {
+    steps.push_back(like);
+    steps.back().loads[0].force_n = Vec3(0, 0, -0.02 * k);
+  }
+  PushedBlock truth;
+  truth.material = "linear";
+  truth.points = 1000;
+  const Inputs clouds = clouds_of(truth, recording);
+  Unknowns unknowns;
+  ForwardModel model(recording, coarse_block("linear"), unknowns);
+  VectorX at = unknowns.prior_mean();
+  at(log_young) = std::log(truth.young_pa);
+  at(poisson) = truth.poisson;
+  for (const double off : {0.5, 8.0}) {  // up and down in turn, in standard deviations
+    Inputs inputs = clouds;
+    for (std::size_t s = 0; s < inputs.size(); ++s)
+      inputs[s].push_back(ToolTravel{"", model.predict(s, at, false).travel_m(0) + (s % 2 == 0 ? off : -off) * sigma_m, sigma_m});
+    const Identification answer = fit(recording, coarse_block("linear"), inputs, {});
+    EXPECT_LT(answer.fit.chi2_per_dof, 1.2) << "over all";
+    EXPECT_EQ(says(answer, "model_does_not_fit"), off > 1) << off;
+  }
+}
+
 TEST(DisplacedClamp, WithAPriorItFitsAndThePoseIsFound) {
   Recording recording = pushed_block_recording();
   recording.supports[0].pose_std_m = 0.005;
