@@ -53,6 +53,7 @@ TEST(Demo, GoesTheWholeWayAndIsRight) {
   EXPECT_EQ(found, (std::set<std::string>{"young_modulus", "poisson_ratio"}));
   EXPECT_THAT(folder.get("err"), HasSubstr("inside the 95 % interval"));
   EXPECT_THAT(folder.get("err"), Not(HasSubstr("OUTSIDE")));
+  EXPECT_THAT(folder.get("err"), HasSubstr("taken as exact     "));
   // A push of its own, at another place than the two of the recording and with another force, by the lab's own solver.
   const nlohmann::json predicted = read_json("prediction/prediction.json");
   lab::PressedBlockOptions cube;
