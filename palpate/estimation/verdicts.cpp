@@ -99,15 +99,16 @@ void judge_poisson(const VerdictInput& in, std::vector<Verdict>& out) {
 }
 
 /// "residuals of travels are 5.1, of torques 3", where chance has such squares once in ten thousand fits at most: the chi-square
-/// quantile by Wilson and Hilferty (1931), of as many degrees of freedom as there are readings, and half a variance beyond it.
+/// quantile by Wilson and Hilferty (1931), of as many degrees of freedom as there are readings. Three standard deviations at least: what
+/// the mesh does to a travel is taken out of E and not of the residuals.
 std::string readings_that_do_not_fit(const ResidualSummary& residuals) {
-  constexpr double once_in_ten_thousand = 3.72, beyond = 0.5;
+  constexpr double once_in_ten_thousand = 3.72, least = 3;
   std::string out;
   for (const auto& [what, readings] : {std::pair("travels", residuals.travels), std::pair("forces", residuals.forces),
                                        std::pair("torques", residuals.torques), std::pair("markers", residuals.markers)}) {
     if (readings.rows == 0) continue;
     const double rows = static_cast<double>(readings.rows), spread = 2 / (9 * rows), mean_square = readings.chi2 / rows;
-    if (!(mean_square > beyond + std::pow(1 - spread + once_in_ten_thousand * std::sqrt(spread), 3))) continue;
+    if (!(mean_square > std::max(least * least, std::pow(1 - spread + once_in_ten_thousand * std::sqrt(spread), 3)))) continue;
     out += (out.empty() ? "residuals of " : ", of ") + std::string(what) + (out.empty() ? " are " : " ") + number(std::sqrt(mean_square), "{:.2g}");
   }
   return out;

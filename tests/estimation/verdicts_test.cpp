@@ -72,6 +72,38 @@ TEST(YoungModulusAtBound, IsNotSaidOfGelsAndStones) {
   EXPECT_FALSE(says(miswritten(1, 1e6), "young_modulus_at_bound"));   // 20 GPa
 }
 
+// ---- The search and its points
+
+TEST(NotConverged, IsSaidOfASearchThatWasCutShort) {
+  const Inputs inputs = clouds_of(clear_view("neo_hookean"));
+  FitOptions options;
+  options.cross_checks = options.stresses = false;
+  options.young_start_pa = 1e6;
+  options.max_iterations = 1;
+  const Identification cut = fit(pushed_block_recording(), coarse_block(), inputs, options);
+  EXPECT_TRUE(says(cut, "not_converged"));
+  EXPECT_NE(cut.termination, Termination::converged);
+  options.max_iterations = FitOptions{}.max_iterations;
+  EXPECT_FALSE(says(fit(pushed_block_recording(), coarse_block(), inputs, options), "not_converged"));
+}
+
+TEST(ManyOutliers, AreSaidWhereMoreThanASeventhOfThePointsIsElsewhere) {
+  const auto with = [](double share) {
+    PushedBlock truth = clear_view();
+    truth.outlier_share = share;
+    return quick_fit(pushed_block_recording(), coarse_block("linear"), clouds_of(truth));
+  };
+  EXPECT_TRUE(says(with(0.25), "many_outliers"));
+  EXPECT_FALSE(says(with(0.05), "many_outliers"));
+}
+
+TEST(YoungNotDetermined, IsSaidWhereTheBlockHardlyMovesAndNotOfAClearView) {
+  Recording recording = pushed_block_recording();
+  EXPECT_FALSE(says(quick_fit(recording, coarse_block("linear"), clouds_of(clear_view())), "e_not_determined"));
+  for (Step& step : recording.pushes[0].steps) *step.loads[0].force_n *= 1e-3;
+  EXPECT_TRUE(says(quick_fit(recording, coarse_block("linear"), clouds_of(clear_view(), recording)), "e_not_determined"));
+}
+
 // ---- Loading and unloading
 
 /// Up in three steps and back in two, when the block has a share of its E only.
