@@ -118,8 +118,11 @@ estimation::Inputs observe(const Recording& recording, std::vector<Points>* mask
                                                      estimation::outline_margin_px / std::min(frame->camera.fx_px, frame->camera.fy_px)});
         } else if (const auto* cloud = std::get_if<PointCloud>(&observation)) {
           PointCloud of_object = sensing::points_of_object(arm.without_arm(*cloud, push, step), planes, low_m, high_m);
-          // No cloud says whose it is: the first one of every step is taken for one camera's, the second for another's.
-          if (of_object.camera.empty() && clouds[cloud_number] > 1) of_object.camera = "clouds " + std::to_string(cloud_number);
+          // Where a cloud does not say whose it is, the first one of every step is taken for one camera's, the second for another's.
+          if (!of_object.camera.empty())
+            of_object.camera = "clouds of " + of_object.camera;
+          else if (clouds[cloud_number] > 1)
+            of_object.camera = "clouds " + std::to_string(cloud_number);
           ++cloud_number;
           terms.push_back(std::move(of_object));
         } else if (const auto* markers = std::get_if<Markers>(&observation)) {

@@ -108,6 +108,7 @@ struct Noun<PointCloud> {
     field("sigma_m", &PointCloud::sigma_m, "of one number for all, or one a point: standard deviation per axis");
     field("pose_std_m", &PointCloud::pose_std_m, "prior on the cloud's pose, per frame");
     field("pose_std_rad", &PointCloud::pose_std_rad, "");
+    field("camera", &PointCloud::camera, "whose pose error it shares with other clouds; none: the clouds of the same number in their steps");
   }
 };
 

@@ -57,7 +57,7 @@ struct PointCloud {
   Points normals;                           ///< 0 x 3 where unknown
   VectorX sigma_m;                          ///< size 1 (common) or N: standard deviation per axis
   double pose_std_m = 0, pose_std_rad = 0;  ///< prior on the cloud's pose, per frame
-  std::string camera;                       ///< what a camera's pose errs by its clouds share; empty: none (`observe` fills it)
+  std::string camera;                       ///< whose pose error clouds share; empty: that of the same number in their step
 };
 
 /// Depth measurements as rays, what the likelihood along the camera ray works on.

@@ -259,6 +259,7 @@ class BagWriter {
     if (cloud.sigma_m[0] != cloud_.sigma_m[0] || cloud.pose_std_m != cloud_.pose_std_m ||
         cloud.pose_std_rad != cloud_.pose_std_rad)
       refuse("clouds differ in their standard deviations", step);
+    if (cloud.camera != cloud_.camera) refuse("clouds are of several cameras", step);
     put("/points", "sensor_msgs/msg/PointCloud2", time_ns_, encode(RosPointCloud{header(frames_.base()), cloud}));
   }
 

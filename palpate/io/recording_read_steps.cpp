@@ -77,6 +77,7 @@ void read_cloud_observation(YamlKeys& keys, const TableRow* row, const std::stri
   const double sigma = keys.has("sigma_m") ? keys.required("sigma_m").within(ranges::length_sigma) : nan;
   const double pose_std_m = keys.within_or("pose_std_m", 0, ranges::length_std),
                pose_std_rad = keys.within_or("pose_std_rad", 0, ranges::angle_std);
+  const std::string camera = keys.text_or("camera", "");
   const auto field = keys.optional("file");
   std::optional<std::string> file = field ? std::optional(field->text()) : std::nullopt;
   std::string where = field ? field->where() : keys.map().where();
@@ -97,6 +98,7 @@ void read_cloud_observation(YamlKeys& keys, const TableRow* row, const std::stri
   }
   cloud.pose_std_m = pose_std_m;
   cloud.pose_std_rad = pose_std_rad;
+  cloud.camera = camera;
   step.observations.emplace_back(std::move(cloud));
 }
 

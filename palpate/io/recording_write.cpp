@@ -356,6 +356,7 @@ std::string RecordingWriter::Pages::observation_text(const Observation& observat
     line.put("kind", "cloud").put("file", file);
     if (cloud->sigma_m.size() == 1) line.number("sigma_m", cloud->sigma_m[0]);
     line.number_unless(0, "pose_std_m", cloud->pose_std_m).number_unless(0, "pose_std_rad", cloud->pose_std_rad);
+    if (!cloud->camera.empty()) line.word("camera", cloud->camera);
   } else if (const auto* markers_given = std::get_if<Markers>(&observation)) {
     if (!markers_given->observed_m.array().isFinite().rowwise().all().any()) return "";  // all are hidden
     const Markers seen = with_names(*markers_given);

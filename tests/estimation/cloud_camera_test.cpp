@@ -81,6 +81,8 @@ TEST(CloudCamera, ObservedCloudsAreOneCamerasWhereThereAreSeveral) {
       EXPECT_EQ(std::get<PointCloud>(step[0]).camera, count > 1 ? "clouds 0" : "");
       EXPECT_EQ(std::get<PointCloud>(step[1]).camera, count > 1 ? "clouds 1" : "") << "a second camera's";
     }
+    for (Step& step : recording.pushes[0].steps) std::get<PointCloud>(step.observations[1]).camera = "0";
+    for (const auto& step : observe(recording)) EXPECT_EQ(std::get<PointCloud>(step[1]).camera, "clouds of 0") << "not that of images";
   }
 }
 

@@ -102,6 +102,13 @@ TEST_F(WrittenRecording, MarkersThatAreAllHiddenAreNoObservation) {
   EXPECT_EQ(std::get<PointCloud>(back.pushes[0].steps[1].observations[0]).points_m, std::get<PointCloud>(cloud).points_m);
 }
 
+TEST_F(WrittenRecording, ACloudsCameraIsWhoseItWas) {
+  std::get<PointCloud>(steps()[0].observations[1]).camera = "left eye: 2";
+  const Recording back = read_back();
+  EXPECT_EQ(std::get<PointCloud>(back.pushes[0].steps[0].observations[1]).camera, "left eye: 2");
+  EXPECT_GT(std::get<PointCloud>(back.pushes[0].steps[0].observations[1]).points_m.rows(), 0);
+}
+
 TEST_F(WrittenRecording, DirectionsAreOfUnitLength) {
   for (std::size_t s = 1; s < steps().size(); ++s) steps()[s].loads[0].direction = Vec3(0, 0, -2);
   Wrench cell;
