@@ -94,7 +94,7 @@ void fields(Each each, TrialAnswer& a) {
 template <class Each>
 void fields(Each each, StudyRow& a) {
   each("what", a.what), each("true_young_modulus_pa", a.young_modulus_pa), each("true_poisson_ratio", a.poisson_ratio);
-  each("paper", a.paper), each("palpate", a.palpate);
+  each("paper", a.paper), each("palpate", a.palpate), each("views", a.views, Since::later);
 }
 
 template <class T>

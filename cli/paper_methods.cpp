@@ -1,12 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_methods.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "palpate/estimation/paper_method.hpp"
 #include "palpate/estimation/slips.hpp"
 
 namespace palpate::cli {
+namespace {
+
+constexpr const char* contact_slipped = "contact_slipped";
+
+bool says(const MethodAnswer& answer, const char* verdict) {
+  return std::find(answer.verdicts.begin(), answer.verdicts.end(), verdict) != answer.verdicts.end();
+}
+
+bool any_slip(const Recording& recording) {
+  for (const Push& push : recording.pushes)
+    for (const Step& step : push.steps)
+      if (step.slipped) return true;
+  return false;
+}
+
+/// The slips of a recording in the other models of what was prepared.
+void tell_slips(const Recording& slipped, Prepared& given) {
+  if (given.finer) {
+    given.finer = std::make_shared<estimation::FinerModel>(*given.finer);
+    estimation::take_slips(slipped, given.finer->recording);
+  }
+  if (given.doubt) {
+    given.doubt = std::make_shared<estimation::ShapeDoubt>(*given.doubt);
+    given.doubt->effect.reset();
+    for (estimation::AlternativeShape& shape : given.doubt->shapes) estimation::take_slips(slipped, shape.recording);
+  }
+}
+
+void count_too(const MethodAnswer& first, MethodAnswer& out) {
+  out.solves += first.solves;
+  out.load_cases += first.load_cases;
+  out.iterations += first.iterations;
+  out.seconds += first.seconds;
+}
+
+}  // namespace
+
 MethodAnswer no_answer() {
   MethodAnswer out;
   out.young_modulus_pa = out.poisson_ratio = out.lower_95_pa = out.upper_95_pa = out.poisson_lower_95 = out.poisson_upper_95 =
@@ -43,7 +82,7 @@ MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& optio
 }
 
 MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
-                        const OnProgress& progress, Identification* whole, estimation::StepCounts* fitted) {
+                        const OnProgress& progress, Found* found) {
   const Watch watch;
   Prepared slipping = given;  // with the slips that are found
   estimation::FitOptions fit_options = options;
@@ -58,37 +97,41 @@ MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& opt
     if (before != nullptr) {
       fit_options.young_start_pa = before->parameters[0].value;
       fit_options.poisson_start = before->parameters[1].value;
-      if (slipping.finer) {
-        slipping.finer = std::make_shared<estimation::FinerModel>(*slipping.finer);
-        estimation::take_slips(slipping.recording, slipping.finer->recording);
-      }
-      if (slipping.doubt) {
-        slipping.doubt = std::make_shared<estimation::ShapeDoubt>(*slipping.doubt);
-        slipping.doubt->effect.reset();
-        for (estimation::AlternativeShape& shape : slipping.doubt->shapes) estimation::take_slips(slipping.recording, shape.recording);
-      }
+      tell_slips(slipping.recording, slipping);
     }
     return estimation::fit_within_pressure(slipping.recording, slipping.object, slipping.inputs, fit_options, fit, &steps, progress);
   });
-  if (fitted != nullptr) *fitted = steps;
   const MethodAnswer out = summary(answer, watch.seconds());
-  if (whole != nullptr) *whole = std::move(answer);
+  if (found != nullptr) *found = {std::move(answer), std::move(steps), std::move(slipping.recording)};
+  return out;
+}
+
+MethodAnswer by_palpate_told_of_slips(const Prepared& given, const Recording& slipped, const estimation::FitOptions& options,
+                                      estimation::FitMemory* memory, const OnProgress& progress) {
+  MethodAnswer first = by_palpate(given, options, memory, progress);
+  if (says(first, contact_slipped) || !std::isfinite(first.young_modulus_pa)) return first;
+  Prepared told = given;
+  estimation::take_slips(slipped, told.recording);
+  if (!any_slip(told.recording)) return first;  // they were in samples that are no longer there
+  tell_slips(told.recording, told);
+  estimation::FitOptions from_there = options;
+  from_there.young_start_pa = first.young_modulus_pa;
+  from_there.poisson_start = first.poisson_ratio;
+  MethodAnswer out = by_palpate(told, from_there, memory, progress);
+  if (!says(out, contact_slipped)) out.verdicts.emplace_back(contact_slipped);
+  count_too(first, out);
   return out;
 }
 
 MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
-                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole,
-                                        estimation::StepCounts* fitted) {
-  const MethodAnswer first = by_palpate(given, options, memory, progress, whole, fitted);
+                                        estimation::FitMemory* memory, const OnProgress& progress, Found* found) {
+  const MethodAnswer first = by_palpate(given, options, memory, progress, found);
   if (!given.doubt || !given.doubt->effect || !given.doubt->effect->better) return first;
   given.doubt->effect->better.reset();
   choice.planar_agrees = true;  // the only alternative that is as likely
   given = prepare(recording, choice, nullptr, progress, given.doubt);
-  MethodAnswer out = by_palpate(given, options, nullptr, progress, whole, fitted);
-  out.solves += first.solves;
-  out.load_cases += first.load_cases;
-  out.iterations += first.iterations;
-  out.seconds += first.seconds;
+  MethodAnswer out = by_palpate(given, options, nullptr, progress, found);
+  count_too(first, out);
   return out;
 }
 

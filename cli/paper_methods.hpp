@@ -40,15 +40,25 @@ MethodAnswer by_paper(const Prepared& given, const estimation::FitOptions& optio
                       const OnProgress& progress,
                       estimation::PaperDistance distance = estimation::PaperDistance::nearest_vertex);
 
-/// @param whole   if given: all that was found
-/// @param fitted  if given: of which samples; loads too high for the model are left out (deep_loads.hpp)
+/// What `by_palpate` found besides.
+struct Found {
+  Identification answer;
+  estimation::StepCounts fitted;  ///< of which samples: loads too high for the model are left out (deep_loads.hpp)
+  Recording slipped;              ///< all samples, with the slips that were found
+};
+
+/// @param found  if given: all that was found
 MethodAnswer by_palpate(const Prepared& given, const estimation::FitOptions& options, estimation::FitMemory* memory,
-                        const OnProgress& progress, Identification* whole = nullptr, estimation::StepCounts* fitted = nullptr);
-/// The same of an object that was seen from one side, as `identify` does it: where a planar back side agrees better with the pushes
+                        const OnProgress& progress, Found* found = nullptr);
+/// With another law, of samples in which a first one found slips already. A slip that this fit does not find by itself (of two samples
+/// it hardly can) it is told, and both fits are counted.
+/// @param slipped  the same pushes, with the slips that the first law found
+MethodAnswer by_palpate_told_of_slips(const Prepared& given, const Recording& slipped, const estimation::FitOptions& options,
+                                      estimation::FitMemory* memory, const OnProgress& progress);
+/// Of an object that was seen from one side, as `identify` does it: where a planar back side agrees better with the pushes
 /// than the one that was fitted, it takes its place, and the answer is of that one. What both fits took is counted.
 /// @param given  of `recording` and `choice`; both are changed to what was fitted at last
 MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
-                                        estimation::FitMemory* memory, const OnProgress& progress, Identification* whole = nullptr,
-                                        estimation::StepCounts* fitted = nullptr);
+                                        estimation::FitMemory* memory, const OnProgress& progress, Found* found = nullptr);
 
 }  // namespace palpate::cli

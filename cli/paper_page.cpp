@@ -165,8 +165,11 @@ std::string claims(const std::vector<SceneAnswers>& scenes) {
 std::string study_section(std::span<const StudyAnswer> seeds, std::uint64_t details_of) {
   const auto detailed = std::find_if(seeds.begin(), seeds.end(), [&](const StudyAnswer& one) { return one.seed == details_of; });
   const StudyAnswer& shown = detailed != seeds.end() ? *detailed : seeds.front();
+  std::string pictures;
+  for (const StudyRow& row : shown.rows)
+    if (!row.views.empty()) pictures += fmt::format("<p>{}:</p>\n", row.what) + view_figures(row.views);
   return fmt::format("<h2 id=\"{}\">{}</h2>\n<p>{}</p>\n", shown.study->name, shown.study->title, shown.study->about) + study_score_table(seeds) +
-         study_table(shown) + (shown.failed.empty() ? "" : "<p>It ended with an error: " + escaped(shown.failed) + "</p>\n");
+         study_table(shown) + pictures + (shown.failed.empty() ? "" : "<p>It ended with an error: " + escaped(shown.failed) + "</p>\n");
 }
 
 }  // namespace

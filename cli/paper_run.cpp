@@ -31,7 +31,7 @@ TrialOptions options_of(const PaperPlan& plan, const lab::PaperScene& scene, std
   options.threads = plan.threads;
   if (seed != plan.details_of) return options;
   const bool dear = scene.law != "linear";
-  options.every_sample = plan.quick && !dear ? 2 : 1;  // of a dear one few are left: deep loads are left out
+  options.samples_alone = true;
   options.pictures = true;
   options.surface_points = !plan.quick ? 25 : dear ? 5 : 9;
   return options;
@@ -49,7 +49,8 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
     return SeedAsked{std::string(scene.name), seed, options_of(plan, scene, seed), plan.object, plan.quick};
   };
   const auto asked_of_study = [&](const Study& study, int k) {
-    return SeedAsked{std::string(study.name), plan.study_seed + static_cast<std::uint64_t>(k), {}, {}, plan.quick};
+    const std::uint64_t seed = plan.study_seed + static_cast<std::uint64_t>(k);
+    return SeedAsked{std::string(study.name), seed, {.pictures = seed == plan.details_of}, {}, plan.quick};
   };
   int there = 0;
   for (const lab::PaperScene* scene : plan.scenes)
@@ -91,7 +92,7 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
       if (folder.has(asked)) continue;
       StudyAnswer answer{study, asked.seed, {}, {}, 0};
       try {
-        work.study(*study, {asked.seed, plan.threads}, answer);
+        work.study(*study, {asked.seed, plan.threads, asked.options.pictures}, answer);
       } catch (const std::exception& error) {
         answer.failed = error.what();
       }

@@ -24,7 +24,7 @@ constexpr int seed_format = 4;
 std::string file_name(const std::string& name, std::uint64_t seed) { return fmt::format("{}_{:04}.json", name, seed); }
 
 json options_json(const SeedAsked& asked) {
-  json out = {{"every_sample", asked.options.every_sample},
+  json out = {{"every_sample", asked.options.samples_alone ? 1 : 0},
               {"surface_points", asked.options.surface_points},
               {"pictures", asked.options.pictures}};
   if (asked.name == "cow" && !asked.object.name.empty())
@@ -186,7 +186,10 @@ void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
                 file);
   runs.version = made_by;
   runs.threads.insert(seed.at("threads").get<int>());
+  runs.quick = runs.quick || seed.at("quick").get<bool>();
+  const bool pictures = seed.at("options").at("pictures");
   if (const Study* study = study_of(name)) {
+    if (pictures) runs.details_of = number;
     StudyAnswer answer{study, number, {}, seed.at("study").at("failed"), seed.at("study").at("seconds")};
     read_into(answer.rows, seed.at("study").at("rows"));
     const auto after = [&](const StudyAnswer& other) {
@@ -215,8 +218,7 @@ void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
   TrialAnswer trial;
   read_into(trial, seed.at("trial"));
   trial.seed = number;
-  runs.quick = runs.quick || seed.at("quick").get<bool>();
-  if (seed.at("options").at("pictures").get<bool>())
+  if (pictures)
     runs.details_of = number;
   else if (runs.details_of == number)
     runs.details_of = 0;  // not even the one that has them where nobody asks

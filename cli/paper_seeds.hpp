@@ -26,7 +26,7 @@ struct PlacedObject {
 struct SeedAsked {
   std::string name;  ///< of a scene or a study
   std::uint64_t seed = 1;
-  TrialOptions options;  ///< of a study: none; the number of threads changes seconds alone
+  TrialOptions options;  ///< of a study: pictures alone; the number of threads changes seconds alone
   PlacedObject object;   ///< of the cow
   bool quick = false;    ///< for the command that the page gives
 };

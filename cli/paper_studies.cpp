@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "cli/paper_views.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/lab/paper_scenes.hpp"
 
@@ -67,7 +68,7 @@ std::vector<StudyRow> faults(const StudyOptions& study, const OnProgress& progre
   return rows;
 }
 
-/// Cube and bear, pressed at one site each: their whole shape, and what one image from the front shows of it.
+/// Cube and bear, pressed at one site each: their whole shape, and what four images around or one from the front show of it.
 std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progress) {
   std::vector<StudyRow> rows;
   for (const char* name : {"cube", "teddy"}) {
@@ -76,11 +77,13 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
     scene.sites = 1;
     scene.view_azimuth_rad = -2;  // from where the camera watches the push
     scene.view_elevation_rad = 0.6;
-    for (const auto shape : {lab::PaperShape::given, lab::PaperShape::planar_back, lab::PaperShape::one_view}) {
+    using lab::PaperShape;
+    for (const auto shape : {PaperShape::given, PaperShape::four_views, PaperShape::planar_back, PaperShape::one_view}) {
       const std::string object(scene.object);
-      const std::string what = object + (shape == lab::PaperShape::given         ? ", its whole shape"
-                                         : shape == lab::PaperShape::planar_back ? ", one view and a planar back side (as in the paper)"
-                                                                                 : ", one view, completed by palpate");
+      const std::string what = object + (shape == PaperShape::given         ? ", its whole shape"
+                                         : shape == PaperShape::four_views  ? ", four views joined (as in the paper's fig. 2)"
+                                         : shape == PaperShape::planar_back ? ", one view and a planar back side (as in the paper)"
+                                                                            : ", one view, completed by palpate");
       if (!wanted(progress, what)) return rows;
       scene.shape = shape;
       const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress);
@@ -89,11 +92,12 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
         ModelChoice choice = choice_of(scene);
         Prepared given = prepare(trial.recording, choice, nullptr, progress);
         // Palpate does not take a planar back side for true, and is asked all the same; no finer mesh of it can be had.
-        const bool planar = shape == lab::PaperShape::planar_back;
+        const bool planar = shape == PaperShape::planar_back;
         if (planar) given.finer.reset();
         row.palpate = planar ? by_palpate(given, options_of(study), nullptr, progress)
                              : by_palpate_on_better_shape(trial.recording, choice, given, options_of(study), nullptr, progress);
         row.paper = by_paper(given, options_of(study), nullptr, progress);
+        if (study.pictures && shape == PaperShape::four_views) row.views = views_of_model(trial.recording, given);
       } catch (const Error& error) {  // what one view shows may make no body: then neither has an answer
         row.paper.failed = row.palpate.failed = error.what();
       }
@@ -112,7 +116,7 @@ constexpr std::array<Study, 3> table{{
      "interval that happens to hold.",
      faults},
     {"partial", "A partial model against the whole one",
-     "The paper says that a model of what one view shows, with a planar back side, suffices.", partial},
+     "The paper says that a model of what one view shows, with a planar back side, suffices. It also joins four views to a whole one.", partial},
 }};
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cli/paper_methods.hpp"
+#include "cli/paper_trial.hpp"
 
 namespace palpate::cli {
 
@@ -15,11 +15,13 @@ struct StudyRow {
   std::string what;
   double young_modulus_pa = 0, poisson_ratio = 0;  ///< the truth
   MethodAnswer paper, palpate;                     ///< NaN: not asked
+  std::vector<PaperView> views = {};               ///< of a model that several views gave; only where asked for
 };
 
 struct StudyOptions {
   std::uint64_t seed = 1;
   int threads = 1;
+  bool pictures = false;
 };
 
 struct Study {

@@ -66,7 +66,7 @@ ErrorSurface error_surface(const Prepared& given, const MethodAnswer& found, dou
   return out;
 }
 
-void answer_samples(const Prepared& given, int every, const estimation::FitOptions& options, TrialAnswer& out, const OnProgress& progress) {
+void answer_samples(const Prepared& given, const estimation::FitOptions& options, TrialAnswer& out, const OnProgress& progress) {
   estimation::FitOptions alone = options;
   alone.cross_checks = alone.stresses = alone.find_slips = false;  // of one sample there is no slip
   std::size_t count = 0, done = 0;
@@ -75,7 +75,7 @@ void answer_samples(const Prepared& given, int every, const estimation::FitOptio
     const Push& push = given.recording.pushes[p];
     for (std::size_t s = 0; s < push.steps.size(); ++s) {
       if (progress && !progress("samples alone", static_cast<double>(done++) / static_cast<double>(count))) return;
-      if (!loaded(push.steps[s]) || s % static_cast<std::size_t>(every) != 0) continue;
+      if (!loaded(push.steps[s])) continue;
       const Load& load = push.steps[s].loads[0];
       SampleAnswer sample;
       sample.push = push.name;
@@ -179,13 +179,13 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   const Watch model;
   Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
   out.model_s = model.seconds();
-  Identification ours;
-  estimation::StepCounts fitted = estimation::all_steps(given.recording);
-  out.palpate = asked([&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, mine, progress, &ours, &fitted); });
+  Found ours;
+  ours.fitted = estimation::all_steps(given.recording);
+  out.palpate = asked([&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, mine, progress, &ours); });
   // From here on these samples alone, by both methods.
-  estimation::keep_first_steps(trial.recording, fitted);
+  estimation::keep_first_steps(trial.recording, ours.fitted);
   out.left_out = samples(given.recording);
-  given = first_samples(std::move(given), fitted);
+  given = first_samples(std::move(given), ours.fitted);
   out.left_out -= samples(given.recording);
   out.tetrahedra = static_cast<Index>(given.object.mesh.tetrahedra.rows());
   const Prepared one = as_one(given);
@@ -201,14 +201,14 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   if (!scene.other_law.empty()) {
     other = with_law(given, scene.other_law);
     out.other_law = scene.other_law;
-    out.other = asked([&] { return by_palpate(*other, fit, others, progress); });
+    out.other = asked([&] { return by_palpate_told_of_slips(*other, ours.slipped, fit, others, progress); });
   }
 
   std::vector<double> by_region;
-  if (!given.object.region_names.empty() && ours.parameters.size() > 2)
-    by_region = answer_sites(given, trial, ours, fit, *shared, out, progress);
+  if (!given.object.region_names.empty() && ours.answer.parameters.size() > 2)
+    by_region = answer_sites(given, trial, ours.answer, fit, *shared, out, progress);
   predict_unused(given, other ? &*other : nullptr, trial, by_region, fit, *shared, out);
-  if (options.every_sample > 0) answer_samples(one, options.every_sample, fit, out, progress);
+  if (options.samples_alone) answer_samples(one, fit, out, progress);
   if (options.pictures && by_region.empty()) {
     const bool known = !scene.apparent;  // else around what was found
     add_pictures(given, known ? out.young_modulus_pa : out.palpate.young_modulus_pa,
@@ -218,18 +218,18 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
     out.views = views_of(trial.recording, given, out.palpate, by_region, fit);
     estimation::FitOptions checked = fit;
     checked.cross_checks = true;
-    const auto judged = [&](const Prepared& what, MethodAnswer& answer, estimation::FitMemory* memory) {
+    const auto judged = [&](const Prepared& what, const Recording& slipped, MethodAnswer& answer, estimation::FitMemory* memory) {
       if (!answer.converged) return;
       estimation::FitOptions from_there = checked;
       from_there.young_start_pa = answer.young_modulus_pa;
       from_there.poisson_start = answer.poisson_ratio;
       from_there.start_is_answer = true;
       const bool left_out = std::find(answer.verdicts.begin(), answer.verdicts.end(), "deep_loads_left_out") != answer.verdicts.end();
-      answer.verdicts = by_palpate(what, from_there, memory, progress).verdicts;
+      answer.verdicts = by_palpate_told_of_slips(what, slipped, from_there, memory, progress).verdicts;
       if (left_out) answer.verdicts.emplace_back("deep_loads_left_out");  // of samples that are no longer there
     };
-    judged(given, out.palpate, mine);
-    if (other) judged(*other, out.other, others);
+    judged(given, given.recording, out.palpate, mine);
+    if (other) judged(*other, ours.slipped, out.other, others);
     if (!by_region.empty()) out.as_one_verdicts = by_palpate(one, checked, nullptr, progress).verdicts;
   }
   if (options.surface_points > 1 && by_region.empty() && std::isfinite(out.paper.young_modulus_pa))

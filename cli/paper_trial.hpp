@@ -102,9 +102,9 @@ struct TrialAnswer {
 };
 
 struct TrialOptions {
-  int every_sample = 0;    ///< alone: 1 = each, 2 = every second, ...; 0 = none
-  int surface_points = 0;  ///< a side of the error surface; 0 = none
-  bool pictures = false;   ///< registrations, verdicts, linear tetrahedra, and what ours says of an object with regions that it is not told of
+  bool samples_alone = false;  ///< each of them
+  int surface_points = 0;      ///< a side of the error surface; 0 = none
+  bool pictures = false;       ///< registrations, verdicts, linear tetrahedra, and what ours says of an object with regions that it is not told of
   int threads = 1;
 };
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/paper_views.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "cli/paper_expected.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
@@ -15,6 +18,7 @@
 #include "palpate/report/mesh_picture.hpp"
 #include "palpate/report/object_picture.hpp"
 #include "palpate/sensing/camera.hpp"
+#include "palpate/sensing/observe.hpp"
 
 namespace palpate::cli {
 namespace {
@@ -189,6 +193,30 @@ std::vector<PaperView> views_of(const Recording& seen, const Prepared& given, co
       picture_of(spread(object_m - simulated_m, simulated_m), window, "Measured less simulated: red to blue = -10 to 10 mm",
                  [](double difference_m) { return difference_colour(difference_m); }),
   };
+}
+
+std::vector<PaperView> views_of_model(const Recording& seen, const Prepared& given) {
+  constexpr int side_px = 320;
+  const geometry::TriangleTree surface(given.object.surface.rest());
+  const double near_m = near_of(seen);
+  std::vector<Points> clouds;
+  for (const DepthFrame& view : seen.rest.views) {
+    const RayCloud rays = sensing::observe(view, seen.environment);
+    Points& cloud = clouds.emplace_back(rays.origins_m + (rays.directions.array().colwise() * rays.range_m.array()).matrix());
+    Index kept = 0;
+    for (Index i = 0; i < static_cast<Index>(cloud.rows()); ++i)
+      if (surface.within(cloud.row(i), near_m * near_m)) cloud.row(kept++) = cloud.row(i).eval();
+    cloud.conservativeResize(kept, 3);
+  }
+  const Points& around = given.object.surface.rest().vertices_m;
+  const TetMesh corners{given.object.mesh.nodes_m, given.object.mesh.tetrahedra.leftCols(4)};
+  const auto view = [](std::string what, const report::Picture& picture) {
+    return PaperView{std::move(what), picture.width, picture.height, io::base64_encoded(report::encode_png(picture))};
+  };
+  return {view("The points of one view", report::draw_clouds(std::span(clouds).first(std::min<std::size_t>(1, clouds.size())), around, side_px, side_px)),
+          view(fmt::format("Those of {} views, where their cameras are said to have been", clouds.size()), report::draw_clouds(clouds, around, side_px, side_px)),
+          view("The surface made of them", report::draw_surface(given.object.surface.rest(), side_px, side_px)),
+          view(fmt::format("Its {} tetrahedra, cut in the middle", corners.tetrahedra.rows()), report::draw_mesh(corners, 2 * side_px, side_px))};
 }
 
 }  // namespace palpate::cli

@@ -15,4 +15,8 @@ namespace palpate::cli {
 std::vector<PaperView> views_of(const Recording& seen, const Prepared& given, const MethodAnswer& answer, const std::vector<double>& by_region,
                                 const estimation::FitOptions& options);
 
+/// Fig. 2 (b to d), of an object whose shape several views gave: one view's cloud, all of them, and what was made of them.
+/// @param given  the model
+std::vector<PaperView> views_of_model(const Recording& seen, const Prepared& given);
+
 }  // namespace palpate::cli

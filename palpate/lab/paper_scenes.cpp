@@ -179,7 +179,9 @@ PaperTrial make_paper_trial(const PaperScene& scene, std::uint64_t seed, const O
   trial.poisson_ratio = robot.object().poisson_ratio;
   if (scene.shape != PaperShape::given) {
     trial.recording.rest.surface.reset();
-    trial.recording.rest.views = robot.look_from({{scene.view_azimuth_rad, scene.view_elevation_rad}});
+    trial.recording.rest.views = scene.shape == PaperShape::four_views
+                                     ? robot.look_around(4)
+                                     : robot.look_from({{scene.view_azimuth_rad, scene.view_elevation_rad}});
   }
   const double slip_m = scene.slip_m + fault.slip_m, deeper_m = scene.slip_deeper_m + fault.slip_deeper_m;
   const double share = 1 / static_cast<double>(sites.size() + 1);

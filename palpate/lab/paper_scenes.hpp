@@ -31,7 +31,8 @@ struct PaperTrial {
 enum class PaperShape {
   given,
   one_view,    ///< one image; completed as the program completes it
-  planar_back  ///< the same, with the paper's planar back side
+  planar_back, ///< the same, with the paper's planar back side
+  four_views   ///< three around and one from above, joined: the paper's fig. 2
 };
 
 /// From the object's foot.

@@ -120,8 +120,9 @@ class DepthBuffer {
   }
   void put(int x, int y, double depth, const Vec3& colour) {
     const std::size_t i = at(x, y);
-    if (depth >= depth_[i]) return;
-    depth_[i] = static_cast<float>(depth);
+    const auto kept = static_cast<float>(depth);
+    if (kept >= depth_[i]) return;
+    depth_[i] = kept;
     for (int k = 0; k < 3; ++k)
       rgba_[i * 4 + static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(std::clamp(colour(k), 0.0, 255.0));
     rgba_[i * 4 + 3] = 255;

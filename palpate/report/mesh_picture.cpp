@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "palpate/report/axes.hpp"
 #include "palpate/report/depth_buffer.hpp"
 
 namespace palpate::report {
@@ -47,14 +48,26 @@ std::vector<Face> outer_faces(const TetMesh& mesh, const std::vector<char>& kept
   return out;
 }
 
+const Vec3 outside(142, 188, 205);
+
+Vec3 looking(const Vec3& up) {
+  const Vec3 level = up.unitOrthogonal(), side = up.cross(level);
+  return -(0.75 * level + 0.65 * side + 0.35 * up).normalized();
+}
+
+void facet(DepthBuffer& buffer, const std::array<Vec3, 3>& x, const Vec3& colour) {
+  const Vec3 normal = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
+  buffer.facet({buffer.project(x[0]), buffer.project(x[1]), buffer.project(x[2])},
+               (0.55 + 0.45 * std::max(0.0, normal.dot(buffer.light()))) * colour, 0.9);
+}
+
 }  // namespace
 
 Picture draw_mesh(const TetMesh& mesh, int width, int height, const Vec3& up) {
   Picture out{width, height,
               std::vector<std::uint8_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4, 0)};
   if (mesh.tetrahedra.rows() == 0) return out;
-  const Vec3 level = up.unitOrthogonal(), side = up.cross(level);
-  const Vec3 towards = -(0.75 * level + 0.65 * side + 0.35 * up).normalized();
+  const Vec3 level = up.unitOrthogonal(), towards = looking(up);
   const Vec3 middle = 0.5 * (mesh.nodes_m.colwise().minCoeff() + mesh.nodes_m.colwise().maxCoeff()).transpose();
   const int half = width / 2;
   for (const bool opened : {false, true}) {
@@ -67,23 +80,36 @@ Picture draw_mesh(const TetMesh& mesh, int width, int height, const Vec3& up) {
       }
     DepthBuffer buffer(2 * half, 2 * height);
     buffer.look(towards, up, mesh.nodes_m);
-    const Vec3 light = buffer.light();
-    for (const Face& f : outer_faces(mesh, kept)) {
-      std::array<Vec3, 3> x, p;
-      for (std::size_t k = 0; k < 3; ++k) {
-        x[k] = mesh.nodes_m.row(f.corner[k]);
-        p[k] = buffer.project(x[k]);
-      }
-      const Vec3 normal = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
-      const Vec3 colour = f.cut ? Vec3(236, 196, 120) : Vec3(142, 188, 205);
-      buffer.facet(p, (0.55 + 0.45 * std::max(0.0, normal.dot(light))) * colour, 0.9);
-    }
+    for (const Face& f : outer_faces(mesh, kept))
+      facet(buffer, {mesh.nodes_m.row(f.corner[0]), mesh.nodes_m.row(f.corner[1]), mesh.nodes_m.row(f.corner[2])},
+            f.cut ? Vec3(236, 196, 120) : outside);
     const Picture drawn = buffer.halved();
     for (int y = 0; y < height; ++y)
       std::copy_n(drawn.rgba.begin() + std::ptrdiff_t(4) * y * drawn.width, 4 * drawn.width,
                   out.rgba.begin() + std::ptrdiff_t(4) * (y * width + (opened ? half : 0)));
   }
   return out;
+}
+
+Picture draw_surface(const TriMesh& surface, int width, int height, const Vec3& up) {
+  DepthBuffer buffer(2 * width, 2 * height);
+  if (surface.vertices_m.rows() == 0) return buffer.halved();
+  buffer.look(looking(up), up, surface.vertices_m);
+  for (Index t = 0; t < surface.triangles.rows(); ++t)
+    facet(buffer, {surface.vertices_m.row(surface.triangles(t, 0)), surface.vertices_m.row(surface.triangles(t, 1)), surface.vertices_m.row(surface.triangles(t, 2))},
+          outside);
+  return buffer.halved();
+}
+
+Picture draw_clouds(std::span<const Points> clouds, const Points& around, int width, int height, const Vec3& up) {
+  DepthBuffer buffer(2 * width, 2 * height);
+  if (around.rows() == 0) return buffer.halved();
+  buffer.look(looking(up), up, around);
+  for (std::size_t k = 0; k < clouds.size(); ++k) {
+    const Colour colour = category(k);
+    for (Index i = 0; i < clouds[k].rows(); ++i) buffer.spot(buffer.project(clouds[k].row(i)), 2, Vec3(colour.r, colour.g, colour.b));
+  }
+  return buffer.halved();
 }
 
 }  // namespace palpate::report

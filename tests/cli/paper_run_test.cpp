@@ -224,11 +224,13 @@ TEST(PaperRun, AStudyThatIsAskedForSeveralSeedsIsToldOverThem) {
   run.plan.scenes.clear();
   run.plan.study_seed = 5;
   run.plan.study_seeds = 3;
+  run.plan.details_of = 7;
   run.work.study = [&](const Study&, const StudyOptions& options, StudyAnswer& out) {
     ++run.made;
     if (options.seed == 6) throw std::runtime_error("no <such> mesh");
     out.rows = {{"row", 1e4, 0.3, answer(1.1e4, 0.2), answer(1e4, 0.3)}};
     out.rows[0].palpate.verdicts = {"contact_slipped", "contact_slipped"};
+    if (options.pictures) out.rows[0].views = {{"Four <views>", 1, 1, "cGljdHVyZQ" + std::to_string(options.seed)}};
   };
   const PaperRuns runs = run_plan(run.plan, run.work, files / "out");
   EXPECT_EQ(run.made, 3);
@@ -237,6 +239,8 @@ TEST(PaperRun, AStudyThatIsAskedForSeveralSeedsIsToldOverThem) {
   const std::string page = contents(files / "out" / "paper.html");
   EXPECT_THAT(page, HasSubstr("contact_slipped (2)"));
   EXPECT_THAT(page, HasSubstr("Seed 6 ended with an error: no &lt;such&gt; mesh"));
+  EXPECT_THAT(page, HasSubstr("cGljdHVyZQ7"));
+  EXPECT_THAT(page, Not(HasSubstr("cGljdHVyZQ5"))) << "pictures of one seed, as with scenes";
   EXPECT_EQ(page.find("<h2"), page.rfind("<h2")) << "one section for all of its seeds";
   const auto told = nlohmann::json::parse(contents(files / "out" / "paper.json")).at("study_scores").at(0);
   EXPECT_EQ(told.at("seeds"), 3);
