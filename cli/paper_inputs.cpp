@@ -115,6 +115,9 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
     if (unseen > 0 && !choice.planar_back) {
       out.doubt = doubt ? std::move(doubt) : std::make_shared<estimation::ShapeDoubt>(other_shapes(as_given, unseen, views.symmetries));
       out.doubt->side = unseen_side(as_given, recording, seen);
+    } else if (const auto foot = foot_doubt(recording, views.strip_m); foot && !choice.planar_back) {
+      out.doubt = std::make_shared<estimation::ShapeDoubt>();
+      out.doubt->foot = foot;
     }
     if (auto finer = estimation::finer_model(recording, out.object, fill_anew(as_given, recording)))
       out.finer = std::make_shared<estimation::FinerModel>(std::move(*finer));
