@@ -63,6 +63,15 @@ TEST_F(MeshElsewhere, TakesTheMeshThatShowedIt) {
   EXPECT_FALSE(says(fine, "mesh_too_coarse"));
 }
 
+TEST_F(MeshElsewhere, IsTooCoarseWhereNoFinerMeshIsWithinWhatWasAskedFor) {
+  Index tetrahedra = 0;
+  const Identification answer = within(1e-5, tetrahedra);
+  EXPECT_GT(tetrahedra, 8 * 144) << "finer ones were tried";
+  EXPECT_TRUE(says(answer, "mesh_too_coarse"));
+  EXPECT_GT(stated(answer), 1e-5);
+  EXPECT_LT(std::abs(error(answer)), 0.005) << "the truth's mesh is no finer than that";
+}
+
 TEST_F(MeshElsewhere, IsStillTakenOutOnceToolsAreFine) {
   const SimulatedObject object = coarse_block();
   const auto everywhere = finer_model(recording, object), under_tools = finer_under_tools(recording, object);

@@ -246,6 +246,26 @@ TEST(BeyondSmallStrain, IsSaidWhereLinearElementsTurnInsideOut) {
 
 TEST(BeyondSmallStrain, IsNotSaidOfALittleBending) { EXPECT_FALSE(says(linear_under(1), "beyond_small_strain")); }
 
+// ---- Loads beyond a law
+
+/// Seen without error through the fit's own mesh, pressed with `over_young` of its E (mean over the patch).
+Identification corotational_under(double over_young) {
+  PushedBlock truth;
+  truth.material = "corotational";
+  truth.finer = 1;
+  Recording recording = glued_block_recording({Vec3(0, 0, -0.1), Vec3(0, 0, -1)}, 0.03, 0.02);
+  const double radius_m = recording.tools[0].radius_m, newton = over_young * truth.young_pa * EIGEN_PI * radius_m * radius_m;
+  recording.pushes[0].steps[1].loads[0].force_n = Vec3(0, 0, -newton);
+  return quick_fit(recording, coarse_block(truth.material), clouds_of(truth, recording));
+}
+
+TEST(InvertedElements, AreSaidOfALoadThatTurnsThemInsideOut) {
+  const Identification answer = corotational_under(1);
+  EXPECT_TRUE(says(answer, "inverted_elements"));
+  EXPECT_NE(message(answer, "inverted_elements").find("neo_hookean"), std::string::npos);
+  EXPECT_FALSE(says(corotational_under(0.05), "inverted_elements"));
+}
+
 // ---- Two equilibria
 
 const Vec3 column_m(0.02, 0.03, 0.3);
