@@ -202,6 +202,7 @@ void PushRun::watch_out() {
   // Below the first step, the arm's own repeat error moves the force of a soft object by more than slip would.
   sensing::SlipOptions slip = options_.slip;
   slip.least_force_n = std::max(slip.least_force_n, step_n());
+  slip.noise_n = std::max(slip.noise_n, worst_axis_std_n_);
   const sensing::PushEvent event = sensing::watch(history_, plan_.direction, lost_n(), slip);
   if (event == sensing::PushEvent::none) return;
   throw Stopped{event == sensing::PushEvent::contact_lost ? StopReason::contact_lost : StopReason::slip,

@@ -36,6 +36,7 @@ void check(const SlipOptions& o) {
   need(o.friction_limit > 0, "SlipOptions.friction_limit", "must be positive");
   need(o.force_drop > 0 && o.force_drop <= 1, "SlipOptions.force_drop", "must be in (0, 1]");
   need(o.least_force_n >= 0, "SlipOptions.least_force_n", "must not be negative");
+  need(o.noise_n >= 0, "SlipOptions.noise_n", "must not be negative");
 }
 
 std::optional<std::size_t> find_contact(std::span<const ContactSample> samples, const Vec3& direction, double free_air_std_n,
@@ -108,7 +109,9 @@ PushEvent watch(std::span<const ContactSample> push, const Vec3& direction, doub
     }
   }
   const bool deeper = along.dot(way) > depth_there + options.deeper_m - 1e-9;
-  if (highest > options.least_force_n && deeper && normal < (1 - options.force_drop) * highest) return PushEvent::force_drop;
+  // The highest of many readings is high by chance, too, and the one that looks like a loss is low.
+  const double loss_n = std::max(options.force_drop * highest, 6 * options.noise_n);
+  if (highest > options.least_force_n && deeper && normal < highest - loss_n) return PushEvent::force_drop;
   return PushEvent::none;
 }
 

@@ -54,6 +54,7 @@ struct SlipOptions {
   double force_drop = 0.2;      ///< share of the force lost while the tool moved on ...
   double deeper_m = 0.001;      ///< ... by this much: an arm that repeats to a millimetre moves a force up and down as well
   double least_force_n = 0.5;   ///< below it, ratios say nothing
+  double noise_n = 0;           ///< standard deviation of a reading: a loss within six of them is none
 };
 void check(const SlipOptions& options);
 

@@ -87,6 +87,12 @@ TEST(Watch, NamesWhatHappens) {
   EXPECT_EQ(with(sample(11, 7, 0.0105)), PushEvent::none) << "an arm that repeats to a millimetre";
   EXPECT_EQ(with(sample(11, 7, 0.006)), PushEvent::none) << "going back, the force may fall";
   EXPECT_EQ(with(sample(11, 0.05, 0.011)), PushEvent::contact_lost);
+  SlipOptions noisy;
+  noisy.noise_n = 0.4;
+  push.push_back(sample(11, 7, 0.011));
+  EXPECT_EQ(watch(push, down, 0.1, noisy), PushEvent::force_drop) << "3 N are beyond six times 0.4";
+  noisy.noise_n = 0.6;
+  EXPECT_EQ(watch(push, down, 0.1, noisy), PushEvent::none);
   EXPECT_EQ(watch({}, down, 0.1), PushEvent::none);
   EXPECT_STRNE(to_words(PushEvent::force_drop), to_words(PushEvent::none));
 }
@@ -109,6 +115,7 @@ TEST(PushEventOptions, BadOnesAreRefused) {
   EXPECT_TRUE(refused(L{}, [](L& o) { o.friction_limit = 0; }));
   EXPECT_TRUE(refused(L{}, [](L& o) { o.force_drop = 1.5; }));
   EXPECT_TRUE(refused(L{}, [](L& o) { o.least_force_n = -1; }));
+  EXPECT_TRUE(refused(L{}, [](L& o) { o.noise_n = -1; }));
 }
 
 }  // namespace
