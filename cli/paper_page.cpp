@@ -106,7 +106,7 @@ std::string grid_search(const TrialAnswer& trial) {
                      points, 1e6 * surface.smallest_m2(), pascal(surface.young_modulus_pa(row)), surface.poisson_ratio(column),
                      1e6 * surface.at_found_m2,
                      surface.at_found_m2 <= surface.smallest_m2() * 1.001
-                         ? "and no point of the grid is lower by a thousandth: it reached the minimum of its own objective"
+                         ? "and no point of the grid is lower by a thousandth: it is as low as its own objective gets"
                          : "so it did not reach the minimum of its own objective",
                      flat, surface.error_m2.size(), flat > 5 ? ": it says little of where the minimum is" : "",
                      convexity(surface)) +
@@ -139,7 +139,7 @@ std::string section(const SceneAnswers& answers) {
   html += figure(registration_figure(first),
                  as("3", "6", "7", "10") + "What the camera saw of the hardest push that is used, registered with the surface that each E gives, where these differ most (grey: the surface); the last is " +
                      (scene.apparent ? "the one that palpate found." : "the true one."));
-  if (!first.views.empty()) html += "<p class=\"small\">" + as("1", "2") + "What the camera saw, and what was made of it.</p>\n";
+  if (!first.views.empty()) html += "<p class=\"small\">" + as("1", "10") + "What the camera saw, and what was made of it.</p>\n";
   html += view_figures(first.views);
   html += figure(force_figure(first), as("5 (a)") + "Measured force over travel.");
   html += figure(samples_figure(first),
@@ -189,8 +189,8 @@ std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vecto
       "Manipulation Robot</i>, IROS 2010. Its experiments, made again by palpate {} on objects of the software lab, whose E is "
       "known (but for the balloon's). The paper's method is its algorithm 1: iterative closest points, squared distance to the nearest "
       "vertex, gradient descent with numerical derivatives. It gets palpate's mesh, solver, points, starts (where the first has no equilibrium: a "
-      "quarter and four times of its E) and threads ({}); in scenes of small strains a second row gives it linear tetrahedra, as the paper had. "
-      "Both are fitted to all samples jointly, where the paper averaged fits of one sample each (tables of samples alone do that). Palpate also gets what the "
+      "quarter and four times of its E) and threads ({}); of the seed with pictures a second row gives it linear tetrahedra, as the paper had (where strains are small and the object has one E). "
+      "Both are fitted to all samples jointly, where the paper averaged fits of one sample each (tables of samples alone do that); the bear by its method site by site, as there. Palpate also gets what the "
       "paper's method has no use for: the tool's travel, the unloaded frame, and what is known of the sensors' noise (of depths, forces, "
       "encoders and the camera's pose). Both see at most 2000 pixels of an image, cut to what lies within 25 mm of the "
       "object at rest (where a push goes deeper: its depth). Where a scene does not say otherwise, the truth is linear elastic with small strains.</p>\n<p><code>{}</code></p>\n",
