@@ -19,9 +19,17 @@ struct Depth {
   int samples = 0;  ///< at most
 };
 
+double young_at(const LabObject& object, const PushSite& site) {
+  for (const TrueRegion& one : object.regions)
+    if (one.region.name == site.name) return one.young_modulus_pa;
+  return object.young_modulus_pa;
+}
+
 Depth depth_of(const PaperScene& scene, const LabObject& object, const PushSite& site) {
-  if (scene.travel_m == 0)  // a step of the object is a quarter of the way to its limit
-    return {object.travel_limit_m, object.force_step_at(site) * 4 / scene.samples, scene.samples + 1};
+  if (scene.travel_m == 0) {  // a step of the object is a quarter of the way to its limit, were it of one stuff
+    const double share = young_at(object, site) / object.young_modulus_pa;
+    return {object.travel_limit_m, share * object.force_step_at(site) * 4 / scene.samples, scene.samples + 1};
+  }
   // Deep in a block, the curve of a soft pad is nearly straight, at about half the slope of its start on a half space.
   const double start_n_m = 2 * object.pad_radius_m * object.young_modulus_pa / (1 - object.poisson_ratio * object.poisson_ratio);
   return {scene.travel_m, 0.5 * start_n_m * scene.travel_m / scene.samples, scene.samples};
@@ -83,12 +91,6 @@ void slip(Push& push, const Push& aside, std::size_t first, double deeper_m) {
         if (auto* travel = std::get_if<ToolTravel>(&observation)) travel->travel_m += deeper_m;
     push.steps.push_back(std::move(step));
   }
-}
-
-double young_at(const LabObject& object, const PushSite& site) {
-  for (const TrueRegion& one : object.regions)
-    if (one.region.name == site.name) return one.young_modulus_pa;
-  return object.young_modulus_pa;
 }
 
 ObjectOptions truth_of(const PaperScene& scene, std::uint64_t seed) {

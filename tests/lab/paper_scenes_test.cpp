@@ -43,12 +43,15 @@ TEST(PaperScenes, CanAllBeBegun) {
 }
 
 // The paper's seven forces: with a sensor of 0.08 N of noise no push of 1.5 N may end for a reading that looks like a slip.
-TEST(PaperScenes, TheBalloonIsPressedSevenTimes) {
-  for (const std::uint64_t seed : {1, 3, 101}) {
-    const PaperTrial trial = make_paper_trial(paper_scene("balloon"), seed);
-    const auto& steps = trial.recording.pushes.at(0).steps;
-    EXPECT_GE(std::count_if(steps.begin(), steps.end(), [](const Step& step) { return !step.loads.empty(); }), 7) << seed;
-  }
+TEST(PaperScenes, BalloonAndBearArePressedSevenTimes) {
+  const auto samples = [](const Push& push) {
+    return std::count_if(push.steps.begin(), push.steps.end(), [](const Step& step) { return !step.loads.empty(); });
+  };
+  for (const std::uint64_t seed : {1, 3, 101}) EXPECT_GE(samples(make_paper_trial(paper_scene("balloon"), seed).recording.pushes.at(0)), 7) << seed;
+  // Its sites differ in stiffness, and are pressed as deep in as many steps.
+  const PaperTrial bear = make_paper_trial(paper_scene("teddy"), 1);
+  ASSERT_EQ(bear.recording.pushes.size(), 3u);
+  for (const Push& push : bear.recording.pushes) EXPECT_NEAR(samples(push), 8, 1) << push.name;
 }
 
 // A slip after the first of nine samples: before it the two recordings are one; after it the tip presses elsewhere, the encoders
