@@ -75,6 +75,7 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
     lab::PaperScene scene = lab::paper_scene(name);
     scene.region_ratio = 1;
     scene.sites = 1;
+    scene.samples = 7;
     scene.view_azimuth_rad = -2;  // from where the camera watches the push
     scene.view_elevation_rad = 0.6;
     using lab::PaperShape;
