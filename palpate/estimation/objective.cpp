@@ -151,10 +151,10 @@ Loss Objective::with_chosen_rays(Loss loss) const {
   return loss;
 }
 
-double Objective::cost_of(const std::vector<StepPrediction>& predictions, const VectorX& unknowns, const Loss& loss) const {
+double Objective::cost_of(const std::vector<StepPrediction>& predictions, const std::vector<std::size_t>& steps, const VectorX& unknowns,
+                          const Loss& loss) const {
   double cost = 0;
-  for (std::size_t s = 0; s < predictions.size(); ++s) {
-    if (predictions[s].surface_m.rows() == 0) continue;
+  for (std::size_t s : steps) {
     for (const TermRows& rows : rows_of(s, predictions[s], unknowns, loss)) {
       for (Index i = 0; i < rows.residual.size(); ++i) {
         cost += rows.robust ? tukey_rho(rows.residual(i), loss.tukey) : 0.5 * rows.residual(i) * rows.residual(i);

@@ -40,8 +40,9 @@ class Objective {
 
   Evaluation evaluate(const VectorX& unknowns, const Loss& loss, const OnProgress& progress = {});
 
-  /// Cost of a prediction that was made elsewhere (start search): no derivative, no prior.
-  double cost_of(const std::vector<StepPrediction>& predictions, const VectorX& unknowns, const Loss& loss) const;
+  /// Cost of predictions of some steps that were made elsewhere (start search): no derivative, no prior.
+  double cost_of(const std::vector<StepPrediction>& predictions, const std::vector<std::size_t>& steps, const VectorX& unknowns,
+                 const Loss& loss) const;
 
   /// Normal equations of rows that were made before, at the unknowns that they were made at. No step is solved.
   Evaluation assemble(const std::vector<std::vector<TermRows>>& rows, const VectorX& unknowns, const Loss& loss) const;

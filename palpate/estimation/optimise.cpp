@@ -293,6 +293,28 @@ std::vector<std::size_t> steps_to_start_with(const Objective& objective, const F
   return some;
 }
 
+std::vector<std::size_t> usable_steps(const std::vector<StepPrediction>& predicted) {
+  std::vector<std::size_t> steps;
+  for (std::size_t s = 0; s < predicted.size(); ++s)
+    if (predicted[s].surface_m.rows() > 0) steps.push_back(s);
+  return steps;
+}
+
+/// A handful of `steps`, where E moves the surface most or, where motions are imposed, the force; in their order.
+std::vector<std::size_t> moved_most(const std::vector<StepPrediction>& predicted, std::vector<std::size_t> steps) {
+  constexpr std::size_t most = 6;
+  if (steps.size() <= most) return steps;
+  std::vector<std::pair<double, double>> effect(predicted.size());
+  for (std::size_t s : steps) {
+    effect[s].first = predicted[s].d_surface.col(0).cwiseAbs().maxCoeff();
+    for (const auto& force : predicted[s].d_force) effect[s].second = std::max(effect[s].second, force.col(0).norm());
+  }
+  std::stable_sort(steps.begin(), steps.end(), [&](std::size_t a, std::size_t b) { return effect[a] > effect[b]; });
+  steps.resize(most);
+  std::sort(steps.begin(), steps.end());
+  return steps;
+}
+
 }  // namespace
 
 VectorX find_start(Objective& objective, double poisson_start) {
@@ -319,12 +341,11 @@ VectorX find_start(Objective& objective, double poisson_start) {
   double best_cost = std::numeric_limits<double>::infinity();
   double best_decade = 5;
   std::vector<StepPrediction> scaled = stiff;  // once: derivatives are large, and stay what they are
-  const auto try_at = [&](double decade) {
+  const auto try_at = [&](double decade, const std::vector<std::size_t>& steps) {
     const double ratio = std::exp(guess(log_young) - decade * std::log(10.0));
     bool sensible = true;
-    for (std::size_t s = 0; s < scaled.size(); ++s) {
+    for (std::size_t s : steps) {
       StepPrediction& prediction = scaled[s];
-      if (prediction.surface_m.rows() == 0) continue;
       prediction.surface_m = stiff[s].surface_m;
       prediction.material_m = stiff[s].material_m;
       prediction.force_n = stiff[s].force_n;
@@ -346,18 +367,24 @@ VectorX find_start(Objective& objective, double poisson_start) {
       }
     }
     if (!sensible) return;
-    const double cost = objective.cost_of(scaled, guess, wide);
+    const double cost = objective.cost_of(scaled, steps, guess, wide);
     if (cost < best_cost) {
       best_cost = cost;
       best_decade = decade;
     }
   };
-  // Half decades first: at the worst of them the displacement is 0.8 of itself off, still less than no displacement is.
-  for (double decade = 1.5; decade <= 11.5; decade += 0.5) try_at(decade);
+  // Half decades first: at the worst of them the displacement is 0.8 of itself off, still less than no displacement is. The steps that
+  // move most tell them apart; beside the best one the others have a say, too, up to where the next one would have led.
+  const std::vector<std::size_t> known = usable_steps(stiff), few = moved_most(stiff, known);
+  for (double decade = 1.5; decade <= 11.5; decade += 0.5) try_at(decade, few);
   const double rough = best_decade;
-  for (double off : {-0.375, -0.25, -0.125, 0.125, 0.25, 0.375}) try_at(rough + off);
+  if (few.size() < known.size()) {
+    best_cost = std::numeric_limits<double>::infinity();
+    try_at(rough, known);
+  }
+  for (double off : {-0.375, -0.25, -0.125, 0.125, 0.25, 0.375}) try_at(rough + off, known);
   const double fine = best_decade;
-  for (double off : {-0.0625, 0.0625}) try_at(fine + off);
+  for (double off : {-0.0625, 0.0625}) try_at(fine + off, known);
   guess(log_young) = best_decade * std::log(10.0);
   if (!is_linear(model)) guess(log_young) += bends_more;
   return guess;
