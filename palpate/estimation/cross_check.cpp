@@ -2,9 +2,12 @@
 #include "palpate/estimation/cross_check.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 
 #include "palpate/estimation/held_out.hpp"
+#include "palpate/estimation/load_drift.hpp"
 
 namespace palpate::estimation {
 namespace {
@@ -133,6 +136,32 @@ class CrossCheck {
     out.low_loads = fits_.young_of(low, "low loads");
     if (!fits_.cancelled()) out.high_loads = fits_.young_of(high, "high loads");
     if (!fits_.cancelled()) out.chance_of_loads = fits_.chance_of_one_young({out.low_loads, out.high_loads}, poisson_std_);
+    if (!fits_.cancelled() && drifts_with_load(out)) ask_quarters(low, high, out);
+  }
+
+  /// How E drifts.
+  /// @param low, high  what was compared: pushes without levels are in neither
+  void ask_quarters(const StepFlags& low, const StepFlags& high, CrossChecks& out) {
+    std::array<StepFlags, 4> quarters;
+    std::array<bool, 4> any{};
+    quarters.fill(StepFlags(model_.step_count(), 0));
+    for (std::size_t s = 0; s < model_.step_count(); ++s) {
+      if (low[s] == 0 && high[s] == 0) continue;
+      const double load = load_of(model_.step(s));
+      double largest = 0;
+      for (std::size_t other = 0; other < model_.step_count(); ++other)
+        if (model_.index(other).push == model_.index(s).push) largest = std::max(largest, load_of(model_.step(other)));
+      const std::size_t its = load > 0 ? static_cast<std::size_t>(std::ceil(4 * load / largest)) - 1 : 0;
+      for (std::size_t q = 0; q < 4; ++q) quarters[q][s] = load == 0 || q == its;
+      any[its] = any[its] || load > 0;
+    }
+    if (std::count(any.begin(), any.end(), true) < 3) return;
+    constexpr std::array<const char*, 4> names{"loads up to 25 %", "25 to 50 %", "50 to 75 %", "75 to 100 %"};
+    for (std::size_t q = 0; q < 4 && !fits_.cancelled(); ++q) {
+      if (!any[q]) continue;
+      const PartialYoung quarter = fits_.young_of(quarters[q], names[q]);
+      if (quarter.usable) out.quarters.push_back(quarter);
+    }
   }
 
   /// The same places under the same loads, on the way in and on the way back: a push without a way back, or loads that the way back

@@ -15,6 +15,8 @@ struct CrossChecks {
   std::vector<PartialYoung> pushes;             ///< empty where there is one push only
   std::vector<PartialYoung> sites;              ///< pushes at one place together; empty where there is one place only
   PartialYoung low_loads, high_loads;           ///< usable where pushes have levels
+  /// Quarters of every push's highest load, the lightest first; empty where low and high loads agree, or loads are in fewer than three.
+  std::vector<PartialYoung> quarters;
   PartialYoung loading, unloading;              ///< usable where steps were recorded on the way back
   /// That parts which have one E differ by at least as much; 1 where there is nothing to compare.
   double chance_of_pushes = 1, chance_of_loads = 1, chance_of_ways = 1;

@@ -212,6 +212,15 @@ std::string better_law(const Identification& answer) {
          number(best->poisson_ratio, "{:.2g}") + ": estimate with `--material " + best->law + "`";
 }
 
+std::string tangents(const VerdictInput& in) {
+  std::string list;
+  for (const TangentModulus& one : tangent_moduli(in.checks, in.objective.model(), in.answer.steps)) {
+    list += (list.empty() ? " Tangent modulus by strain (travel over the object's extent along the push): " : ", ") + quantity(one.young_pa, "Pa") +
+            " to " + number(100 * one.to_strain, "{:.2g}") + " %";
+  }
+  return list.empty() ? list : list + ".";
+}
+
 void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
   const bool regions = in.objective.unknowns().ratio_count() > 0, pushes_differ = in.checks.chance_of_pushes < rare;
   if (regions && pushes_differ) {
@@ -247,7 +256,7 @@ void judge_parts(const VerdictInput& in, std::vector<Verdict>& out) {
                    "E drifts with the load: the higher half of the loads gives " + ratio(in.checks.high_loads, in.checks.low_loads) +
                        " times the E of the lower half, so the material " + (softens ? "softens" : "stiffens") +
                        " beyond what the law `" + in.answer.material +
-                       "` describes. For small strains believe the lower loads; " + better_law(in.answer) + "."});
+                       "` describes." + tangents(in) + " For small strains believe the lower loads; " + better_law(in.answer) + "."});
   }
   if (in.checks.loading.usable && in.checks.unloading.usable && in.checks.chance_of_ways < rare) {
     out.push_back({"hysteresis", "Unloading gives " + ratio(in.checks.unloading, in.checks.loading) +

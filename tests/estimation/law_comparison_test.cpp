@@ -8,6 +8,7 @@
 
 #include <map>
 
+#include "palpate/core/quantity.hpp"
 #include "pressed_bar.hpp"
 #include "pushed_block.hpp"
 
@@ -77,7 +78,7 @@ TEST(LawComparison, ALawThatHoldsIsLeftInPeace) {
 
 TEST(LawComparison, YoungsModulusIsToldAgainstStrain) {
   const Identification answer = fit_bar("neo_hookean", "linear", false);
-  ASSERT_EQ(answer.per_load.size(), 2u);
+  ASSERT_EQ(answer.per_load.size(), 6u);
   EXPECT_EQ(answer.per_load[0].young.region, "low loads");
   EXPECT_EQ(answer.per_load[1].young.region, "high loads");
   // 3 and 6 mm of 50 are the lower half of 15 mm.
@@ -94,6 +95,23 @@ TEST(LawComparison, YoungsModulusIsToldAgainstStrain) {
   };
   EXPECT_NEAR(answer.per_load[0].young.value, secant({0.003, 0.006}), 0.01 * true_young_pa);
   EXPECT_NEAR(answer.per_load[1].young.value, secant({0.009, 0.012, 0.015}), 0.01 * true_young_pa);
+  // Quarters of the highest force: 3 mm; 6 mm; 9 mm; 12 and 15 mm.
+  EXPECT_EQ(answer.per_load[2].young.region, "loads up to 25 %");
+  EXPECT_EQ(answer.per_load[5].young.region, "75 to 100 %");
+  EXPECT_NEAR(answer.per_load[3].strain, 0.12, 1e-9);
+  EXPECT_NEAR(answer.per_load[3].young.value, secant({0.006}), 0.01 * true_young_pa);
+  EXPECT_NEAR(answer.per_load[5].young.value, secant({0.012, 0.015}), 0.01 * true_young_pa);
+}
+
+TEST(LawComparison, TheTangentModulusIsTheSlopeOfTheClosedForm) {
+  const Identification answer = fit_bar("neo_hookean", "linear", false);
+  // Of the nominal stress, per unit of linear theory's at 50 mm and E = 1.
+  const auto stress = [](double travel_m) { return neo_hookean_force_n(1, true_poisson, travel_m) / linear_force_n(1, true_poisson, 0.05); };
+  std::string said;
+  for (const Verdict& verdict : answer.verdicts)
+    if (verdict.code == "not_linear") said = verdict.message;
+  const double slope = (stress(0.006) - stress(0.003)) / 0.06;
+  EXPECT_NE(said.find(quantity(true_young_pa * slope, "Pa") + " to 12 %"), std::string::npos) << said;
 }
 
 /// Noisy clouds of a Neo-Hookean block that bends far, solved on a mesh twice as fine.

@@ -164,7 +164,7 @@ export function perSite(report: Report, width: number): SVGElement | null {
 
 export function perLoad(report: Report, width: number): SVGElement | null {
   const loads = report.per_load.filter((p) => known(p.lower_95) && known(p.upper_95));
-  return youngOfParts(report, width, [[loads, category(4)]], "Young's modulus of low and of high loads");
+  return youngOfParts(report, width, [[loads, category(4)]], "Young's modulus of some of the loads alone");
 }
 
 export function nuisances(report: Report, width: number): SVGElement | null {
