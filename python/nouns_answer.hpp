@@ -127,7 +127,7 @@ template <>
 struct Noun<YoungAtLoad> {
   static constexpr const char *name = "YoungAtLoad", *about = "E of some of the loads alone.";
   static void fields(auto&& field) {
-    field("young", &YoungAtLoad::young, "region: 'low loads' or 'high loads'");
+    field("young", &YoungAtLoad::young, "region: 'low loads', 'high loads', 'quarter 1' (up to 25 % of the highest load) and so on");
     field("force_n", &YoungAtLoad::force_n, "");
     field("travel_m", &YoungAtLoad::travel_m, "");
     field("strain", &YoungAtLoad::strain, "travel over the object's extent along the push");

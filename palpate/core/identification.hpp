@@ -79,7 +79,7 @@ struct RegionShare {
 
 /// E of some of the loads alone, and how far they deform the object: the farthest of them.
 struct YoungAtLoad {
-  Parameter young;  ///< region = "low loads" or "high loads"
+  Parameter young;  ///< region = "low loads", "high loads", or "quarter 1" (up to 25 % of a push's highest load) and so on
   double force_n = HeldOut::unknown, travel_m = HeldOut::unknown;
   double strain = HeldOut::unknown;       ///< travel over the object's extent along the push
   double indentation = HeldOut::unknown;  ///< travel over the radius of the touched patch; NaN = not a round one
@@ -158,7 +158,7 @@ struct Identification {
   std::vector<BudgetEntry> budget_if;
   std::vector<Parameter> per_push;  ///< young_modulus of each push alone (region = push name)
   std::vector<Parameter> per_site;  ///< of all pushes at one place (region = its name); empty = one site
-  std::vector<YoungAtLoad> per_load;  ///< low loads, high loads; empty = pushes have one level only
+  std::vector<YoungAtLoad> per_load;  ///< low loads, high loads; quarters where these differ; empty = pushes have one level only
   std::vector<LawFit> laws;           ///< empty = not compared
   Termination termination = Termination::failed;
   std::string message = "identify() was not called.";

@@ -156,7 +156,7 @@ class CrossCheck {
       any[its] = any[its] || load > 0;
     }
     if (std::count(any.begin(), any.end(), true) < 3) return;
-    constexpr std::array<const char*, 4> names{"loads up to 25 %", "25 to 50 %", "50 to 75 %", "75 to 100 %"};
+    constexpr std::array<const char*, 4> names{"quarter 1", "quarter 2", "quarter 3", "quarter 4"};
     for (std::size_t q = 0; q < 4 && !fits_.cancelled(); ++q) {
       if (!any[q]) continue;
       const PartialYoung quarter = fits_.young_of(quarters[q], names[q]);

@@ -96,8 +96,8 @@ TEST(LawComparison, YoungsModulusIsToldAgainstStrain) {
   EXPECT_NEAR(answer.per_load[0].young.value, secant({0.003, 0.006}), 0.01 * true_young_pa);
   EXPECT_NEAR(answer.per_load[1].young.value, secant({0.009, 0.012, 0.015}), 0.01 * true_young_pa);
   // Quarters of the highest force: 3 mm; 6 mm; 9 mm; 12 and 15 mm.
-  EXPECT_EQ(answer.per_load[2].young.region, "loads up to 25 %");
-  EXPECT_EQ(answer.per_load[5].young.region, "75 to 100 %");
+  EXPECT_EQ(answer.per_load[2].young.region, "quarter 1");
+  EXPECT_EQ(answer.per_load[5].young.region, "quarter 4");
   EXPECT_NEAR(answer.per_load[3].strain, 0.12, 1e-9);
   EXPECT_NEAR(answer.per_load[3].young.value, secant({0.006}), 0.01 * true_young_pa);
   EXPECT_NEAR(answer.per_load[5].young.value, secant({0.012, 0.015}), 0.01 * true_young_pa);

@@ -131,7 +131,7 @@ class Page {
       steps,
       Panel.make("Each push on its own", "Young's modulus with 95 % interval from each push (or region) alone; shaded: all together. Intervals that do not overlap speak for an object that is not homogeneous.", (w) => perPush(report, w)),
       Panel.make("Each site on its own", "The same for all pushes at one place together.", (w) => perSite(report, w)),
-      Panel.make("Low and high loads", "The same for the lower and the higher half of the loads. Where they disagree, the material does not obey the law.", (w) => perLoad(report, w)),
+      Panel.make("Low and high loads", "The same for the lower and the higher half of the loads. Where they disagree, the material does not obey the law, and each quarter of the loads is shown as well: of a linear law these are secants.", (w) => perLoad(report, w)),
       Panel.make("Other laws", `Each law fitted to the same data on one mesh, and once without the highest loads, which it then predicts: the shortest bar is the law that these surprise least.${report.laws.filter((l) => !l.usable).map((l) => ` ${l.law}: ${l.message}.`).join("")}`, (w) => laws(report, w)),
       Panel.make("Error budget", "How far one standard deviation of each input moves the answer. The longest bar is what to calibrate next.", (w) => budget(report, w)),
       Panel.make("Stated as exact", "In no interval, since the recording says that these inputs are exactly known: what each would do to the answer were it off by a typical size.", (w) => budgetIf(report, w)),
