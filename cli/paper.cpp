@@ -72,8 +72,11 @@ int remake(Session& session, const PaperArguments& arguments) {
   plan.seeds = arguments.seeds > 0 ? arguments.seeds : arguments.quick ? 1 : 100;
   plan.details_of = arguments.details_of;
   plan.quick = arguments.quick;
-  plan.threads = session.thread_count();
   choose(arguments, session.seed, plan);
+  // A thread a scene does more than all of them on one.
+  const int tasks = static_cast<int>(plan.scenes.size() + plan.studies.size()), threads = session.thread_count();
+  plan.side_by_side = std::clamp(tasks, 1, threads);
+  plan.threads = threads / plan.side_by_side;
   TriMesh surface;
   lab::PaperScene own;
   if (!arguments.object.empty()) {
@@ -88,13 +91,20 @@ int remake(Session& session, const PaperArguments& arguments) {
     *cow = &own;
   }
   must_take_files(arguments.output);
+  // Stages of several scenes at once would read like one that jumps.
+  const bool alone = plan.side_by_side == 1;
+  if (!alone) session.say(fmt::format("{} experiments, {} at a time; a line when one is done", tasks, plan.side_by_side));
+  const auto progress = [&]() -> OnProgress {
+    if (alone) return session.progress();
+    return [](std::string_view, double) { return !Session::interrupted(); };
+  };
   PaperWork work;
   work.trial = [&](const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared, TrialAnswer& out) {
-    run_trial(scene, seed, options, shared, session.progress(), out);
+    run_trial(scene, seed, options, shared, progress(), out);
   };
   work.study = [&](const Study& study, const StudyOptions& options, StudyAnswer& out) {
     const Watch watch;
-    out.rows = study.run(options, session.progress());
+    out.rows = study.run(options, progress());
     out.seconds = watch.seconds();
   };
   work.stopped = [] { return Session::interrupted(); };

@@ -3,7 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
 #include <optional>
+#include <thread>
 
 #include "cli/paper_truths.hpp"
 #include "palpate/core/error.hpp"
@@ -22,6 +27,27 @@ std::string line_of(const lab::PaperScene& scene, const TrialAnswer& trial) {
                             report::quantity(trial.palpate.young_modulus_pa, "Pa"),
                             report::interval(trial.palpate.lower_95_pa, trial.palpate.upper_95_pa, "Pa"), trial.palpate.poisson_ratio,
                             trial.palpate.load_cases, trial.total_s);
+}
+
+/// As many at the same time as asked for, taken in order. The first error ends the rest as soon as what runs is done.
+void run_side_by_side(const std::vector<std::function<void()>>& tasks, int workers) {
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failed;
+  std::mutex mutex;
+  const auto work = [&] {
+    try {
+      for (std::size_t task = next++; task < tasks.size(); task = next++) tasks[task]();
+    } catch (...) {
+      const std::scoped_lock lock(mutex);
+      if (!failed) failed = std::current_exception();
+      next = tasks.size();
+    }
+  };
+  std::vector<std::jthread> others;
+  for (int k = 1; k < std::min(workers, static_cast<int>(tasks.size())); ++k) others.emplace_back(work);
+  work();
+  others.clear();  // waits for them
+  if (failed) std::rethrow_exception(failed);
 }
 
 }  // namespace
@@ -58,50 +84,56 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
   for (const Study* study : plan.studies)
     for (int k = 0; k < plan.study_seeds; ++k) there += folder.has(asked_of_study(*study, k));
   if (there > 0) work.say(fmt::format("{} seeds are there already: going on", there));
-  const auto add = [&](const nlohmann::json& seed) {
+  std::mutex mutex;  // of `runs`, the page and what is said
+  const auto add = [&](const nlohmann::json& seed, const std::string& line) {
+    const std::scoped_lock lock(mutex);
+    work.say(line);
     add_seed(runs, seed, "the seed that was just run");
     write_page(runs, out);
   };
-  for (const lab::PaperScene* scene : plan.scenes) {
+  const auto run_scene = [&](const lab::PaperScene& scene) {
     // What serves one seed alone is not worth solving for over all of nu's range.
     std::optional<SharedModels> shared;
     const auto share_anew = [&] {
       shared.emplace();
-      if (scene->true_law != "linear") shared->truths = lab::PressedMemory(truths_in(out / "truths"));  // others take seconds
+      if (scene.true_law != "linear") shared->truths = lab::PressedMemory(truths_in(out / "truths"));  // others take seconds
     };
     if (plan.seeds > 1) share_anew();
     for (int k = 0; k < plan.seeds && !work.stopped(); ++k) {
-      const SeedAsked asked = asked_of(*scene, k);
+      const SeedAsked asked = asked_of(scene, k);
       if (folder.has(asked)) continue;
       TrialAnswer trial;
       try {
-        work.trial(*scene, asked.seed, asked.options, shared ? &*shared : nullptr, trial);
+        work.trial(scene, asked.seed, asked.options, shared ? &*shared : nullptr, trial);
       } catch (const std::exception& error) {
         trial.failed = error.what();
         if (shared) share_anew();  // it may be half made
       }
       if (work.stopped()) break;
       trial.seed = asked.seed;
-      work.say(line_of(*scene, trial));
-      add(folder.keep(asked, trial));
+      add(folder.keep(asked, trial), line_of(scene, trial));
     }
-  }
-  for (const Study* study : plan.studies) {
+  };
+  const auto run_study = [&](const Study& study) {
     for (int k = 0; k < plan.study_seeds && !work.stopped(); ++k) {
-      const SeedAsked asked = asked_of_study(*study, k);
+      const SeedAsked asked = asked_of_study(study, k);
       if (folder.has(asked)) continue;
-      StudyAnswer answer{study, asked.seed, {}, {}, 0};
+      StudyAnswer answer{&study, asked.seed, {}, {}, 0};
       try {
-        work.study(*study, {asked.seed, plan.threads, asked.options.pictures}, answer);
+        work.study(study, {asked.seed, plan.threads, asked.options.pictures}, answer);
       } catch (const std::exception& error) {
         answer.failed = error.what();
       }
       if (work.stopped()) break;
-      work.say(fmt::format("{} seed {}: {}; {:.0f} s", study->name, answer.seed,
-                           answer.failed.empty() ? fmt::format("{} rows", answer.rows.size()) : "failed: " + answer.failed, answer.seconds));
-      add(folder.keep(asked, answer, plan.threads));
+      add(folder.keep(asked, answer, plan.threads),
+          fmt::format("{} seed {}: {}; {:.0f} s", study.name, answer.seed,
+                      answer.failed.empty() ? fmt::format("{} rows", answer.rows.size()) : "failed: " + answer.failed, answer.seconds));
     }
-  }
+  };
+  std::vector<std::function<void()>> tasks;
+  for (const lab::PaperScene* scene : plan.scenes) tasks.emplace_back([&run_scene, scene] { run_scene(*scene); });
+  for (const Study* study : plan.studies) tasks.emplace_back([&run_study, study] { run_study(*study); });
+  run_side_by_side(tasks, plan.side_by_side);
   return runs;
 }
 

@@ -15,11 +15,12 @@ struct PaperPlan {
   int seeds = 1, study_seeds = 1;                ///< a scene, and a study
   std::uint64_t details_of = 1;  ///< the seed of each scene that also gets pictures, samples alone, grid search and cross-checks
   bool quick = false;
-  int threads = 1;
+  int side_by_side = 1;  ///< scenes and studies that are run at the same time
+  int threads = 1;       ///< of each of them
   PlacedObject object;
 };
 
-/// The work itself; tests put other work in its place.
+/// The work itself, called from as many threads as run side by side; tests put other work in its place.
 struct PaperWork {
   std::function<void(const lab::PaperScene&, std::uint64_t seed, const TrialOptions&, SharedModels*, TrialAnswer&)> trial;
   std::function<void(const Study&, const StudyOptions&, StudyAnswer&)> study;

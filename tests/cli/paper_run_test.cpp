@@ -7,11 +7,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <barrier>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <mutex>
+#include <set>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
+
+#include "palpate/core/error.hpp"
 
 #include "refusals.hpp"
 #include "temporary_folder.hpp"
@@ -69,6 +75,8 @@ void make_up(std::uint64_t seed, const TrialOptions& options, TrialAnswer& out) 
   out.surface.at_found_m2 = 1e-6;
 }
 
+std::vector<StudyRow> one_row() { return {{"row", 1e4, 0.3, answer(1.1e4, 0.2), answer(1e4, 0.3)}}; }
+
 struct MadeUp {
   PaperPlan plan;
   PaperWork work;
@@ -85,7 +93,7 @@ struct MadeUp {
     };
     work.study = [this](const Study&, const StudyOptions&, StudyAnswer& out) {
       ++made;
-      out.rows = {{"row", 1e4, 0.3, answer(1.1e4, 0.2), answer(1e4, 0.3)}};
+      out.rows = one_row();
     };
     work.stopped = [this] { return made >= stops_after; };
     work.say = [this](const std::string& line) { said.push_back(line); };
@@ -112,6 +120,49 @@ TEST(PaperRun, WhatWasStoppedGoesOnToTheSamePage) {
   run_plan(nothing.plan, nothing.work, files / "parts");
   EXPECT_EQ(nothing.made, 0);
   EXPECT_EQ(page_of(files / "parts"), page_of(files / "whole"));
+}
+
+TEST(PaperRun, ScenesSideBySideMakeTheSamePage) {
+  const test::TemporaryFolder files("paper_side_by_side");
+  MadeUp whole;
+  run_plan(whole.plan, whole.work, files / "whole");
+  // Cow, cube and study wait for each other: that they meet shows that they run at the same time.
+  MadeUp run;
+  run.plan.side_by_side = 3;
+  std::barrier all(3);
+  std::set<std::thread::id> threads;
+  std::mutex mutex;
+  const auto note = [&] {
+    const std::scoped_lock lock(mutex);
+    ++run.made;
+    threads.insert(std::this_thread::get_id());
+  };
+  run.work.trial = [&](const lab::PaperScene&, std::uint64_t seed, const TrialOptions& options, SharedModels*, TrialAnswer& out) {
+    if (seed == 1) all.arrive_and_wait();
+    note();
+    make_up(seed, options, out);
+  };
+  run.work.study = [&](const Study&, const StudyOptions&, StudyAnswer& out) {
+    all.arrive_and_wait();
+    note();
+    out.rows = one_row();
+  };
+  run.work.stopped = [] { return false; };
+  run_plan(run.plan, run.work, files / "out");
+  EXPECT_EQ(run.made, 9);
+  EXPECT_EQ(threads.size(), 3u);
+  EXPECT_EQ(page_of(files / "out"), page_of(files / "whole"));
+
+  // What cannot be written ends the run with its error, from whatever thread.
+  MadeUp nowhere;
+  nowhere.plan.side_by_side = 3;
+  nowhere.work.stopped = [] { return false; };
+  nowhere.work.trial = [](const lab::PaperScene&, std::uint64_t seed, const TrialOptions& options, SharedModels*, TrialAnswer& out) {
+    make_up(seed, options, out);
+  };
+  nowhere.work.study = [](const Study&, const StudyOptions&, StudyAnswer&) {};
+  nowhere.work.say = [](const std::string&) { throw Error("is full", "the disk"); };
+  EXPECT_THAT(message_of([&] { run_plan(nowhere.plan, nowhere.work, files / "nowhere"); }), HasSubstr("is full"));
 }
 
 TEST(PaperRun, PiecesJoinedAreTheWhole) {
@@ -228,7 +279,7 @@ TEST(PaperRun, AStudyThatIsAskedForSeveralSeedsIsToldOverThem) {
   run.work.study = [&](const Study&, const StudyOptions& options, StudyAnswer& out) {
     ++run.made;
     if (options.seed == 6) throw std::runtime_error("no <such> mesh");
-    out.rows = {{"row", 1e4, 0.3, answer(1.1e4, 0.2), answer(1e4, 0.3)}};
+    out.rows = one_row();
     out.rows[0].palpate.verdicts = {"contact_slipped", "contact_slipped"};
     if (options.pictures) out.rows[0].views = {{"Four <views>", 1, 1, "cGljdHVyZQ" + std::to_string(options.seed)}};
   };
