@@ -57,7 +57,8 @@ TrialOptions options_of(const PaperPlan& plan, const lab::PaperScene& scene, std
   options.threads = plan.threads;
   if (seed != plan.details_of) return options;
   const bool dear = scene.law != "linear";
-  options.samples_alone = true;
+  options.samples_alone = !plan.quick || scene.each_sample;
+  options.other_starts = !plan.quick || scene.error_drawn;
   options.pictures = true;
   options.surface_points = !plan.quick ? 25 : dear ? 5 : 9;
   return options;

@@ -27,6 +27,7 @@ json options_json(const SeedAsked& asked) {
   json out = {{"every_sample", asked.options.samples_alone ? 1 : 0},
               {"surface_points", asked.options.surface_points},
               {"pictures", asked.options.pictures}};
+  if (asked.options.other_starts) out["other_starts"] = true;
   if (asked.name == "cow" && !asked.object.name.empty())
     out["object"] = {{"sha256", asked.object.sha256}, {"up", asked.object.up}, {"size_m", asked.object.size_m}};
   return out;

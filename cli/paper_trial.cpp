@@ -236,7 +236,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
     out.surface = error_surface(given, out.paper, scene.apparent ? out.palpate.young_modulus_pa : out.young_modulus_pa, options.surface_points, fit, progress);
   // Of a shape that is a guess palpate asks a dozen more: minutes a start, and nothing about starts.
   const bool guessed = given.doubt && !given.doubt->shapes.empty();
-  if (out.surface.error_m2.cols() > 1 && !guessed) answer_starts(given, fit, *shared, out, progress);
+  if (options.other_starts && out.surface.error_m2.cols() > 1 && !guessed) answer_starts(given, fit, *shared, out, progress);
   if (out.surface.error_m2.size() == 0) drop_paths(out);
 }
 

@@ -98,12 +98,13 @@ struct TrialAnswer {
   std::vector<PaperView> views;               ///< only where asked for
   std::vector<SampleAnswer> samples;          ///< each sample alone; only where asked for
   ErrorSurface surface;                       ///< only where asked for
-  std::vector<StartAnswer> starts;            ///< only beside a surface of more than one nu, and not of a shape that is a guess
+  std::vector<StartAnswer> starts;            ///< only where asked for
 };
 
 struct TrialOptions {
   bool samples_alone = false;  ///< each of them
   int surface_points = 0;      ///< a side of the error surface; 0 = none
+  bool other_starts = false;   ///< beside a surface of more than one nu, and not of a shape that is a guess
   bool pictures = false;       ///< registrations, verdicts, linear tetrahedra, and what ours says of an object with regions that it is not told of
   int threads = 1;
 };

@@ -63,6 +63,8 @@ struct PaperScene {
   double edge_m = 0;       ///< where these are given: of those under the pad; 0: like all others
   int samples = 7;         ///< a push, as with the balloon and the teddy bear
   double travel_m = 0;     ///< 0: the object's own limit
+  bool error_drawn = false;   ///< the paper draws its error over (E, nu) here; quick mode asks other starts where it does
+  bool each_sample = false;   ///< the paper has E of every sample here; quick mode fits them alone where it does
   double slip_m = 0;       ///< after the first sample: sideways, nobody notices
   double slip_deeper_m = 0;             ///< how much further the tip then has to come before it presses again
   std::optional<PaperPlace> unused = {};     ///< of the push that is predicted; nothing: at the last site again, at other forces

@@ -24,6 +24,7 @@ constexpr std::array<PaperScene, 8> table{{
      .young_modulus_pa = 1000,
      .poisson_ratio = 0.3,
      .sites = 1,
+     .error_drawn = true,
      .unused = PaperPlace{{0.03, 0, 0.1}, {0, -0.5, -0.866}}},
     {.name = "cube",
      .title = "Foam cube of 15 cm, time-of-flight camera, small strains",
@@ -34,6 +35,7 @@ constexpr std::array<PaperScene, 8> table{{
      .depth_sensor = "time_of_flight",
      .force_sensor = "schunk_ftcl_050",
      .sites = 1,
+     .each_sample = true,
      .unused = PaperPlace{{0.03, 0, 0.15}, {0, 0, -1}}},
     {.name = "cube9cm",
      .title = "Foam cube of 15 cm, 9 cm of travel, a slip at the start",
@@ -90,7 +92,8 @@ constexpr std::array<PaperScene, 8> table{{
      .shape = PaperShape::planar_back,
      .apparent = true,
      .tetrahedra = 815,
-     .samples = 9},  // the skin yields under seven of them before the tool has gone as far as it may
+     .samples = 9,  // the skin yields under seven of them before the tool has gone as far as it may
+     .each_sample = true},
     {.name = "ball",
      .title = "A solid ball in the balloon's place",
      .figures = "1, 7, 8",
@@ -112,6 +115,7 @@ constexpr std::array<PaperScene, 8> table{{
      .force_sensor = "schunk_ftcl_050",
      .region_ratio = 1.4,
      .samples = 11,  // of which the travel leaves seven or so
+     .each_sample = true,
      .unused = PaperPlace{{0.014, 0.004, 0.15}, {-0.2, 0, -0.98}}},
     {.name = "between",
      .title = "A free ball between two opposed pushes",

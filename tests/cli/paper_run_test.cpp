@@ -122,6 +122,24 @@ TEST(PaperRun, WhatWasStoppedGoesOnToTheSamePage) {
   EXPECT_EQ(page_of(files / "parts"), page_of(files / "whole"));
 }
 
+TEST(PaperRun, QuickModeTakesWhatThePaperHas) {
+  PaperPlan plan;
+  plan.details_of = 1;
+  plan.quick = true;
+  const auto& cow = lab::paper_scene("cow");
+  const auto& cube = lab::paper_scene("cube");
+  EXPECT_TRUE(options_of(plan, cow, 1).other_starts) << "fig. 4";
+  EXPECT_FALSE(options_of(plan, cow, 1).samples_alone);
+  EXPECT_TRUE(options_of(plan, cube, 1).samples_alone) << "fig. 6";
+  EXPECT_FALSE(options_of(plan, cube, 1).other_starts);
+  EXPECT_FALSE(options_of(plan, cube, 2).samples_alone) << "a seed without details";
+  plan.quick = false;
+  for (const lab::PaperScene& scene : lab::paper_scenes()) {
+    EXPECT_TRUE(options_of(plan, scene, 1).other_starts) << scene.name;
+    EXPECT_TRUE(options_of(plan, scene, 1).samples_alone) << scene.name;
+  }
+}
+
 TEST(PaperRun, ScenesSideBySideMakeTheSamePage) {
   const test::TemporaryFolder files("paper_side_by_side");
   MadeUp whole;
