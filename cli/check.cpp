@@ -21,7 +21,7 @@
 namespace palpate::cli {
 namespace {
 
-struct Options {
+struct CheckArguments {
   std::filesystem::path recording, mapping;
   double stiffness_n_per_m = 0;
   bool rigid = false;
@@ -45,7 +45,7 @@ TriMesh body_of(const Recording& recording) {
 }
 
 template <typename Vector>
-std::vector<double> numbers(const Vector& of) {
+std::vector<double> number_list(const Vector& of) {
   return {of.data(), of.data() + of.size()};
 }
 
@@ -65,7 +65,7 @@ std::string camera_as_found(const Recording& recording, const Pose& correction) 
   return "";
 }
 
-int run(const Options& given, Session& session) {
+int run(const CheckArguments& given, Session& session) {
   if (given.rigid == (given.stiffness_n_per_m > 0))
     throw Error("say what was pushed: --stiffness N_PER_M of a spring, or --rigid", "--stiffness");
   Recording recording = load_recording_unchecked(session, given.recording, given.mapping);
@@ -106,8 +106,8 @@ int run(const Options& given, Session& session) {
     fine = fine && error.consistent;
   }
   if (check.rays > 0) {
-    json["hand_eye_pivot_m"] = numbers(check.pivot_m);
-    for (int row = 0; row < 4; ++row) json["hand_eye_correction"].push_back(numbers(VectorX(check.hand_eye_correction.matrix().row(row))));
+    json["hand_eye_pivot_m"] = number_list(check.pivot_m);
+    for (int row = 0; row < 4; ++row) json["hand_eye_correction"].push_back(number_list(VectorX(check.hand_eye_correction.matrix().row(row))));
     session.say(fmt::format("hand_eye is about {:.3f} {:.3f} {:.3f} m, the body's middle{}", check.pivot_m.x(), check.pivot_m.y(), check.pivot_m.z(),
                             camera_as_found(recording, check.hand_eye_correction)));
   }
@@ -129,7 +129,7 @@ int run(const Options& given, Session& session) {
 }  // namespace
 
 Run verbs::check(CLI::App& app) {
-  auto given = std::make_shared<Options>();
+  auto given = std::make_shared<CheckArguments>();
   app.add_option("recording", given->recording,
                  "of pushes on the known body: forces, travels, and depth images if there is a camera")
       ->required();

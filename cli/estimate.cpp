@@ -25,7 +25,7 @@
 namespace palpate::cli {
 namespace {
 
-struct Options {
+struct EstimateArguments {
   std::filesystem::path recording, mapping, out;
   std::string method = "palpate", material, element, refine, regions = "recorded";
   std::vector<double> poisson_range;
@@ -56,7 +56,7 @@ class StageClock {
   std::map<std::string, double> seconds_;
 };
 
-IdentifyOptions identify_options(const Options& given, const Session& session) {
+IdentifyOptions identify_options(const EstimateArguments& given, const Session& session) {
   IdentifyOptions options;
   options.method = given.method;
   options.regions = given.regions;
@@ -146,7 +146,7 @@ void tell_exact(Session& session, const Identification& answer) {
                           names, std::sqrt(squares)));
 }
 
-void tell(Session& session, const Options& given, const Identification& answer) {
+void tell(Session& session, const EstimateArguments& given, const Identification& answer) {
   for (const auto& parameter : answer.parameters) {
     const bool young = parameter.name == "young_modulus" && parameter.region.empty();
     const std::string label = young ? "Young's modulus E"
@@ -191,7 +191,7 @@ void tell(Session& session, const Options& given, const Identification& answer) 
   for (const auto& verdict : answer.verdicts) session.warn(fmt::format("{}: {}", verdict.code, verdict.message));
 }
 
-int estimate(Session& session, const Options& given) {
+int estimate(Session& session, const EstimateArguments& given) {
   StageClock clock;
   must_leave_recording(given.out, given.recording);
   must_take_files(given.out);
@@ -234,7 +234,7 @@ int estimate(Session& session, const Options& given) {
 }  // namespace
 
 Run verbs::estimate(CLI::App& app) {
-  auto given = std::make_shared<Options>();
+  auto given = std::make_shared<EstimateArguments>();
   app.add_option("recording", given->recording, "folder of the recording, or a bag: MCAP, rosbag2 (a folder or .db3), ROS 1")
       ->required();
   app.add_option("--mapping", given->mapping, "what a bag's topics mean (default: mapping.yaml beside it)");

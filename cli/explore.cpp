@@ -37,7 +37,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ExploreArguments {
   RobotArguments robot;
   ExploreOptions explore;
   fs::path out;
@@ -68,7 +68,7 @@ struct Kept {
 
 /// One whole loop; in the lab, on an object of its own. `kept` only where it is recorded, `live` where it may be watched.
 /// @param scene  with pushes where it goes on
-Explored run_loop(Session& session, const Options& given, PushRobot& robot, const Recording& scene, PushOrder order, Kept* kept,
+Explored run_loop(Session& session, const ExploreArguments& given, PushRobot& robot, const Recording& scene, PushOrder order, Kept* kept,
                   LiveReport* live) {
   ExploreOptions options = given.explore;
   options.order = order;
@@ -136,7 +136,7 @@ std::string needed(const Explored& run) {
 }
 
 /// What stands before the robot, and which law it is taken to have.
-Recording scene_of(const Options& given, const PushRobot& robot) {
+Recording scene_of(const ExploreArguments& given, const PushRobot& robot) {
   Recording scene = robot.scene();
   if (!given.law.empty()) scene.model.material = given.law;
   if (const auto wrong = wrong_material(scene.model.material)) throw Error(*wrong, given.robot.scene.string() + ": model.material");
@@ -144,7 +144,7 @@ Recording scene_of(const Options& given, const PushRobot& robot) {
 }
 
 /// The other orders in the same lab; with --seeds in further labs, too, and the next best push there.
-void compare(Session& session, const Options& given, const Explored& found, nlohmann::json& json) {
+void compare(Session& session, const ExploreArguments& given, const Explored& found, nlohmann::json& json) {
   struct Order {
     PushOrder order;
     const char* name;
@@ -154,7 +154,7 @@ void compare(Session& session, const Options& given, const Explored& found, nloh
                     {PushOrder::random, "random order", {}},
                     {PushOrder::best_repeated, "best place repeated", {}}};
   for (int lab = 0; lab < given.seeds; ++lab) {
-    Options there = given;
+    ExploreArguments there = given;
     const std::uint64_t seed = session.seed + std::uint64_t(lab);
     there.explore.suggest.candidates.seed = there.explore.seed = seed;
     there.explore.identify.fit.cross_checks = false;  // a dozen labs: verdicts are those without them
@@ -181,7 +181,7 @@ void compare(Session& session, const Options& given, const Explored& found, nloh
   }
 }
 
-int run(const Options& given, Session& session) {
+int run(const ExploreArguments& given, Session& session) {
   must_take_files(given.out);
   std::error_code code;
   const bool exists = fs::exists(given.out, code) && !fs::is_empty(given.out, code);
@@ -203,7 +203,7 @@ int run(const Options& given, Session& session) {
   const auto robot = push_robot(given.robot, session.seed);
   Recording scene = scene_of(given, *robot);
   must_clear(scene.tools, given.explore.push);
-  Options loop = given;
+  ExploreArguments loop = given;
   loop.explore.go_on = exists;
   TruthFile truth(given.out / "truth.json", robot->truth());
   if (exists) {
@@ -250,7 +250,7 @@ int run(const Options& given, Session& session) {
 }  // namespace
 
 Run verbs::explore(CLI::App& app) {
-  auto given = std::make_shared<Options>();
+  auto given = std::make_shared<ExploreArguments>();
   auto& options = given->explore;
   app.add_option("-o,--out", given->out,
                  "folder for recording/, result.json, model/, report.html, exploration.json and truth.json")
@@ -288,7 +288,7 @@ Run verbs::explore(CLI::App& app) {
   add_robot_options(app, given->robot);
   add_push_thresholds(app, options.push);
   return [given](Session& session) {
-    Options chosen = *given;
+    ExploreArguments chosen = *given;
     chosen.explore.suggest.goal = estimation::push_goal(given->goal);
     chosen.explore.suggest.candidates.seed = chosen.explore.seed = session.seed;
     chosen.explore.suggest.threads = chosen.explore.identify.fit.threads = session.thread_count();

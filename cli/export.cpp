@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ExportArguments {
   fs::path result, out;
   std::string to;
   double density_kg_m3 = 0;
@@ -88,7 +88,7 @@ const io::Exporter& exporter_of(const std::string& simulator) {
   }
 }
 
-int run(const Options& given, Session& session) {
+int run(const ExportArguments& given, Session& session) {
   const io::Exporter& exporter = exporter_of(given.to);
   must_take_files(given.out);
   const LearnedObject learned = load_learned_object(given.result);
@@ -149,7 +149,7 @@ int run(const Options& given, Session& session) {
 }  // namespace
 
 Run verbs::export_(CLI::App& app) {
-  auto given = std::make_shared<Options>();
+  auto given = std::make_shared<ExportArguments>();
   std::string list;
   for (const io::Exporter& one : io::exporters()) list += "\n  " + one.name + ": " + one.about;
   app.add_option("result", given->result, "folder that `palpate estimate` wrote")->required();

@@ -41,7 +41,7 @@ struct Images {
   std::set<std::vector<double>> places;
 };
 
-std::vector<double> numbers(const Pose& pose) { return {pose.matrix().data(), pose.matrix().data() + 16}; }
+std::vector<double> pose_numbers(const Pose& pose) { return {pose.matrix().data(), pose.matrix().data() + 16}; }
 
 json cameras_of(const Recording& recording) {
   std::vector<Images> all;
@@ -52,7 +52,7 @@ json cameras_of(const Recording& recording) {
     });
     if (at == all.end()) at = all.insert(all.end(), {&frame, 0, {}});
     ++at->count;
-    at->places.insert(numbers(frame.T_base_camera));
+    at->places.insert(pose_numbers(frame.T_base_camera));
   };
   for (const DepthFrame& frame : recording.rest.views) look(frame);
   for (const Push& push : recording.pushes)

@@ -21,7 +21,7 @@
 namespace palpate::cli {
 namespace {
 
-struct Options {
+struct ModelArguments {
   std::string input, output, unit = "m";
   Index tetrahedra = 10000;
   double edge_m = 0;
@@ -36,7 +36,7 @@ double metres_per(const std::string& unit) {
 }
 
 /// The object at rest as a recording gives it: a volume, a surface, or views to be fused.
-reconstruction::BuiltObject build_from_recording(const Options& o, const reconstruction::BuildOptions& options,
+reconstruction::BuiltObject build_from_recording(const ModelArguments& o, const reconstruction::BuildOptions& options,
                                                  Session& session) {
   const Recording recording = io::read_recording_unchecked(o.input);
   const Rest& rest = recording.rest;
@@ -45,7 +45,7 @@ reconstruction::BuiltObject build_from_recording(const Options& o, const reconst
   return build_from_views(recording, options, reconstruction::Completion::mirrored, session.progress());
 }
 
-reconstruction::BuiltObject build(const Options& o, Session& session) {
+reconstruction::BuiltObject build(const ModelArguments& o, Session& session) {
   reconstruction::BuildOptions options;
   if (o.tetrahedra != 0) options.mesh.tetrahedra = o.tetrahedra;
   options.mesh.edge_m = o.edge_m;
@@ -71,7 +71,7 @@ reconstruction::BuiltObject build(const Options& o, Session& session) {
   }
 }
 
-int run(const Options& o, Session& session) {
+int run(const ModelArguments& o, Session& session) {
   must_exist(o.input, "give a mesh file, or the folder of a recording");
   must_take_files(o.output);
   const auto start = std::chrono::steady_clock::now();
@@ -117,7 +117,7 @@ int run(const Options& o, Session& session) {
 }  // namespace
 
 Run verbs::model(CLI::App& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<ModelArguments>();
   app.add_option("INPUT", o->input,
                  "mesh file: a surface (OBJ, STL, PLY, ...), however broken, or a volume (MSH, VTK, VTU); or a recording")
       ->required();

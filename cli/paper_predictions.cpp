@@ -15,11 +15,11 @@
 namespace palpate::cli {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 
 /// @param moves  the object may have moved as a whole: registered first
 double rms_to(const TriMesh& surface, const RayCloud& seen, bool moves) {
-  if (seen.range_m.size() == 0) return nan;
+  if (seen.range_m.size() == 0) return no_number;
   const geometry::TriangleTree tree(surface);
   PointCloud cloud;
   cloud.points_m = seen.origins_m + (seen.directions.array().colwise() * seen.range_m.array()).matrix();
@@ -47,7 +47,7 @@ Points dent_of(const TriMesh& now, const geometry::TriangleTree& rest) {
 }
 
 double rms_to(const geometry::TriangleTree& surface, const Points& points_m) {
-  if (points_m.rows() == 0) return nan;
+  if (points_m.rows() == 0) return no_number;
   double sum = 0;
   for (Index i = 0; i < static_cast<Index>(points_m.rows()); ++i) sum += surface.closest(points_m.row(i)).squared_distance_m2;
   return std::sqrt(sum / static_cast<double>(points_m.rows()));
@@ -88,7 +88,7 @@ Course course_of(const Recording& recording, const Prepared& given, const Method
     const std::pair<double, double> here{predicted.travel_m(0), load.force_n->dot(load.direction)};
     if (here.first > travel_force.back().first) travel_force.push_back(here);
     const TriMesh surface{predicted.surface_m, given.object.surface.rest().triangles};
-    course.at[s] = {nan, rms_to(surface, shown.seen[s], recording.free), rms_to(geometry::TriangleTree(surface), shown.dent_m[s])};
+    course.at[s] = {no_number, rms_to(surface, shown.seen[s], recording.free), rms_to(geometry::TriangleTree(surface), shown.dent_m[s])};
   }
   if (travel_force.size() > 1)
     for (auto& [s, expectation] : course.at) expectation.force_n = force_at(travel_of(push.steps[s]), travel_force);
@@ -123,7 +123,7 @@ void predict_unused(const Prepared& given, const Prepared* other, const lab::Pap
                by_other = other != nullptr ? course_of(recording, *other, out.other, {}, shown, options, shared.other.unused) : Course{};
   const auto expectation = [](const Course& course, std::size_t s) {
     const auto found = course.at.find(s);
-    return found == course.at.end() ? Expectation{nan, nan, nan} : found->second;
+    return found == course.at.end() ? Expectation{no_number, no_number, no_number} : found->second;
   };
   for (std::size_t s = 0; s < recording.pushes[0].steps.size(); ++s) {
     if (!loaded(trial.unused.steps[s])) continue;

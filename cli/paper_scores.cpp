@@ -13,7 +13,7 @@
 namespace palpate::cli {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_score = std::numeric_limits<double>::quiet_NaN();
 
 /// One E with its truth: of the whole object, or of a site of one with regions.
 struct Compared {
@@ -35,9 +35,9 @@ struct Moments {
   double sum = 0, squares = 0;
   int count = 0;
   void add(double x) { sum += x, squares += x * x, ++count; }
-  double mean() const { return count > 0 ? sum / count : nan; }
-  double rms() const { return count > 0 ? std::sqrt(squares / count) : nan; }
-  double spread() const { return count > 1 ? std::sqrt(std::max(0.0, squares - sum * sum / count) / (count - 1)) : nan; }
+  double mean() const { return count > 0 ? sum / count : no_score; }
+  double rms() const { return count > 0 ? std::sqrt(squares / count) : no_score; }
+  double spread() const { return count > 1 ? std::sqrt(std::max(0.0, squares - sum * sum / count) / (count - 1)) : no_score; }
 };
 
 Score score_of(const std::vector<Compared>& all, const std::vector<Effort>& efforts) {

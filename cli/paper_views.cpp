@@ -25,7 +25,7 @@ namespace {
 
 using Depths = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // along the optical axis, NaN = nothing there
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_depth = std::numeric_limits<double>::quiet_NaN();
 constexpr double largest_difference_m = 0.01;  // that colours tell apart
 
 /// Part of an image: columns and rows.
@@ -96,7 +96,7 @@ std::optional<Hardest> hardest_of(const Recording& recording) {
 Depths as_measured(const DepthFrame& image) {
   Depths out(image.depth_m.rows(), image.depth_m.cols());
   for (Eigen::Index v = 0; v < out.rows(); ++v)
-    for (Eigen::Index u = 0; u < out.cols(); ++u) out(v, u) = image.depth_m(v, u) > 0 ? static_cast<double>(image.depth_m(v, u)) : nan;
+    for (Eigen::Index u = 0; u < out.cols(); ++u) out(v, u) = image.depth_m(v, u) > 0 ? static_cast<double>(image.depth_m(v, u)) : no_depth;
   return out;
 }
 
@@ -106,7 +106,7 @@ Depths of_the_object(const Recording& seen, const Hardest& hardest, const Depths
   Push push = seen.pushes[hardest.push];
   push.steps = {push.steps[hardest.step]};
   one.pushes = {std::move(push)};
-  Depths out = Depths::Constant(measured_m.rows(), measured_m.cols(), nan);
+  Depths out = Depths::Constant(measured_m.rows(), measured_m.cols(), no_depth);
   const double near_m = near_of(seen);
   for (const auto& step : observe(one))
     for (const auto& input : step)
@@ -138,7 +138,7 @@ Depths spread(const Depths& few, const Depths& everywhere) {
 Depths cast_onto(const DepthFrame& image, const geometry::TriangleTree& surface, const Pose& T_surface_base) {
   const Points directions = sensing::pixel_directions(image.camera);
   const Pose T = T_surface_base * image.T_base_camera;
-  Depths out = Depths::Constant(image.camera.height_px, image.camera.width_px, nan);
+  Depths out = Depths::Constant(image.camera.height_px, image.camera.width_px, no_depth);
   Index hint = -1;
   for (int v = 0; v < out.rows(); ++v)
     for (int u = 0; u < out.cols(); ++u) {

@@ -18,7 +18,7 @@
 namespace palpate::cli {
 namespace {
 
-struct Options {
+struct PredictArguments {
   std::filesystem::path result, out;
   std::vector<double> contact, direction;
   std::optional<double> force_n, travel_m;
@@ -43,7 +43,7 @@ nlohmann::json regions_json(const prediction::Elasticity& elasticity) {
 
 MatrixX by_rows(const VectorX& field) { return Eigen::Map<const Points>(field.data(), field.size() / 3, 3); }
 
-int run(const Options& given, Session& session) {
+int run(const PredictArguments& given, Session& session) {
   end_at_first_interrupt();
   const LearnedObject learned = load_learned_object(given.result);
   AskedPush asked;
@@ -111,7 +111,7 @@ int run(const Options& given, Session& session) {
 }  // namespace
 
 Run verbs::predict(CLI::App& app) {
-  auto given = std::make_shared<Options>();
+  auto given = std::make_shared<PredictArguments>();
   app.add_option("result", given->result, "folder that `palpate estimate` wrote")->required();
   app.add_option("--contact", given->contact, "where the push acts, X Y Z in metres, base frame (not of a platen)")
       ->check(finite_number())

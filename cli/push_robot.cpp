@@ -19,7 +19,7 @@ namespace palpate::cli {
 namespace {
 
 constexpr const char* own_robot = "A robot of your own";
-constexpr const char* where = "Where to push";
+constexpr const char* option_group = "Where to push";
 
 struct Place {
   Vec3 contact_m, direction;
@@ -202,14 +202,14 @@ void add_contact_options(CLI::App& app, RobotArguments& arguments) {
       ->type_name("X Y Z")
       ->allow_extra_args(false)
       ->check(coordinate("where to push, in metres, base frame"))
-      ->group(where);
+      ->group(option_group);
   app.add_option("--direction", arguments.directions,
                  "of these pushes, in the base frame, into the object: one for all, or one each (default: across the surface)")
       ->needs("--contact")
       ->type_name("X Y Z")
       ->allow_extra_args(false)
       ->check(coordinate("along which to push, into the object, base frame"))
-      ->group(where);
+      ->group(option_group);
 }
 
 std::unique_ptr<PushRobot> push_robot(const RobotArguments& arguments, std::uint64_t seed) {

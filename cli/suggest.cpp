@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct SuggestArguments {
   fs::path given, recording, mapping;
   std::string goal = "both";
   SuggestOptions suggest;
@@ -43,7 +43,7 @@ struct Known {
   std::optional<Identification> answer;
 };
 
-Known read(Session& session, const Options& given, std::vector<std::string>& warnings) {
+Known read(Session& session, const SuggestArguments& given, std::vector<std::string>& warnings) {
   std::error_code code;
   Known known;
   const bool is_result = fs::exists(given.given / "result.json", code) || given.given.filename() == "result.json";
@@ -130,7 +130,7 @@ nlohmann::json json_of(const estimation::RatedPush& push, const PushScene& scene
 }
 
 /// The fewest pushes that make the intervals as narrow as was asked for, as indices of the ranking.
-std::vector<std::size_t> pushes_to_target(const Options& given, const estimation::PushRanking& ranking, Session& session,
+std::vector<std::size_t> pushes_to_target(const SuggestArguments& given, const estimation::PushRanking& ranking, Session& session,
                                           nlohmann::json& json) {
   constexpr double any = 1e6;
   const estimation::SpreadTarget target{given.young_modulus_within.value_or(any), given.poisson_ratio_within.value_or(any)};
@@ -155,7 +155,7 @@ std::vector<std::size_t> pushes_to_target(const Options& given, const estimation
   return {};
 }
 
-int run(const Options& given, Session& session) {
+int run(const SuggestArguments& given, Session& session) {
   std::vector<std::string> warnings;
   Known known = read(session, given, warnings);
   SuggestOptions options = given.suggest;
@@ -263,7 +263,7 @@ int run(const Options& given, Session& session) {
 }  // namespace
 
 Run verbs::suggest(CLI::App& app) {
-  auto given = std::make_shared<Options>();
+  auto given = std::make_shared<SuggestArguments>();
   auto& limits = given->suggest.candidates.limits;
   app.add_option("given", given->given, "what `palpate estimate` wrote, or a recording (before the first touch)")
       ->required();

@@ -56,7 +56,7 @@ Pose looking_at(const Vec3& eye_m, const Vec3& target_m, const Vec3& up) {
 }
 
 /// Cameras of the recording, each pose once.
-std::vector<DepthFrame> cameras_of(const Recording& recording) {
+std::vector<DepthFrame> views_of(const Recording& recording) {
   std::vector<DepthFrame> cameras;
   const auto add = [&](const DepthFrame& frame) {
     for (const auto& known : cameras) {
@@ -173,7 +173,7 @@ void add_views(PushScene& scene, const Recording& recording, const SuggestOption
   const TriMesh& surface = scene.simulated.surface.rest();
   const Vec3 low = surface.vertices_m.colwise().minCoeff(), high = surface.vertices_m.colwise().maxCoeff();
   const Vec3 middle = 0.5 * (low + high), up = up_of(recording);
-  std::vector<DepthFrame> cameras = options.cameras.empty() ? cameras_of(recording) : options.cameras;
+  std::vector<DepthFrame> cameras = options.cameras.empty() ? views_of(recording) : options.cameras;
   std::vector<std::string> names;
   for (std::size_t i = 0; i < cameras.size(); ++i) names.push_back("camera " + std::to_string(i + 1));
   const PointCloud* cloud = cameras.empty() ? cloud_of(recording) : nullptr;

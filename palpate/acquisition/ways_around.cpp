@@ -11,7 +11,7 @@
 namespace palpate::acquisition {
 namespace {
 
-constexpr double beside_m = 1e-3;  // via points lie this far outside
+constexpr double via_beside_m = 1e-3;  // via points lie this far outside
 
 Pose posed(const Mat3& rotation, const Vec3& at_m) {
   Pose pose = Pose::Identity();
@@ -22,12 +22,12 @@ Pose posed(const Mat3& rotation, const Vec3& at_m) {
 
 // Between the two, places to go through: none; over the top; around the upright edges, one or two of them.
 std::vector<std::vector<Vec3>> places_between(const KeepOut& box, const Vec3& from_m, const Vec3& to_m) {
-  const double top_m = std::max({box.max_m.z() + beside_m, from_m.z(), to_m.z()});
+  const double top_m = std::max({box.max_m.z() + via_beside_m, from_m.z(), to_m.z()});
   std::vector<std::vector<Vec3>> out{{}, {{from_m.x(), from_m.y(), top_m}, {to_m.x(), to_m.y(), top_m}}};
   std::array<Vec3, 4> edges;
   for (int k = 0; k < 4; ++k)
-    edges[std::size_t(k)] = {k == 1 || k == 2 ? box.max_m.x() + beside_m : box.min_m.x() - beside_m,
-                             k >= 2 ? box.max_m.y() + beside_m : box.min_m.y() - beside_m, 0};
+    edges[std::size_t(k)] = {k == 1 || k == 2 ? box.max_m.x() + via_beside_m : box.min_m.x() - via_beside_m,
+                             k >= 2 ? box.max_m.y() + via_beside_m : box.min_m.y() - via_beside_m, 0};
   const auto at_height = [](Vec3 edge_m, double height_m) {
     edge_m.z() = height_m;
     return edge_m;

@@ -5,7 +5,7 @@ namespace palpate::estimation {
 
 /// Cosine between a camera's ray and the surface's normal below which no ray has a say: 75 degrees. A sphere's ray there is a
 /// thirtieth of the radius inside the outline; beyond, pixels that mix the object with what is behind it are left
-/// (lab_rim_bias_test).
+/// (tests/lab/rim_bias_test.cpp).
 constexpr double grazing_cosine = 0.26;
 
 /// Pixels between a ray that has a say and the simulated surface's outline. Where the pixels on both sides of an edge mix object and

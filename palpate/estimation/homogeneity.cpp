@@ -7,14 +7,14 @@
 
 namespace palpate::estimation {
 
-double homogeneity_p_value(const VectorX& log_young, MatrixX covariance) {
-  if (log_young.size() < 2) return 1;
+double homogeneity_p_value(const VectorX& log_moduli, MatrixX covariance) {
+  if (log_moduli.size() < 2) return 1;
   covariance.diagonal().array() += contact_model_std * contact_model_std;
   const Eigen::LDLT<MatrixX> factorised(covariance);
-  const VectorX ones = VectorX::Ones(log_young.size()), weights = factorised.solve(ones);
-  const double mean = weights.dot(log_young) / weights.sum();
-  const VectorX off = log_young - mean * ones;
-  return chi_square_tail(off.dot(factorised.solve(off)), static_cast<int>(log_young.size()) - 1);
+  const VectorX ones = VectorX::Ones(log_moduli.size()), weights = factorised.solve(ones);
+  const double mean = weights.dot(log_moduli) / weights.sum();
+  const VectorX off = log_moduli - mean * ones;
+  return chi_square_tail(off.dot(factorised.solve(off)), static_cast<int>(log_moduli.size()) - 1);
 }
 
 double chi_square_tail(double value, int degrees_of_freedom) {

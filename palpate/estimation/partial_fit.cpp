@@ -11,7 +11,7 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr double nearly = 0.1;  // of log E: one step from the joint optimum gets a part's own to a few per mille
+constexpr double near_log = 0.1;  // of log E: one step from the joint optimum gets a part's own to a few per mille
 
 OptimiseOptions few_iterations() {
   OptimiseOptions options;
@@ -52,7 +52,7 @@ Optimum PartialFits::refit(const StepFlags& steps, bool hold_poisson) {
   for (std::size_t k = 0; k < moving.size(); ++k) part.unknowns(moving[k]) += move(static_cast<Index>(k));
   note_held(unknowns, part);
   part.termination = Termination::converged;
-  if (!move.allFinite() || std::abs(move(0)) > nearly || leaves) {
+  if (!move.allFinite() || std::abs(move(0)) > near_log || leaves) {
     const OnProgress keep_going = [&](std::string_view, double share) { return !progress_ || progress_("cross-check", share); };
     part = optimise(objective_, optimum_.unknowns, loss, few_iterations(), keep_going);
   }

@@ -13,7 +13,7 @@ namespace palpate::estimation {
 namespace {
 
 constexpr int grid_size = 401;
-constexpr double search_reuse = 2;  // Objective::set_reuse for a linear body: what single points err by
+constexpr double linear_reuse = 2;  // Objective::set_reuse for a linear body: what single points err by
 constexpr double negligible = 8;  // of the cost above its least: e^-8 of the density, four standard deviations
 constexpr double excluded = 3;    // the same: what lies beyond is less than a hundredth of a normal density
 
@@ -177,9 +177,9 @@ class FollowRows {
  public:
   FollowRows(Objective& objective, const Optimum& optimum, const Loss& loss) : objective_(objective), before_(objective.reuse()) {
     if (!objective.model().superposes()) return;
-    objective.set_reuse(search_reuse);
+    objective.set_reuse(linear_reuse);
     objective.evaluate(optimum.unknowns, loss);
-    objective.set_reuse(search_reuse, false);
+    objective.set_reuse(linear_reuse, false);
   }
   ~FollowRows() {
     if (objective_.model().superposes()) objective_.set_reuse(before_);

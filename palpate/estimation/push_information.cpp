@@ -21,7 +21,7 @@ namespace {
 constexpr const char* candidate_name = "candidate ";  // and a number: how unknowns of one push are told from those of all
 constexpr double robust_efficiency = 0.95;  // of Tukey's biweight at the fit's usual cut
 
-Points points_of(const TermInput& view) {
+Points seen_points(const TermInput& view) {
   if (const auto* rays = std::get_if<RayObservation>(&view))
     return rays->rays.origins_m + rays->rays.range_m.asDiagonal() * rays->rays.directions;
   if (const auto* cloud = std::get_if<PointCloud>(&view)) return cloud->points_m;
@@ -232,7 +232,7 @@ PushInformation::PushInformation(const Recording& scene, const SimulatedObject& 
   plan.rest_step = scene.rest.surface_std_m > 0;
   plan.surface.emplace(object.surface.rest());
   for (const auto& view : sensors.views) {
-    plan.seen_m.push_back(points_of(view.sees));
+    plan.seen_m.push_back(seen_points(view.sees));
     plan.spacing.push_back(spacing_m(object.surface.rest(), static_cast<Index>(plan.seen_m.back().rows())));
     const auto* rays = std::get_if<RayObservation>(&view.sees);
     plan.rest_step = plan.rest_step || (rays != nullptr && (rays->bias_std_m > 0 || rays->scatter));
@@ -296,7 +296,7 @@ std::vector<RatedPush> PushInformation::rate(std::size_t c) {
     Points left_m = plan.seen_m[v];
     if (const auto* rays = std::get_if<RayObservation>(&sees)) {
       sees = without_stick(*rays, candidate, plan.tool.radius_m, plan.options.limits.stick_length_m);
-      left_m = points_of(sees);
+      left_m = seen_points(sees);
     }
     if (left_m.rows() == 0) continue;
     std::optional<Vec3> eye_m;

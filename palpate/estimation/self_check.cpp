@@ -226,7 +226,7 @@ const TermInput* rays_in(const std::vector<TermInput>& inputs) {
   return nullptr;
 }
 
-RayCloud thinned(const RayCloud& rays) {
+RayCloud most_of(const RayCloud& rays) {
   const Index every = std::max<Index>(1, (static_cast<Index>(rays.range_m.size()) + most_rays - 1) / most_rays);
   std::vector<Index> keep;
   for (Index i = 0; i < rays.range_m.size(); i += every) keep.push_back(i);
@@ -285,7 +285,7 @@ Problem problem_of(const Recording& recording, const TriMesh& surface, const Inp
       const bool tells = p.give == 0 || load == nullptr || load->force_n;
       if (s < inputs.size() && tells)
         if (const TermInput* rays = rays_in(inputs[s]))
-          p.views.push_back({k, force_n != 0, force_n, direction, thinned(std::get<RayObservation>(*rays).rays)});
+          p.views.push_back({k, force_n != 0, force_n, direction, most_of(std::get<RayObservation>(*rays).rays)});
       ++s;
     }
   }

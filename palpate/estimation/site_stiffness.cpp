@@ -12,15 +12,15 @@ namespace {
 
 constexpr std::size_t most_sites = 6;
 
-struct Place {
+struct Site {
   std::string name;
   Vec3 at_m = Vec3::Zero();
   double radius_m = 0;
 };
 
 /// Where each push first touched.
-std::vector<Place> places_of(const Recording& recording) {
-  std::vector<Place> places;
+std::vector<Site> places_of(const Recording& recording) {
+  std::vector<Site> places;
   for (const Push& push : recording.pushes) {
     const std::size_t known = places.size();
     for (const Step& step : push.steps) {
@@ -38,7 +38,7 @@ std::vector<Place> places_of(const Recording& recording) {
 }  // namespace
 
 std::vector<Region> sites_pushed(const Recording& recording) {
-  const std::vector<Place> places = places_of(recording);
+  const std::vector<Site> places = places_of(recording);
   if (recording.regions.size() > 1 || places.empty()) return {};
   std::vector<std::size_t> chosen{0};
   std::vector<double> away_m(places.size(), std::numeric_limits<double>::infinity());

@@ -14,7 +14,7 @@ namespace {
 
 constexpr Index most_carriers = 400;
 constexpr double kept = 0.995;     // of the field's variance: the normal equations cost the square of the modes a point
-constexpr double spacing = 0.65;   // of the points that carry the field, in correlation lengths
+constexpr double carrier_spacing = 0.65;   // of the points that carry the field, in correlation lengths
 
 Points vertex_normals(const TriMesh& mesh) {
   Points normals = Points::Zero(mesh.vertices_m.rows(), 3);
@@ -47,7 +47,7 @@ SurfaceField::SurfaceField(const TriMesh& rest, double std_m, double correlation
   // Farthest points first, in place and direction: two sides of an edge err apart.
   std::vector<Index> carriers{0};
   VectorX gap2 = VectorX::Constant(count, std::numeric_limits<double>::infinity());
-  const double enough2 = std::pow(spacing * correlation_m, 2);
+  const double enough2 = std::pow(carrier_spacing * correlation_m, 2);
   while (static_cast<Index>(carriers.size()) < most_carriers) {
     const Index last = carriers.back();
     for (Index v = 0; v < count; ++v) {

@@ -15,7 +15,7 @@
 namespace palpate::geometry {
 namespace {
 
-constexpr double share = 0.12;  // of the root of the area that a rim goes around, as a circle of its length
+constexpr double rim_share = 0.12;  // of the root of the area that a rim goes around, as a circle of its length
 constexpr double hardly_a_rim = 0.05;  // of the longest: where a foot only grazes a side, or a scan is rough there
 
 /// Where a triangle goes through one side of the box.
@@ -118,7 +118,7 @@ class Rims {
 std::vector<FinerNear> finer_at_rims(const Vec3& box_min_m, const Vec3& box_max_m, const TriMesh& surface) {
   std::vector<FinerNear> finer;
   for (const std::vector<Piece>& rim : Rims(box_min_m, box_max_m, weld(surface)).all()) {
-    const double edge_m = share * Rims::length_m(rim) / (2 * std::sqrt(EIGEN_PI));
+    const double edge_m = rim_share * Rims::length_m(rim) / (2 * std::sqrt(EIGEN_PI));
     const std::size_t first = finer.size();
     for (const Piece& piece : rim) {
       const int steps = 1 + int(piece.length_m() / (0.7 * edge_m));

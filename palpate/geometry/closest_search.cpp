@@ -8,6 +8,11 @@
 #include "palpate/geometry/float_lanes.hpp"
 
 namespace palpate::geometry {
+
+struct Vec3x4 {
+  lanes::Floats x, y, z;
+};
+
 namespace {
 
 using lanes::Floats;
@@ -21,9 +26,6 @@ constexpr float absolute_error = 1.25F, relative_error = 2.5e-4F;
 
 float farther(float distance) { return distance * (1 + relative_error) + absolute_error; }
 
-struct Vec3x4 {
-  Floats x, y, z;
-};
 Vec3x4 operator-(const Vec3x4& a, const Vec3x4& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 Vec3x4 operator*(Floats s, const Vec3x4& a) { return {s * a.x, s * a.y, s * a.z}; }
 Floats dot(const Vec3x4& a, const Vec3x4& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }

@@ -17,6 +17,8 @@ const Box& box_of(const Bvh& bvh, Source s) { return bvh.nodes[s / 2].box[s % 2]
 Index child_of(const Bvh& bvh, Source s) { return bvh.nodes[s / 2].child[s % 2]; }
 Index leaf_count(const Bvh& bvh, Source s) { return bvh.nodes[s / 2].count[s % 2]; }
 
+}  // namespace
+
 /// Which subtrees become the eight children of a node: those that make the sum of all nodes' and blocks' surfaces smallest.
 /// Found from the leaves up (Ylitie, Karras, Laine 2017, section 3.1).
 class Packing {
@@ -95,8 +97,6 @@ class Packing {
   std::vector<Index> count_;
   std::vector<Plan> plans_;
 };
-
-}  // namespace
 
 struct ClosestSearch::Builder {
   ClosestSearch& out;

@@ -122,7 +122,7 @@ void add_size_finding(std::vector<Finding>& list, const Vec3& extent) {
 }
 
 /// Faces opposite to corner k, outward for a positive determinant.
-constexpr std::array<std::array<int, 3>, 4> faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+constexpr std::array<std::array<int, 3>, 4> tet_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
 struct Face {
   std::array<Index, 3> key;
@@ -135,7 +135,7 @@ std::vector<Face> sorted_faces(const Tetrahedra& t) {
   out.reserve(4 * t.rows());
   for (Index i = 0; i < t.rows(); ++i)
     for (int k = 0; k < 4; ++k) {
-      std::array<Index, 3> key{t(i, faces[k][0]), t(i, faces[k][1]), t(i, faces[k][2])};
+      std::array<Index, 3> key{t(i, tet_faces[k][0]), t(i, tet_faces[k][1]), t(i, tet_faces[k][2])};
       std::sort(key.begin(), key.end());
       out.push_back({key, i, k});
     }
@@ -356,7 +356,7 @@ BoundarySurface boundary_surface(const TetMesh& mesh) {
   for (std::size_t i = 0; i < outer.size(); ++i) {
     out.tetrahedron.push_back(outer[i].tet);
     for (int k = 0; k < 3; ++k)
-      out.surface.triangles(i, k) = vertex[mesh.tetrahedra(outer[i].tet, faces[outer[i].opposite][k])];
+      out.surface.triangles(i, k) = vertex[mesh.tetrahedra(outer[i].tet, tet_faces[outer[i].opposite][k])];
   }
   return out;
 }
@@ -452,7 +452,7 @@ std::string unit_guess(double longest_edge_m) {
 std::pair<double, double> dihedral_range_deg(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const std::array<Vec3, 4> x{a, b, c, d};
   std::array<Vec3, 4> n;
-  for (int k = 0; k < 4; ++k) n[k] = (x[faces[k][1]] - x[faces[k][0]]).cross(x[faces[k][2]] - x[faces[k][0]]);
+  for (int k = 0; k < 4; ++k) n[k] = (x[tet_faces[k][1]] - x[tet_faces[k][0]]).cross(x[tet_faces[k][2]] - x[tet_faces[k][0]]);
   double low = M_PI, high = 0;
   for (int i = 0; i < 4; ++i)
     for (int j = i + 1; j < 4; ++j) {

@@ -18,21 +18,6 @@ namespace {
 /// answers can be kept (a tree costs about as much as the questions of one placement).
 constexpr double share_of_spacing = 0.05;
 
-// What nanoflann asks of a set of points.
-struct Placed {
-  Points at_m;
-  std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(at_m.rows()); }
-  double kdtree_get_pt(std::size_t vertex, std::size_t axis) const {
-    return at_m(static_cast<Index>(vertex), static_cast<Index>(axis));
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Placed>, Placed, 3, Index>;
-
 // Collects the nearest vertex where they are now, and the two nearest where they were.
 struct NearestNow {
   using DistanceType = double;
@@ -80,6 +65,21 @@ void check(const Points& vertices_m) {
 }  // namespace
 
 struct NearestVertices::Impl {
+  // What nanoflann asks of a set of points.
+  struct Placed {
+    Points at_m;
+    std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(at_m.rows()); }
+    double kdtree_get_pt(std::size_t vertex, std::size_t axis) const {
+      return at_m(static_cast<Index>(vertex), static_cast<Index>(axis));
+    }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+      return false;
+    }
+  };
+
+  using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Placed>, Placed, 3, Index>;
+
   Placed placed;
   Points now_m;
   std::unique_ptr<Tree> tree;

@@ -16,7 +16,7 @@ namespace palpate::geometry {
 namespace {
 
 constexpr double smooth = 0.766;  // cosine of 40 degrees between neighbouring triangles
-constexpr double reach = 0.7;     // of the wished edge: further a vertex does not go
+constexpr double edge_reach = 0.7;     // of the wished edge: further a vertex does not go
 
 /// The triangles at every edge of a surface, edges in the order of their vertices.
 class EdgeUses {
@@ -139,7 +139,7 @@ bool meet_corners(TetEditor& mesh, const Parts& parts, double floor_quality) {
       if (taken) break;
       const bool large =
           std::all_of(meeting.begin(), meeting.end(), [&](Index part) { return parts.area_m2[part] > 4 * size * size; });
-      if (far > reach * size || !large) continue;
+      if (far > edge_reach * size || !large) continue;
       const double least = std::min(mesh.star_quality(v), floor_quality) - 1e-12;
       const double fresh = mesh.star_quality_at(v, corner, std::max(least, quality));
       if (fresh > std::max(least, quality)) best = v, quality = fresh;
@@ -180,7 +180,7 @@ bool SharpEdges::meet(TetEditor& mesh, double floor_quality) const {
       if (between[v].size() < 2 || between[v].count(none) > 0) continue;
       const auto id = static_cast<Index>(v);
       const double size = mesh.size_m[v];
-      const auto place = place_of(mesh.x[v], between[v], parts, reach * size);
+      const auto place = place_of(mesh.x[v], between[v], parts, edge_reach * size);
       if (!place || (place->at - mesh.x[v]).norm() < 1e-3 * size) continue;
       const double least = std::min(mesh.star_quality(id), floor_quality) - 1e-12;
       const auto move = [&](const Vec3& there) {

@@ -19,7 +19,7 @@
 namespace palpate::geometry {
 namespace {
 
-constexpr double reach = 0.15;         // of the longest edge: faces that near the plane are laid on it
+constexpr double plane_reach = 0.15;         // of the longest edge: faces that near the plane are laid on it
 constexpr double least_volume = 0.2;   // of an element, that it keeps
 constexpr double lowest_quality = 0.15;  // tet_quality: 9 degrees
 constexpr double outline_reach = 0.7;  // of the mean edge around a node: further it does not go out
@@ -121,7 +121,7 @@ std::set<Index> lay_faces(const Plane& plane, const Triangles& faces, TetMesh& v
     bool along = std::abs((corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized().dot(plane.normal)) > 0.7;
     for (int k = 0; along && k < 3; ++k) {
       const double off_m = plane.normal.dot(corner(k) - plane.point_m);
-      along = std::abs(off_m) < reach * edge && may_lie(corner(k) - off_m * plane.normal, edge);
+      along = std::abs(off_m) < plane_reach * edge && may_lie(corner(k) - off_m * plane.normal, edge);
     }
     for (int k = 0; along && k < 3; ++k) laid.insert(faces(t, k));
   }

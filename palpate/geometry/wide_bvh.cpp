@@ -6,13 +6,13 @@
 namespace palpate::geometry {
 namespace {
 
-using Source = std::pair<Index, int>;
+using NodeSide = std::pair<Index, int>;
 
 Index widen_node(const Bvh& bvh, Index node, WideBvh& out) {
-  std::vector<Source> children;
+  std::vector<NodeSide> children;
   for (int side = 0; side < 2; ++side)
     if (bvh.nodes[node].child[side] >= 0) children.push_back({node, side});
-  const auto inner = [&](const Source& s) { return bvh.nodes[s.first].count[s.second] == 0; };
+  const auto inner = [&](const NodeSide& s) { return bvh.nodes[s.first].count[s.second] == 0; };
   while (children.size() < 4) {  // opens the child that queries reach most often
     int widest = -1;
     double area = -1;
@@ -27,7 +27,7 @@ Index widen_node(const Bvh& bvh, Index node, WideBvh& out) {
   }
   const auto id = static_cast<Index>(out.nodes.size());
   out.nodes.emplace_back();
-  out.source.push_back({Source{-1, 0}, {-1, 0}, {-1, 0}, {-1, 0}});
+  out.source.push_back({NodeSide{-1, 0}, {-1, 0}, {-1, 0}, {-1, 0}});
   for (std::size_t i = 0; i < children.size(); ++i) {
     const auto [n, side] = children[i];
     out.source[id][i] = children[i];

@@ -9,7 +9,7 @@
 namespace palpate::io {
 namespace {
 
-constexpr const char* format_name = "palpate-mapping/1";
+constexpr const char* mapping_format = "palpate-mapping/1";
 constexpr std::pair<const char*, StepsBy> ways[] = {
     {"times", StepsBy::times}, {"marks", StepsBy::marks}, {"detection", StepsBy::detection}};
 constexpr std::pair<const char*, bool> reports[] = {{"force_on_sensor", false}, {"force_on_object", true}};
@@ -241,11 +241,11 @@ BagMapping read_mapping(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, code)) throw Error("there is no such mapping", path.string());
   const YamlField top = YamlField::parse(context.folder.read(path.filename().string(), path.string()), path.string());
   YamlKeys keys(top);
-  const YamlField format = keys.required("format", std::string("write 'format: ") + format_name + "'");
-  if (format.text() != format_name) {
+  const YamlField format = keys.required("format", std::string("write 'format: ") + mapping_format + "'");
+  if (format.text() != mapping_format) {
     if (format.text().starts_with("palpate-recording/"))
       format.fail("this is a recording, not the mapping of a bag; give its folder as the recording");
-    format.fail("'" + format.text().substr(0, 60) + "' is not a format that this version reads; it reads " + format_name);
+    format.fail("'" + format.text().substr(0, 60) + "' is not a format that this version reads; it reads " + mapping_format);
   }
   const YamlField topics = keys.required("topics", "say which topic holds what; `palpate info BAG` suggests it");
   const YamlField frames = keys.required("frames", "name the frames: {base: ..., tip: ...}");

@@ -15,13 +15,13 @@
 namespace palpate::io {
 namespace {
 
-constexpr std::string_view magic = "#ROSBAG V2.0\n";
+constexpr std::string_view ros1_magic = "#ROSBAG V2.0\n";
 enum Operation : std::uint8_t { op_message = 2, op_bag = 3, op_chunk = 5, op_connection = 7 };
 
-using Header = std::map<std::string, std::string_view, std::less<>>;
+using Fields = std::map<std::string, std::string_view, std::less<>>;
 
-std::optional<Header> header_of(std::string_view bytes) {
-  Header header;
+std::optional<Fields> fields_of(std::string_view bytes) {
+  Fields header;
   ByteFields fields(bytes);
   while (!fields.at_end()) {
     const std::string_view field = fields.view();
@@ -33,13 +33,13 @@ std::optional<Header> header_of(std::string_view bytes) {
 }
 
 template <typename T>
-std::optional<T> number_of(const Header& header, std::string_view name) {
+std::optional<T> number_of(const Fields& header, std::string_view name) {
   const auto found = header.find(name);
   if (found == header.end() || found->second.size() != sizeof(T)) return std::nullopt;
   return load<T>(found->second.data());
 }
 
-std::string text_of(const Header& header, std::string_view name) {
+std::string text_of(const Fields& header, std::string_view name) {
   const auto found = header.find(name);
   return found == header.end() ? std::string() : std::string(found->second);
 }
@@ -57,11 +57,11 @@ class Ros1Parser {
       const bool has_head = fields.good;
       const std::string_view data = fields.view();
       if (!fields.good) {
-        if (!in_chunk) cut_at_ = magic.size() + begin;
+        if (!in_chunk) cut_at_ = ros1_magic.size() + begin;
         if (!in_chunk && has_head) cut_chunk(head, fields.rest());
         return false;
       }
-      const auto header = header_of(head);
+      const auto header = fields_of(head);
       if (!header || !record(*header, data, in_chunk)) ++damaged_;
     }
     return true;
@@ -100,7 +100,7 @@ class Ros1Parser {
 
   /// The file ends within this chunk: its first messages are whole all the same.
   void cut_chunk(std::string_view head, std::string_view data) {
-    const auto header = header_of(head);
+    const auto header = fields_of(head);
     if (!header || number_of<std::uint8_t>(*header, "op") != op_chunk) return;
     const auto size = number_of<std::uint32_t>(*header, "size");
     if (!size) return;
@@ -112,7 +112,7 @@ class Ros1Parser {
     records(data, true);
   }
 
-  bool record(const Header& header, std::string_view data, bool in_chunk) {
+  bool record(const Fields& header, std::string_view data, bool in_chunk) {
     const auto op = number_of<std::uint8_t>(header, "op");
     if (!op) return false;
     if (*op == op_bag) {
@@ -120,7 +120,7 @@ class Ros1Parser {
       index_at_ = number_of<std::uint64_t>(header, "index_pos").value_or(0);
     } else if (*op == op_connection) {
       const auto id = number_of<std::uint32_t>(header, "conn");
-      const auto inner = header_of(data);
+      const auto inner = fields_of(data);
       const std::string topic = text_of(header, "topic");
       if (!id || !inner || topic.empty()) return false;
       connections_[*id] = collector.topic(topic, text_of(*inner, "type"), MessageEncoding::ros1);
@@ -155,10 +155,10 @@ MessageSource parse_ros1_bag(std::string bytes, const std::string& name) {
   const auto storage = std::make_shared<std::deque<std::string>>();  // addresses stay
   storage->push_back(std::move(bytes));
   const std::string_view all = storage->front();
-  if (!all.starts_with(magic)) throw Error("is not of version 2.0; convert it with `rosbag fix` or `rosbag reindex`", name);
+  if (!all.starts_with(ros1_magic)) throw Error("is not of version 2.0; convert it with `rosbag fix` or `rosbag reindex`", name);
   Ros1Parser parser(*storage);
   try {
-    const bool whole = parser.records(all.substr(magic.size()), false);
+    const bool whole = parser.records(all.substr(ros1_magic.size()), false);
     if (!whole || parser.lacks_index(all.size()))
       parser.collector.warnings.push_back(
           cut_off_warning(all.size(), whole ? all.size() : parser.cut_at(), parser.first_ns(), parser.last_ns()));

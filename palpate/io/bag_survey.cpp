@@ -82,7 +82,7 @@ const SurveyedTopic* camera_info_of(const BagSurvey& survey, const std::string& 
 }
 
 /// Grey pictures that are named a mask, of the same camera.
-const SurveyedTopic* mask_of(const BagSurvey& survey, const std::string& image) {
+const SurveyedTopic* mask_topic_of(const BagSurvey& survey, const std::string& image) {
   const SurveyedTopic* best = nullptr;
   for (const SurveyedTopic& topic : survey.topics) {
     if (topic.use != "grey images" || topic.messages == 0 || topic.name.find("mask") == std::string::npos) continue;
@@ -125,7 +125,7 @@ std::string skeleton(const BagSurvey& survey, const std::vector<std::string>& fr
   for (const SurveyedTopic& topic : survey.topics) {
     if (topic.messages == 0) continue;
     if (topic.use == "depth images" && !is_repeated(survey, topic)) {
-      const SurveyedTopic *info = camera_info_of(survey, topic.name), *mask = mask_of(survey, topic.name);
+      const SurveyedTopic *info = camera_info_of(survey, topic.name), *mask = mask_topic_of(survey, topic.name);
       depth += "    - {image: " + topic.name + ", info: " + (info ? info->name : std::string(fill_in)) +
                (mask ? ", mask: " + mask->name : "") + ", noise: {model: constant, sigma_m: 0.003}}   # check: noise of the sensor\n";
     }

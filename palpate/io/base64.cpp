@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-constexpr std::array<std::int8_t, 256> values = [] {
+constexpr std::array<std::int8_t, 256> value_of_letter = [] {
   std::array<std::int8_t, 256> table{};
   table.fill(-1);
   for (std::size_t i = 0; i < alphabet.size(); ++i)
@@ -47,7 +47,7 @@ std::optional<std::string> base64_decoded(std::string_view text) {
       flush();
       continue;
     }
-    const int value = values[static_cast<unsigned char>(letter)];
+    const int value = value_of_letter[static_cast<unsigned char>(letter)];
     if (value < 0) return std::nullopt;
     group |= static_cast<std::uint32_t>(value) << (18 - 6 * letters);
     if (++letters == 4) flush();

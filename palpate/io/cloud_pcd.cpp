@@ -20,7 +20,7 @@ struct Field {
   std::size_t count = 1;
 };
 
-struct Header {
+struct PcdHeader {
   std::vector<Field> fields;
   std::size_t width = 0, height = 1, points = 0;
   std::string data;
@@ -31,8 +31,8 @@ struct Header {
   }
 };
 
-Header parse_header(Scanner& file) {
-  Header header;
+PcdHeader parse_pcd_header(Scanner& file) {
+  PcdHeader header;
   bool has_points = false;
   while (header.data.empty()) {
     std::string_view line = file.line();
@@ -138,7 +138,7 @@ std::string unpacked(std::string_view packed, std::size_t size, const Scanner& f
   return out;
 }
 
-MatrixX read_values(Scanner& file, const Header& header) {
+MatrixX read_values(Scanner& file, const PcdHeader& header) {
   const std::size_t point_bytes = header.point_bytes();
   std::size_t numbers_a_point = 0;
   for (const Field& field : header.fields) numbers_a_point += field.count;
@@ -190,7 +190,7 @@ MatrixX read_values(Scanner& file, const Header& header) {
   return values;
 }
 
-std::string header_of(const CloudColumns& columns, const char* data) {
+std::string pcd_header(const CloudColumns& columns, const char* data) {
   std::string fields, sizes, types, counts;
   for (const std::string& name : columns.names) {
     const bool normal = name.size() == 2 && name[0] == 'n';
@@ -208,7 +208,7 @@ std::string header_of(const CloudColumns& columns, const char* data) {
 
 PointCloud read_pcd(std::string_view bytes, const std::string& name) {
   Scanner file(bytes, name);
-  const Header header = parse_header(file);
+  const PcdHeader header = parse_pcd_header(file);
   std::vector<std::string> names;
   for (const Field& field : header.fields) names.push_back(field.name);
   PointCloud cloud = cloud_from_columns(names, read_values(file, header), name);
@@ -228,7 +228,7 @@ PointCloud read_pcd(std::string_view bytes, const std::string& name) {
 
 std::string write_pcd(const PointCloud& cloud) {
   const CloudColumns columns = columns_of(cloud);
-  std::string out = header_of(columns, "binary");
+  std::string out = pcd_header(columns, "binary");
   for (Eigen::Index i = 0; i < columns.values.rows(); ++i) {
     for (Eigen::Index k = 0; k < columns.values.cols(); ++k) store(out, columns.values(i, k));
   }
@@ -237,7 +237,7 @@ std::string write_pcd(const PointCloud& cloud) {
 
 std::string write_pcd_ascii(const PointCloud& cloud) {
   const CloudColumns columns = columns_of(cloud);
-  std::string out = header_of(columns, "ascii");
+  std::string out = pcd_header(columns, "ascii");
   for (Eigen::Index i = 0; i < columns.values.rows(); ++i) {
     for (Eigen::Index k = 0; k < columns.values.cols(); ++k) {
       fmt::format_to(std::back_inserter(out), "{}{}", columns.values(i, k), k + 1 == columns.values.cols() ? '\n' : ' ');

@@ -15,7 +15,7 @@
 namespace palpate::io {
 namespace {
 
-constexpr std::string_view magic = "\x89MCAP0\r\n";
+constexpr std::string_view mcap_magic = "\x89MCAP0\r\n";
 enum Opcode : std::uint8_t {
   op_header = 0x01,
   op_footer = 0x02,
@@ -176,9 +176,9 @@ McapFile McapFile::parse(std::string bytes, const std::string& name) {
   McapFile file;
   file.storage_.push_back(std::move(bytes));
   const std::string_view all = file.storage_.front();
-  if (all.substr(0, magic.size()) != magic) throw Error("does not start as an MCAP file does", name);
+  if (all.substr(0, mcap_magic.size()) != mcap_magic) throw Error("does not start as an MCAP file does", name);
   McapParser parser(file);
-  const bool whole = parser.records(all.substr(magic.size()), false);
+  const bool whole = parser.records(all.substr(mcap_magic.size()), false);
   if (!parser.has_header()) throw Error("is cut off before its first record; record it again", name);
   // A channel that was lost with a damaged chunk is found in the summary, if there is one.
   const auto orphans = std::remove_if(file.messages.begin(), file.messages.end(),
@@ -196,14 +196,14 @@ McapFile McapFile::parse(std::string bytes, const std::string& name) {
     const auto time = [&](const McapMessage& one) { return static_cast<std::int64_t>(one.log_time_ns); };
     const bool any = !file.messages.empty();
     file.warnings.insert(file.warnings.begin(),
-                         cut_off_warning(all.size(), magic.size() + parser.cut_at(),
+                         cut_off_warning(all.size(), mcap_magic.size() + parser.cut_at(),
                                          any ? std::optional(time(file.messages.front())) : std::nullopt,
                                          any ? std::optional(time(file.messages.back())) : std::nullopt));
   }
   return file;
 }
 
-McapWriter::McapWriter(std::string profile, Compression compression) : compression_(compression), out_(magic) {
+McapWriter::McapWriter(std::string profile, Compression compression) : compression_(compression), out_(mcap_magic) {
   std::string content;
   text_field(content, profile);
   text_field(content, "palpate");
@@ -378,7 +378,7 @@ std::string McapWriter::finish() {
   store(footer, summary_offsets);
   out_ += footer;
   store(out_, checksum(std::string_view(out_).substr(summary)));
-  out_ += magic;
+  out_ += mcap_magic;
   return std::move(out_);
 }
 

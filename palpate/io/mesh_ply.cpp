@@ -10,7 +10,7 @@
 namespace palpate::io {
 namespace {
 
-std::string header_of(const MeshData& mesh, const char* format) {
+std::string mesh_header(const MeshData& mesh, const char* format) {
   return fmt::format(
       "ply\nformat {} 1.0\ncomment metres\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n"
       "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
@@ -40,7 +40,7 @@ MeshData read_ply_mesh(std::string_view bytes, const std::string& name) {
 }
 
 std::string write_ply_mesh(const MeshData& mesh) {
-  std::string out = header_of(mesh, "binary_little_endian");
+  std::string out = mesh_header(mesh, "binary_little_endian");
   for (Eigen::Index i = 0; i < mesh.points_m.rows(); ++i) {
     for (int axis = 0; axis < 3; ++axis) store(out, mesh.points_m(i, axis));
   }
@@ -52,7 +52,7 @@ std::string write_ply_mesh(const MeshData& mesh) {
 }
 
 std::string write_ply_mesh_ascii(const MeshData& mesh) {
-  std::string out = header_of(mesh, "ascii");
+  std::string out = mesh_header(mesh, "ascii");
   for (Eigen::Index i = 0; i < mesh.points_m.rows(); ++i) {
     fmt::format_to(std::back_inserter(out), "{} {} {}\n", mesh.points_m(i, 0), mesh.points_m(i, 1), mesh.points_m(i, 2));
   }

@@ -13,7 +13,7 @@ namespace palpate::io {
 namespace {
 
 constexpr std::string_view npy_magic = "\x93NUMPY";
-constexpr std::int64_t largest_side = 100000000;
+constexpr std::int64_t largest_array_side = 100000000;
 
 }  // namespace
 
@@ -42,7 +42,7 @@ MatrixX parse_npy(std::string_view bytes, const std::string& name) {
   const auto rows = parse_whole(trimmed(shape.substr(0, comma)));
   const std::string_view second = comma == std::string_view::npos ? "" : trimmed(shape.substr(comma + 1));
   const auto columns = second.empty() ? std::optional<std::int64_t>(1) : parse_whole(second);
-  if (!rows || !columns || *rows < 1 || *columns < 1 || *rows > largest_side || *columns > largest_side) {
+  if (!rows || !columns || *rows < 1 || *columns < 1 || *rows > largest_array_side || *columns > largest_array_side) {
     file.fail("the array has shape (" + std::string(shape.substr(0, 40)) + "); one or two dimensions are read");
   }
   const auto count = static_cast<std::size_t>(*rows * *columns);

@@ -36,15 +36,15 @@ struct Property {
   Type type = Type::float32;
 };
 
-struct Header {
+struct PlyHeader {
   bool ascii = false;
   std::endian order = std::endian::little;
   std::vector<PlyElement> elements;
   std::vector<std::vector<Property>> properties;
 };
 
-Header parse_header(Scanner& file) {
-  Header header;
+PlyHeader parse_ply_header(Scanner& file) {
+  PlyHeader header;
   if (trimmed(file.line()) != "ply") {
     file.seek(0);
     file.fail("does not start with 'ply'; it is not a PLY file");
@@ -94,7 +94,7 @@ Header parse_header(Scanner& file) {
 }
 
 /// One value of either kind of file.
-double next_value(Scanner& file, const Header& header, Type type) {
+double next_value(Scanner& file, const PlyHeader& header, Type type) {
   if (header.ascii) {
     const std::string_view text = file.word("a value");
     const auto value = parse_number(text);  // may be nan: whoever needs the value judges it
@@ -123,7 +123,7 @@ double next_value(Scanner& file, const Header& header, Type type) {
   return 0;
 }
 
-Index next_index(Scanner& file, const Header& header, Type type) {
+Index next_index(Scanner& file, const PlyHeader& header, Type type) {
   const double value = next_value(file, header, type);
   if (!(value >= 0 && value <= std::numeric_limits<Index>::max()) ||
       value != static_cast<double>(static_cast<Index>(value))) {
@@ -132,7 +132,7 @@ Index next_index(Scanner& file, const Header& header, Type type) {
   return static_cast<Index>(value);
 }
 
-void read_element(Scanner& file, const Header& header, const std::vector<Property>& properties, PlyElement& element) {
+void read_element(Scanner& file, const PlyHeader& header, const std::vector<Property>& properties, PlyElement& element) {
   std::size_t least = 0;  // bytes of one row, at least
   for (const Property& property : properties) {
     least += header.ascii ? 2 : property.is_list ? size_of(property.count_type) : size_of(property.type);
@@ -176,7 +176,7 @@ std::optional<Eigen::Index> PlyElement::column(std::string_view property) const 
 
 std::vector<PlyElement> parse_ply(std::string_view bytes, const std::string& name) {
   Scanner file(bytes, name);
-  Header header = parse_header(file);
+  PlyHeader header = parse_ply_header(file);
   for (std::size_t i = 0; i < header.elements.size(); ++i)
     read_element(file, header, header.properties[i], header.elements[i]);
   return std::move(header.elements);

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr const char* index_name = "recording.yaml";
-constexpr const char* format_name = "palpate-recording/1";
+constexpr const char* recording_format = "palpate-recording/1";
 
 void read_density(YamlKeys& keys, Recording& recording) {
   const auto field = keys.optional("density_kg_m3");
@@ -142,11 +142,11 @@ Recording read_recording_unchecked(const fs::path& given) {
   const std::string bytes = context.folder.read(index.filename().string(), index.string());
   const YamlField top = YamlField::parse(bytes, index.string());
   YamlKeys keys(top);
-  const YamlField format = keys.required("format", std::string("write 'format: ") + format_name + "'");
-  if (format.text() != format_name) {
+  const YamlField format = keys.required("format", std::string("write 'format: ") + recording_format + "'");
+  if (format.text() != recording_format) {
     if (format.text().starts_with("palpate-mapping/"))
       format.fail("this is the mapping of a bag; name the bag in its place, and this as its mapping (`--mapping`) unless it is mapping.yaml beside the bag");
-    format.fail("'" + format.text().substr(0, 60) + "' is not a format that this version reads; it reads " + format_name);
+    format.fail("'" + format.text().substr(0, 60) + "' is not a format that this version reads; it reads " + recording_format);
   }
   recording.source = given.string();
   const auto markers = keys.optional("markers");

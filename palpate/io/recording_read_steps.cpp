@@ -25,7 +25,7 @@ const Tool* find_tool(const Recording& recording, const std::string& name) {
   return nullptr;
 }
 
-std::vector<std::string> tool_names(const Recording& recording) {
+std::vector<std::string> stated_tools(const Recording& recording) {
   std::vector<std::string> names;
   for (const Tool& tool : recording.tools) names.push_back(tool.name);
   return names;
@@ -34,7 +34,7 @@ std::vector<std::string> tool_names(const Recording& recording) {
 std::string tool_of(YamlKeys& keys, const Step& step, const RecordingContext& context) {
   if (const auto field = keys.optional("tool")) {
     const std::string name = field->text();
-    if (find_tool(context.recording, name) == nullptr) field->fail_name("tool", "tools", tool_names(context.recording));
+    if (find_tool(context.recording, name) == nullptr) field->fail_name("tool", "tools", stated_tools(context.recording));
     return name;
   }
   return step.loads.size() == 1 ? step.loads.front().tool : "";
@@ -341,7 +341,7 @@ Load read_load(const YamlField& field, const TableRow* row, bool alone, const Re
   const YamlField name = keys.required("tool");
   load.tool = name.text();
   const Tool* tool = find_tool(context.recording, load.tool);
-  if (tool == nullptr) name.fail_name("tool", "tools", tool_names(context.recording));
+  if (tool == nullptr) name.fail_name("tool", "tools", stated_tools(context.recording));
   const auto number = [&](const char* column) {
     return row != nullptr ? row->number(column_of(*row, load.tool, alone, column)) : std::nullopt;
   };

@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* format_name = "palpate-result/1";
+constexpr const char* result_format = "palpate-result/1";
 constexpr std::array<std::pair<const char*, Termination>, 5> termination_names = {
     {{"converged", Termination::converged},
      {"max_iterations", Termination::max_iterations},
@@ -268,7 +268,7 @@ auto all_of(const json& array, Read read) {
 
 json result_json(const Identification& answer) {
   json object;
-  object["format"] = format_name;
+  object["format"] = result_format;
   object["method"] = answer.method;
   object["material"] = answer.material;
   object["parameters"] = array_from(answer.parameters);
@@ -307,8 +307,8 @@ Identification parse_result(const std::string& bytes, const std::string& name) {
       at = key;
       return object.at(key);
     };
-    if (part("format") != format_name) {
-      throw Error("its format is not " + std::string(format_name), name + ": format");
+    if (part("format") != result_format) {
+      throw Error("its format is not " + std::string(result_format), name + ": format");
     }
     Identification answer;
     answer.method = part("method");

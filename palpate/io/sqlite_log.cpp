@@ -10,7 +10,7 @@ namespace palpate::io {
 namespace {
 
 constexpr std::size_t log_header = 32, frame_header = 24;
-constexpr std::uint32_t magic = 0x377f0682;  // or one more: check sums over words whose first byte is the highest
+constexpr std::uint32_t log_magic = 0x377f0682;  // or one more: check sums over words whose first byte is the highest
 
 std::uint32_t word(std::string_view bytes, std::size_t at) { return load<std::uint32_t>(bytes.data() + at, std::endian::big); }
 
@@ -30,7 +30,7 @@ struct CheckSum {
 }  // namespace
 
 std::optional<std::size_t> fold_in_log(std::string& database, std::string_view log) {
-  if (log.size() < log_header || (word(log, 0) | 1U) != (magic | 1U)) return std::nullopt;
+  if (log.size() < log_header || (word(log, 0) | 1U) != (log_magic | 1U)) return std::nullopt;
   const std::size_t page = word(log, 8);
   CheckSum sum{(word(log, 0) & 1U) != 0 ? std::endian::big : std::endian::little};
   sum.add(log.substr(0, 24));

@@ -23,7 +23,7 @@ Vec3 as_read(Vec3 value, double unit, const Vec3& range) {
 
 // Every number with its source, or that it has none: docs/lab.md, "Where the numbers come from". Ranges and resolutions are the
 // makers' where a source is named; no sheet that could be had states noise, drift or cross-talk.
-constexpr std::array<ForceSensorModel, 4> table{{
+constexpr std::array<ForceSensorModel, 4> sensor_table{{
     {"generic", "a good strain-gauge sensor without cross-talk", {}},
     {"schunk_ftcl_050", "range 300 N: Frank et al. 2010, section V; the rest has no source: assumed",
      {.sigma_n = 0.08, .unit_n = 0.05, .range_n = 300, .range_along_n = 300, .bias_n = 1.0, .drift_n_s = 0.0003, .scale_std = 0.015,
@@ -40,11 +40,11 @@ constexpr std::array<ForceSensorModel, 4> table{{
 
 }  // namespace
 
-std::span<const ForceSensorModel> force_sensors() { return table; }
+std::span<const ForceSensorModel> force_sensors() { return sensor_table; }
 
 ForceSensorOptions force_sensor(std::string_view name) {
   std::string names;
-  for (const ForceSensorModel& row : table) {
+  for (const ForceSensorModel& row : sensor_table) {
     if (row.name == name) return row.options;
     names += (names.empty() ? "" : ", ") + std::string(row.name);
   }

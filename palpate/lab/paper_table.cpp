@@ -12,7 +12,7 @@ namespace {
 
 constexpr double degree = 3.14159265358979323846 / 180;
 
-constexpr std::array<PaperScene, 8> table{{
+constexpr std::array<PaperScene, 8> scene_table{{
     {.name = "cow",
      .title = "Simulated test on a four-legged animal",
      .figures = "3, 4",
@@ -137,12 +137,12 @@ constexpr std::array<PaperFault, 3> faults{{
 
 }  // namespace
 
-std::span<const PaperScene> paper_scenes() { return table; }
+std::span<const PaperScene> paper_scenes() { return scene_table; }
 std::span<const PaperFault> paper_faults() { return faults; }
 
 const PaperScene& paper_scene(std::string_view name) {
   std::string names;
-  for (const PaperScene& scene : table) {
+  for (const PaperScene& scene : scene_table) {
     if (scene.name == name) return scene;
     names += (names.empty() ? "" : ", ") + std::string(scene.name);
   }

@@ -15,8 +15,8 @@
 namespace palpate::reconstruction {
 namespace {
 
-constexpr int most_cubes_across = 64;   // of the seen part's diagonal
-constexpr double close_cubes = 2.5;     // to a facet: its side is known there
+constexpr int cubes_across = 64;   // of the seen part's diagonal
+constexpr double known_cubes = 2.5;     // to a facet: its side is known there
 constexpr double before_facet = 0.5;    // of the distance, along the normal: beside its rim nothing is known
 constexpr double little = 0.3;          // of the field, either way from one half, is what other completions dare
 constexpr double gently = 0.02;         // drawn to the planar completion, within the root of one over this, in cubes
@@ -32,7 +32,7 @@ Cubes lay_cubes(const TriMesh& held, const FusedViews& fused, const FuseOptions&
     const Vec3 p = out.axes.transpose() * middle_of(held, t);
     low = low.cwiseMin(p), high = high.cwiseMax(p);
   }
-  out.h = std::max(0.5 * fused.cell_m, (high - low).norm() / most_cubes_across);
+  out.h = std::max(0.5 * fused.cell_m, (high - low).norm() / cubes_across);
   const Vec3 margin = Vec3::Constant(2 * out.h);
   low -= margin, high += margin;
   if (options.support) low.z() = up.dot(options.support->point_m);
@@ -103,7 +103,7 @@ std::function<double(const Vec3&)> hidden_field(const FusedViews& fused, const F
   const geometry::TriangleTree to_held(held);
   std::vector<Known> known(cubes.count(), Known::nothing);
   VectorX drawn_to = VectorX::Zero(static_cast<Index>(cubes.count()));
-  const double reach_m2 = std::pow(close_cubes * cubes.h, 2);
+  const double reach_m2 = std::pow(known_cubes * cubes.h, 2);
   cubes.each([&](int x, int y, int z) {
     const Vec3 p = cubes.middle(x, y, z);
     const std::size_t k = cubes.at(x, y, z);

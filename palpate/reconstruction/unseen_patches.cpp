@@ -13,7 +13,7 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double stands_within = 0.1;   // of the reach, above the support
+constexpr double stands_within_reach = 0.1;   // of the reach, above the support
 constexpr int rounds = 3;              // edges that were stretched count anew
 constexpr double shortest_edge = 0.2;  // of the reach: marching leaves slivers, which would count without bound
 constexpr int halvings = 4;            // of a way that ends in free space
@@ -53,7 +53,7 @@ Places places_of(const TriMesh& surface, const Grid& facets, double reach_m, con
   std::vector<Index> far(count, -1);
   for (std::size_t v = 0; v < count; ++v) {
     const Vec3 p = surface.vertices_m.row(static_cast<Index>(v)).transpose();
-    if (support && support->normal.dot(p - support->point_m) < stands_within * reach_m) continue;
+    if (support && support->normal.dot(p - support->point_m) < stands_within_reach * reach_m) continue;
     if (!facets.any_around(p, [&](Index i) { return (facets.point(i) - p).squaredNorm() < reach_m * reach_m; })) far[v] = 0;
   }
   leave_alone_what_nothing_holds(surface, far);

@@ -244,17 +244,17 @@ class Joint {
   bool free_ = true;
 };
 
-void require(bool ok, const char* field, const char* bounds) {
+void require_views(bool ok, const char* field, const char* bounds) {
   if (!ok) throw Error(bounds, std::string("ViewsOptions: ") + field);
 }
 
 }  // namespace
 
 void check(const ViewsOptions& o) {
-  require(o.cell_m >= 0 && std::isfinite(o.cell_m), "cell_m", "must be a length, or 0");
-  require(o.reject_m >= 0 && std::isfinite(o.reject_m), "reject_m", "must be a length, or 0");
-  require(o.reject_angle_rad > 0 && o.reject_angle_rad <= M_PI, "reject_angle_rad", "must lie within 0 and pi");
-  require(o.max_iterations >= 1, "max_iterations", "must be at least 1");
+  require_views(o.cell_m >= 0 && std::isfinite(o.cell_m), "cell_m", "must be a length, or 0");
+  require_views(o.reject_m >= 0 && std::isfinite(o.reject_m), "reject_m", "must be a length, or 0");
+  require_views(o.reject_angle_rad > 0 && o.reject_angle_rad <= M_PI, "reject_angle_rad", "must lie within 0 and pi");
+  require_views(o.max_iterations >= 1, "max_iterations", "must be at least 1");
 }
 
 ViewsResult align_views(const std::vector<PointCloud>& clouds, const ViewsOptions& options) {

@@ -14,7 +14,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::driver_robot_test {
 namespace {
 
 using testing::HasSubstr;
@@ -231,4 +231,4 @@ TEST_F(DriverRobotTest, WhatCannotBeIsNamed) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::driver_robot_test

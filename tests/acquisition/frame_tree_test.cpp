@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::frame_tree_test {
 namespace {
 
 TEST(FrameTree, InterpolatesAndClosesThePath) {
@@ -48,4 +48,4 @@ TEST(FrameTree, TimesAreThoseOfTheLinksThatMoveInBetween) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::frame_tree_test

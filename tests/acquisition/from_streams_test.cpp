@@ -12,14 +12,14 @@
 #include "palpate/acquisition/repeated_notes.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::from_streams_test {
 namespace {
 
 using namespace palpate::acquisition::test;
 using testing::HasSubstr;
 
 TEST(FromStreams, FindsThePushItsStepsAndItsUnloading) {
-  const FromStreams made = recording_from(plan(), lab());
+  const FromStreams made = recording_from(stream_plan(), lab());
   ASSERT_EQ(made.recording.pushes.size(), 1u);
   const Push& push = made.recording.pushes[0];
   // Before, four stages down, one up, after.
@@ -58,7 +58,7 @@ TEST(FromStreams, FindsThePushItsStepsAndItsUnloading) {
 TEST(FromStreams, ADriftBetweenTheFreeAirBeforeAndAfterIsTakenOff) {
   LabOptions drifts;
   drifts.drift_n_s = Vec3(0.01, -0.02, 0.01);
-  const Push still = recording_from(plan(), lab()).recording.pushes.at(0), made = recording_from(plan(), lab(drifts)).recording.pushes.at(0);
+  const Push still = recording_from(stream_plan(), lab()).recording.pushes.at(0), made = recording_from(stream_plan(), lab(drifts)).recording.pushes.at(0);
   ASSERT_EQ(made.steps.size(), still.steps.size());
   for (std::size_t i = 1; i + 1 < made.steps.size(); ++i)
     EXPECT_LT((*made.steps[i].loads.at(0).force_n - *still.steps[i].loads.at(0).force_n).norm(), 0.012) << "a sample's worth of tare's noise";
@@ -67,8 +67,8 @@ TEST(FromStreams, ADriftBetweenTheFreeAirBeforeAndAfterIsTakenOff) {
 
   LabOptions much = drifts;
   much.drift_n_s *= 5;
-  EXPECT_THAT(recording_from(plan(), lab(much)).notes, testing::Contains(HasSubstr("the zero of the force moved by")));
-  StreamPlan kept = plan();
+  EXPECT_THAT(recording_from(stream_plan(), lab(much)).notes, testing::Contains(HasSubstr("the zero of the force moved by")));
+  StreamPlan kept = stream_plan();
   kept.tare = Tare::between;
   kept.tare_to_s = 2;
   const Push by_hand = recording_from(kept, lab(drifts)).recording.pushes.at(0);
@@ -78,10 +78,10 @@ TEST(FromStreams, ADriftBetweenTheFreeAirBeforeAndAfterIsTakenOff) {
 TEST(FromStreams, AForceOnTheObjectKeepsItsSign) {
   SensorStreams streams = lab();
   for (WrenchSample& one : streams.wrenches) one.force_n = -one.force_n;
-  StreamPlan on_object = plan();
+  StreamPlan on_object = stream_plan();
   on_object.force_on_object = true;
   EXPECT_NEAR(recording_from(on_object, streams).recording.pushes[0].steps[4].loads[0].force_n->z(), -8, 0.02);
-  StreamPlan wrong = plan();
+  StreamPlan wrong = stream_plan();
   try {
     recording_from(wrong, streams);
     FAIL() << "a force of the wrong sign is no contact";
@@ -91,7 +91,7 @@ TEST(FromStreams, AForceOnTheObjectKeepsItsSign) {
 }
 
 TEST(FromStreams, TimesAndMarksChooseTheSteps) {
-  StreamPlan times = plan();
+  StreamPlan times = stream_plan();
   times.steps_by = StepsBy::times;
   PlannedPush push = times.any_push;
   push.name = "head";
@@ -107,7 +107,7 @@ TEST(FromStreams, TimesAndMarksChooseTheSteps) {
   EXPECT_TRUE(steps[3].unloading);
   EXPECT_EQ(made.recording.pushes[0].site, "head");
 
-  StreamPlan marks = plan();
+  StreamPlan marks = stream_plan();
   marks.steps_by = StepsBy::marks;
   marks.pushes = {push};
   SensorStreams streams = lab();
@@ -120,7 +120,7 @@ TEST(FromStreams, TimesAndMarksChooseTheSteps) {
 }
 
 TEST(FromStreams, PushesAndContactsThatAreNotAsManyAreSaid) {
-  StreamPlan described = plan();
+  StreamPlan described = stream_plan();
   described.pushes = {described.any_push};
   described.pushes[0].name = "head";
   EXPECT_TRUE(recording_from(described, lab()).notes.empty());
@@ -133,7 +133,7 @@ TEST(FromStreams, PushesAndContactsThatAreNotAsManyAreSaid) {
 }
 
 TEST(FromStreams, AForceOnItsWayIsThatOfTheImage) {
-  StreamPlan moving = plan();
+  StreamPlan moving = stream_plan();
   moving.steps_by = StepsBy::times;
   moving.pushes = {moving.any_push};
   moving.pushes[0].name = "away";
@@ -153,7 +153,7 @@ TEST(FromStreams, AForceOnItsWayIsThatOfTheImage) {
 }
 
 TEST(FromStreams, ATareWhereNothingWasMeasuredIsRefused) {
-  StreamPlan wrong = plan();
+  StreamPlan wrong = stream_plan();
   wrong.tare = Tare::between;
   wrong.tare_from_s = 1000;
   wrong.tare_to_s = 1001;
@@ -173,7 +173,7 @@ TEST(FromStreams, TheToolsWeightIsTakenOffWhateverTheSensorReports) {
   const Vec3 weight(0, 0, -2 * 9.81);
   const Mat3 R_tip_sensor = streams.frames[1].samples[0].T_parent_child.linear();
   for (WrenchSample& sample : streams.wrenches) sample.force_n += (tip_at(sample.time_s).linear() * R_tip_sensor).transpose() * weight;
-  StreamPlan heavy = plan();
+  StreamPlan heavy = stream_plan();
   heavy.tare = Tare::none;
   heavy.tool_mass_kg = 2;
   const auto on_sensor = recording_from(heavy, streams).recording.pushes.at(0);
@@ -206,7 +206,7 @@ TEST(FromStreams, CloudsComeIntoTheBaseFrame) {
     return cloud;
   };
   streams.clouds.push_back(clouds);
-  const auto steps = recording_from(plan(), streams).recording.pushes.at(0).steps;
+  const auto steps = recording_from(stream_plan(), streams).recording.pushes.at(0).steps;
   std::size_t seen = 0;
   for (const Step& step : steps) {
     for (const Observation& one : step.observations) {
@@ -231,25 +231,25 @@ TEST(FromStreams, WhatIsMissingIsSaidWithACure) {
     }
     return "nothing";
   };
-  StreamPlan other = plan();
+  StreamPlan other = stream_plan();
   other.tip_frame = "flange";
   EXPECT_THAT(message(other, lab()), testing::AllOf(HasSubstr("'flange'"), HasSubstr("base, camera, sensor, tip")));
   SensorStreams moving = lab();
-  StreamPlan patient = plan();
+  StreamPlan patient = stream_plan();
   patient.hold_s = 5;
   EXPECT_THAT(message(patient, moving), HasSubstr("stood still"));
   moving.cameras[0].image = [](std::size_t) -> DepthImage { throw Error("is damaged", "m"); };
-  const FromStreams made = recording_from(plan(), moving);
+  const FromStreams made = recording_from(stream_plan(), moving);
   EXPECT_THAT(made.notes, testing::Contains(HasSubstr("is damaged")));
   EXPECT_EQ(made.recording.pushes[0].steps.size(), 7u) << "the steps have their force and travel still";
 }
 
 TEST(FromStreams, StepsWithoutAnImageAreSaidOnceWithTheWorst) {
   SensorStreams streams = lab();
-  const std::size_t steps = recording_from(plan(), streams).recording.pushes.at(0).steps.size();
+  const std::size_t steps = recording_from(stream_plan(), streams).recording.pushes.at(0).steps.size();
   DepthStream& camera = streams.cameras[0];
   camera.times_s = {camera.times_s.back() + 100};
-  const FromStreams made = recording_from(plan(), streams);
+  const FromStreams made = recording_from(stream_plan(), streams);
   const std::vector<Step>& all = made.recording.pushes.at(0).steps;
   ASSERT_EQ(all.size(), steps);
   EXPECT_THAT(made.notes, testing::ElementsAre(testing::AllOf(
@@ -263,7 +263,7 @@ TEST(FromStreams, AStepWithoutALoadIsWhereThePictureIs) {
   SensorStreams streams = lab();
   streams.cameras[0].times_s = {1.5, 2.6, 7.9, 11.9, 15.9, 19.9, 23.9, 29.2};
   streams.cameras[0].image = [times = streams.cameras[0].times_s](std::size_t i) { return picture(times[i]); };
-  const FromStreams made = recording_from(plan(), streams);
+  const FromStreams made = recording_from(stream_plan(), streams);
   EXPECT_TRUE(made.notes.empty()) << made.notes.front();
   const std::vector<Step>& steps = made.recording.pushes.at(0).steps;
   ASSERT_EQ(steps.size(), 7u);
@@ -277,7 +277,7 @@ TEST(FromStreams, AStepWithoutALoadIsWhereThePictureIs) {
   }
   // A picture while it still touches, or is hardly off it, is none of the object at rest.
   streams.cameras[0].times_s.back() = 24.99;
-  EXPECT_THAT(recording_from(plan(), streams).notes, testing::Contains(HasSubstr("no image within")));
+  EXPECT_THAT(recording_from(stream_plan(), streams).notes, testing::Contains(HasSubstr("no image within")));
 }
 
 TEST(FindContacts, ADriftingBiasIsTaredAnewForEachPush) {
@@ -289,7 +289,7 @@ TEST(FindContacts, ADriftingBiasIsTaredAnewForEachPush) {
     track.samples.push_back({time, Vec3(0.02 * time, 0, -pressing - 0.01 * time), Vec3(0, 0, -depth)});
     track.direction.push_back(-Vec3::UnitZ());
   }
-  const auto spans = find_contacts(track, plan());
+  const auto spans = find_contacts(track, stream_plan());
   ASSERT_EQ(spans.size(), 2u);
   EXPECT_NEAR(spans[0].tare_n.z(), -0.01 * 9.4, 0.005);
   EXPECT_NEAR(spans[1].tare_n.z(), -0.01 * 39.4, 0.005);
@@ -315,7 +315,7 @@ TEST(FindContacts, ASlowRiseIsNotTakenForFreeAir) {
       track.samples.push_back({time, Vec3(-0.3, -0.7, bias_n - pressing) + noise_n * noise, Vec3(0, 0, -depth_m(time))});
       track.direction.push_back(-Vec3::UnitZ());
     }
-    const auto spans = find_contacts(track, plan());
+    const auto spans = find_contacts(track, stream_plan());
     ASSERT_EQ(spans.size(), 1u) << rate_n_s;
     EXPECT_NEAR(spans[0].tare_n.z(), bias_n, 0.04) << rate_n_s << ": 35 samples of 0.055 N";
     EXPECT_LT(spans[0].free_air_std_n, 1.5 * noise_n) << rate_n_s;
@@ -335,11 +335,11 @@ TEST(FindContacts, AnOnsetThatWasNoneIsForgottenWhereTheToolWentElsewhere) {
                              Vec3(aside_m, 0, -lowered_m - depth_m)});
     track.direction.push_back(-Vec3::UnitZ());
   }
-  const auto spans = find_contacts(track, plan());
+  const auto spans = find_contacts(track, stream_plan());
   ASSERT_EQ(spans.size(), 1u);
   EXPECT_NEAR(track.samples[spans[0].begin].time_s, 20, 0.2);
   EXPECT_NEAR(spans[0].tare_n.z(), -0.15, 0.01);
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::from_streams_test

@@ -85,7 +85,7 @@ inline SensorStreams lab(const LabOptions& options = {}) {
   return streams;
 }
 
-inline StreamPlan plan() {
+inline StreamPlan stream_plan() {
   StreamPlan plan;
   plan.base_frame = "base";
   plan.tip_frame = "tip";

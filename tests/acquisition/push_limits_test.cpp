@@ -8,7 +8,7 @@
 
 #include "acquisition/spring_robot.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::push_limits_test {
 namespace {
 
 TEST(PushProtocol, TheStepAtTheLimitIsRecordedHoweverLowThatIs) {
@@ -159,4 +159,4 @@ TEST(PushProtocol, SoftObjectsAreFeltEveryIncrement) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::push_limits_test

@@ -10,7 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "refusals.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::push_protocol_test {
 namespace {
 
 // Which motion crosses the target is decided by what the encoders do not see of it: its own travel would read too little,
@@ -376,4 +376,4 @@ TEST(PushProtocol, BadOptionsAndPlansAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::push_protocol_test

@@ -9,7 +9,7 @@
 #include "acquisition/spring_robot.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::push_resume_test {
 namespace {
 
 Push killed_after(std::size_t steps, SpringRobot& robot) {
@@ -124,4 +124,4 @@ TEST(PushProtocol, WhatMovedInThePauseIsNotPushedAsIfItHadNot) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::push_resume_test

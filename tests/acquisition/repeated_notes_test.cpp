@@ -7,7 +7,7 @@
 
 #include <limits>
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::repeated_notes_test {
 namespace {
 
 TEST(RepeatedNotes, AreSaidOnceWithTheirCountAndTheWorst) {
@@ -29,4 +29,4 @@ TEST(RepeatedNotes, AreSaidOnceWithTheirCountAndTheWorst) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::repeated_notes_test

@@ -10,7 +10,7 @@
 
 #include "acquisition/spring_robot.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::robot_faults_test {
 namespace {
 
 enum class Fault { none, reversed, sideways, readings_stand, clock_stands, clock_goes_back, does_not_follow, dragged };
@@ -166,4 +166,4 @@ TEST(RobotFaults, ASensorThatIsSlowIsWaitedFor) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::robot_faults_test

@@ -10,7 +10,7 @@
 #include "acquisition/spring_robot.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::robot_limits_test {
 namespace {
 
 using testing::HasSubstr;
@@ -152,4 +152,4 @@ TEST(LookAround, TheUserAndAFaultStopTheRobot) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::robot_limits_test

@@ -7,14 +7,14 @@
 #include "acquisition/pressed_spring.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::stream_clocks_test {
 namespace {
 
 using namespace palpate::acquisition::test;
 using testing::HasSubstr;
 
 TEST(FromStreams, WhatEstimatedClocksLeaveIsStated) {
-  StreamPlan aligned = plan();
+  StreamPlan aligned = stream_plan();
   aligned.camera_clock.estimate = true;
   aligned.recording.time_offset_std_s = 0.003;
   const FromStreams made = recording_from(aligned, lab());
@@ -27,7 +27,7 @@ TEST(FromStreams, LateClocksAreFoundAndTakenOff) {
     LabOptions options;
     options.camera_late_s = late_s;
     options.wrench_late_s = -0.5 * late_s;
-    StreamPlan aligned = plan();
+    StreamPlan aligned = stream_plan();
     aligned.camera_clock.estimate = true;
     aligned.wrench_clock.estimate = true;
     const FromStreams made = recording_from(aligned, lab(options));
@@ -122,10 +122,10 @@ TEST(FromStreams, GivenOffsetsAreAddedToTheSensorsTimes) {
   LabOptions late;
   late.camera_late_s = 0.13;
   late.wrench_late_s = -0.21;
-  StreamPlan given = plan();
+  StreamPlan given = stream_plan();
   given.camera_clock.offset_s = -0.13;
   given.wrench_clock.offset_s = 0.21;
-  const FromStreams made = recording_from(given, lab(late)), expected = recording_from(plan(), lab());
+  const FromStreams made = recording_from(given, lab(late)), expected = recording_from(stream_plan(), lab());
   EXPECT_TRUE(made.clocks.empty());
   EXPECT_EQ(made.recording.time_offset_std_s, 0) << "a number is taken as known";
   const auto &is = made.recording.pushes.at(0).steps, &was = expected.recording.pushes.at(0).steps;
@@ -143,7 +143,7 @@ TEST(FromStreams, GivenOffsetsAreAddedToTheSensorsTimes) {
 TEST(FromStreams, AClockThatCannotBeFoundIsLeftAlone) {
   SensorStreams streams = lab();
   streams.cameras[0].image = [](std::size_t) { return DepthImage(DepthImage::Constant(48, 64, 1.0f)); };
-  StreamPlan aligned = plan();
+  StreamPlan aligned = stream_plan();
   aligned.camera_clock.estimate = true;
   const FromStreams made = recording_from(aligned, streams);
   EXPECT_FALSE(made.clocks[0].usable);
@@ -156,7 +156,7 @@ TEST(FromStreams, OneForceOfAnotherCenturyDoesNotHoldUpTheSearch) {
   late.camera_late_s = 0.13;
   SensorStreams streams = lab(late);
   streams.wrenches.insert(streams.wrenches.begin(), {-1.7e9, Vec3::Zero(), Vec3::Zero()});
-  StreamPlan aligned = plan();
+  StreamPlan aligned = stream_plan();
   aligned.camera_clock.estimate = true;
   aligned.wrench_clock.estimate = true;
   const FromStreams made = recording_from(aligned, streams);
@@ -168,7 +168,7 @@ TEST(FromStreams, OneForceOfAnotherCenturyDoesNotHoldUpTheSearch) {
 TEST(FromStreams, ACameraWithoutAnImageTellsNoClock) {
   SensorStreams streams = lab();
   streams.cameras[0].times_s.clear();
-  StreamPlan aligned = plan();
+  StreamPlan aligned = stream_plan();
   aligned.camera_clock.estimate = true;
   const FromStreams made = recording_from(aligned, streams);
   ASSERT_EQ(made.clocks.size(), 1u);
@@ -189,10 +189,10 @@ TEST(FromStreams, AClockThatCloudsCannotTellIsSaid) {
   };
   streams.cameras.clear();
   streams.clouds.push_back(clouds);
-  StreamPlan late = plan();
+  StreamPlan late = stream_plan();
   late.camera_clock.estimate = true;
   EXPECT_THAT(recording_from(late, streams).notes, testing::Contains(HasSubstr("there are clouds only")));
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::stream_clocks_test

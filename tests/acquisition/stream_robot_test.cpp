@@ -8,7 +8,7 @@
 #include "palpate/acquisition/stream_joints.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::stream_robot_test {
 namespace {
 
 using namespace palpate::acquisition::test;
@@ -56,10 +56,10 @@ TEST(FromStreams, WithoutTransformsOfTheTipTheJointsTellWhereItIs) {
   streams.joint_names = {"gripper_of_another_device", "lift"};
   for (const PoseSample& sample : tip.samples) streams.joints.push_back({sample.time_s, {0.5, height_m(sample.time_s)}});
   streams.frames.erase(streams.frames.begin());
-  StreamPlan by_joints = plan();
+  StreamPlan by_joints = stream_plan();
   by_joints.recording.robot = column();
   const auto with_joints = recording_from(by_joints, streams).recording.pushes,
-             with_frames = recording_from(plan(), lab()).recording.pushes;
+             with_frames = recording_from(stream_plan(), lab()).recording.pushes;
   ASSERT_EQ(with_joints.size(), 1u);
   ASSERT_EQ(with_joints[0].steps.size(), with_frames[0].steps.size());
   for (std::size_t i = 1; i + 1 < with_joints[0].steps.size(); ++i) {
@@ -81,7 +81,7 @@ TEST(FromStreams, PixelsOfTheRobotAreLeftOut) {
   streams.cameras[0].mask_robot = true;
   streams.cameras[0].like.camera = {64, 48, 200, 200, 31.5, 23.5, DistortionModel::none, {}};
   streams.cameras[0].image = [](std::size_t) { return DepthImage(DepthImage::Constant(48, 64, 0.5f)); };
-  StreamPlan masked = plan();
+  StreamPlan masked = stream_plan();
   masked.recording.robot = column();
   const FromStreams made = recording_from(masked, streams);
   for (const Step& step : made.recording.pushes[0].steps) {
@@ -103,7 +103,7 @@ TEST(FromStreams, PixelsOfTheRobotAreLeftOut) {
 TEST(FromStreams, ImagesWithoutARobotAreNotCalledMasked) {
   SensorStreams streams = lab();
   const auto called_masked = [&] {
-    for (const Step& step : recording_from(plan(), streams).recording.pushes.at(0).steps)
+    for (const Step& step : recording_from(stream_plan(), streams).recording.pushes.at(0).steps)
       for (const Observation& one : step.observations)
         if (const auto* frame = std::get_if<DepthFrame>(&one)) return frame->robot_is_masked;
     ADD_FAILURE() << "no image";
@@ -131,7 +131,7 @@ TEST(FromStreams, PointsOfTheRobotAreLeftOutOfClouds) {
     return cloud;
   };
   streams.clouds.push_back(clouds);
-  StreamPlan masked = plan();
+  StreamPlan masked = stream_plan();
   masked.recording.robot = column();
   const auto fewest_and_most_points = [&] {
     std::pair<Index, Index> points{1000, 0};
@@ -157,7 +157,7 @@ TEST(FromStreams, TheRobotIsMaskedWhereItStandsAndOnceAndOnlyIfItIsWanted) {
   streams.joint_names = {"gripper", "lift"};
   Pose aside = Pose::Identity();
   aside.translation() = Vec3(10, 0, 0);
-  StreamPlan masked = plan();
+  StreamPlan masked = stream_plan();
   masked.recording.robot = column();
   masked.recording.robot->links.front().name = masked.recording.robot->joints.front().parent = "root";
   streams.frames.push_back({"base", "root", true, {{0, aside}}});
@@ -227,9 +227,9 @@ SensorStreams told_by_joints() {
 
 TEST(FromStreams, AJointThatNobodyTellsHidesOnlyWhatHangsOnIt) {
   const SensorStreams streams = told_by_joints();
-  StreamPlan by_joints = plan();
+  StreamPlan by_joints = stream_plan();
   by_joints.recording.robot = column_with_finger();
-  const auto made = recording_from(by_joints, streams).recording, expected = recording_from(plan(), lab()).recording;
+  const auto made = recording_from(by_joints, streams).recording, expected = recording_from(stream_plan(), lab()).recording;
   ASSERT_EQ(made.pushes.size(), 1u);
   ASSERT_EQ(made.pushes[0].steps.size(), expected.pushes[0].steps.size());
   for (std::size_t i = 1; i + 1 < made.pushes[0].steps.size(); ++i)
@@ -253,9 +253,9 @@ TEST(FromStreams, WhatIsFixedToAKnownFrameNeedsNoJointStates) {
   T_carriage_tip.linear() = tip_at(0).linear();
   streams.frames[0].child = "carriage";
   for (PoseSample& sample : streams.frames[0].samples) sample.T_parent_child = sample.T_parent_child * T_carriage_tip.inverse();
-  StreamPlan described = plan();
+  StreamPlan described = stream_plan();
   described.recording.robot = column();
-  const auto made = recording_from(described, streams).recording, expected = recording_from(plan(), lab()).recording;
+  const auto made = recording_from(described, streams).recording, expected = recording_from(stream_plan(), lab()).recording;
   ASSERT_EQ(made.pushes.size(), 1u);
   ASSERT_EQ(made.pushes[0].steps.size(), expected.pushes[0].steps.size());
   for (std::size_t i = 1; i + 1 < made.pushes[0].steps.size(); ++i) {
@@ -280,7 +280,7 @@ TEST(FromStreams, TransformsOfTheLinksTellTheJoints) {
     sample.T_parent_child = robot.joints[0].T_parent_joint;
     sample.T_parent_child.translation().z() += height_m(sample.time_s);
   }
-  StreamPlan described = plan();
+  StreamPlan described = stream_plan();
   described.recording.robot = robot;
   const auto made = recording_from(described, streams).recording;
   ASSERT_EQ(made.joint_names, std::vector<std::string>{"lift"});
@@ -318,7 +318,7 @@ TEST(FromStreams, LinksThatAreKnownAreMaskedWithoutThoseThatAreNot) {
   streams.frames[2].samples[0].T_parent_child = above;
   streams.cameras[0].like.camera = {64, 48, 200, 200, 31.5, 23.5, DistortionModel::none, {}};
   streams.cameras[0].image = [](std::size_t) { return DepthImage(DepthImage::Constant(48, 64, 0.5f)); };
-  StreamPlan masked = plan();
+  StreamPlan masked = stream_plan();
   masked.recording.robot = column_with_finger();
   const FromStreams made = recording_from(masked, streams);
   int frames = 0;
@@ -343,7 +343,7 @@ TEST(FromStreams, AJointThatTurnsWithoutEndGoesTheShortWay) {
     const double one = i % 2 == 0 ? 3.13 : -3.13;
     streams.joints.push_back({0.1 * i + 0.003, {height_m(0.1 * i + 0.003), one, one}});
   }
-  StreamPlan turning = plan();
+  StreamPlan turning = stream_plan();
   RobotModel robot = column();
   RobotJoint joint;
   joint.kind = RobotJoint::Kind::continuous;
@@ -373,4 +373,4 @@ TEST(FromStreams, AJointThatTurnsWithoutEndGoesTheShortWay) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::stream_robot_test

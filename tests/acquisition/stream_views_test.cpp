@@ -7,7 +7,7 @@
 #include "acquisition/pressed_spring.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::stream_views_test {
 namespace {
 
 using namespace palpate::acquisition::test;
@@ -45,7 +45,7 @@ RobotModel column() {
 // Such an image was called masked, and the stick in it was taken for the object.
 TEST(StreamViews, ARobotThatCannotBePlacedLeavesItsStickToBeMasked) {
   SensorStreams streams = lab();
-  StreamPlan described = plan();
+  StreamPlan described = stream_plan();
   described.recording.robot = column();
   for (const DepthFrame& image : images_of(recording_from(described, streams))) EXPECT_FALSE(image.robot_is_masked) << "no joint states";
 
@@ -68,16 +68,16 @@ TEST(StreamViews, ARobotThatCannotBePlacedLeavesItsStickToBeMasked) {
 // One such image made the whole recording unusable.
 TEST(StreamViews, AnImageThatShowsNothingIsLeftOut) {
   SensorStreams streams = lab();
-  const auto all = images_of(recording_from(plan(), streams));
+  const auto all = images_of(recording_from(stream_plan(), streams));
   streams.cameras[0].image = [times = streams.cameras[0].times_s](std::size_t i) {
     return times[i] > 10 && times[i] < 14 ? DepthImage(DepthImage::Zero(48, 64)) : picture(times[i]);
   };
-  const FromStreams made = recording_from(plan(), streams);
+  const FromStreams made = recording_from(stream_plan(), streams);
   EXPECT_EQ(images_of(made).size(), all.size() - 1);
-  EXPECT_EQ(made.recording.pushes.at(0).steps.size(), recording_from(plan(), lab()).recording.pushes.at(0).steps.size()) << "its force counts all the same";
+  EXPECT_EQ(made.recording.pushes.at(0).steps.size(), recording_from(stream_plan(), lab()).recording.pushes.at(0).steps.size()) << "its force counts all the same";
   EXPECT_THAT(made.notes, Contains(HasSubstr("/depth: the image shows nothing outside its mask at the step at")));
   streams.cameras[0].mask = [](std::size_t) { return MaskImage(MaskImage::Ones(48, 64)); };
-  EXPECT_TRUE(images_of(recording_from(plan(), streams)).empty());
+  EXPECT_TRUE(images_of(recording_from(stream_plan(), streams)).empty());
 }
 
 TEST(StreamViews, ACloudWithoutAPointIsLeftOut) {
@@ -94,7 +94,7 @@ TEST(StreamViews, ACloudWithoutAPointIsLeftOut) {
     return cloud;
   };
   streams.clouds.push_back(clouds);
-  const FromStreams made = recording_from(plan(), streams);
+  const FromStreams made = recording_from(stream_plan(), streams);
   std::size_t seen = 0;
   for (const Step& step : made.recording.pushes.at(0).steps)
     for (const Observation& one : step.observations)
@@ -107,7 +107,7 @@ TEST(StreamViews, ACloudWithoutAPointIsLeftOut) {
 }
 
 TEST(StreamViews, TheObjectAtRestIsSeenAtTheTimesThatAreGiven) {
-  StreamPlan seen = plan();
+  StreamPlan seen = stream_plan();
   seen.views_at_s = {0.5, 2};
   seen.views_where = "mapping.yaml:3: rest.views_at_s";
   const FromStreams made = recording_from(seen, lab());
@@ -118,7 +118,7 @@ TEST(StreamViews, TheObjectAtRestIsSeenAtTheTimesThatAreGiven) {
     EXPECT_EQ(view.depth_m, picture(view.time_s));
     EXPECT_EQ(view.noise.sigma_m, 0.002);
   }
-  EXPECT_EQ(images_of(made).size(), images_of(recording_from(plan(), lab())).size()) << "no step lost its image";
+  EXPECT_EQ(images_of(made).size(), images_of(recording_from(stream_plan(), lab())).size()) << "no step lost its image";
 
   const auto refusal = [&](const SensorStreams& streams) -> std::string {
     try {
@@ -139,4 +139,4 @@ TEST(StreamViews, TheObjectAtRestIsSeenAtTheTimesThatAreGiven) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::stream_views_test

@@ -12,7 +12,7 @@
 #include "palpate/acquisition/keep_out.hpp"
 #include "palpate/acquisition/ways_around.hpp"
 
-namespace palpate::acquisition {
+namespace palpate::acquisition::transit_test {
 namespace {
 
 // A tip in free air around a box of 0.2 m at the origin's table, without gravity: it feels the box, and whatever else stands there.
@@ -245,4 +245,4 @@ TEST(Transit, APressedTipGoesOutTheWayItCame) {
 }
 
 }  // namespace
-}  // namespace palpate::acquisition
+}  // namespace palpate::acquisition::transit_test

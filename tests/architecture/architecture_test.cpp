@@ -10,6 +10,7 @@
 
 #include "architecture/rules.hpp"
 
+namespace architecture_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -134,3 +135,4 @@ TEST(ArchitectureRules, MissingLicenceUnknownRoomAndCyclesAreFound) {
 }
 
 }  // namespace
+}  // namespace architecture_test

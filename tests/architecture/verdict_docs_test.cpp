@@ -11,6 +11,7 @@
 #include <sstream>
 #include <string>
 
+namespace verdict_docs_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -72,3 +73,4 @@ TEST(VerdictCodes, AreFoundHoweverTheyAreMade) {
 }
 
 }  // namespace
+}  // namespace verdict_docs_test

@@ -10,7 +10,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/io/urdf.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_frames_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -163,4 +163,4 @@ TEST(BagsOfALab, InWhichAFixedFrameLeavesNoContactSayWhichOneItIs) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_frames_test

@@ -17,6 +17,7 @@
 #include "palpate/sensing/depth_render.hpp"
 #include "temporary_folder.hpp"
 
+namespace check_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -147,3 +148,4 @@ TEST(Check, TheBodyMustBeSaidAndBeOneOfTwo) {
 }
 
 }  // namespace
+}  // namespace check_test

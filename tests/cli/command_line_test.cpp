@@ -15,6 +15,7 @@
 #include "said_by.hpp"
 #include "temporary_folder.hpp"
 
+namespace command_line_test {
 namespace {
 
 using palpate::test::Said;
@@ -200,3 +201,4 @@ TEST(CommandLine, VersionIsTheProjects) {
 }
 
 }  // namespace
+}  // namespace command_line_test

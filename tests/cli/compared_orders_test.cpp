@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::cli {
+namespace palpate::cli::compared_orders_test {
 namespace {
 
 TEST(ComparedOrders, RunsThatDidNotComeToTheGoalAreTheLongest) {
@@ -27,4 +27,4 @@ TEST(ComparedOrders, TheFileHasEveryLab) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::compared_orders_test

@@ -13,7 +13,7 @@
 #include "palpate/core/error.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::demo_mark_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -82,4 +82,4 @@ TEST_F(DemoMark, LeavesAloneWhatWasPutInOrChangedSince) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::demo_mark_test

@@ -19,7 +19,7 @@
 #include "palpate/lab/pressed_block.hpp"
 #include "palpate/report/words.hpp"
 
-namespace palpate::io {
+namespace palpate::io::demo_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -85,4 +85,4 @@ TEST(Demo, GoesTheWholeWayAndIsRight) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::demo_test

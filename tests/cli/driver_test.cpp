@@ -13,7 +13,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate::io {
+namespace palpate::io::driver_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -190,4 +190,4 @@ TEST_F(Driver, WhatIsWrongIsSaidWithACure) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::driver_test

@@ -11,7 +11,7 @@
 #include "cli/running_program.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate::io {
+namespace palpate::io::explore_compare_test {
 namespace {
 
 using testing::HasSubstr;
@@ -52,4 +52,4 @@ TEST_F(ExploreCompare, EveryOrderPushesInTheLabOfEverySeed) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::explore_compare_test

@@ -14,7 +14,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate::io {
+namespace palpate::io::explore_resume_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -129,4 +129,4 @@ TEST_F(ExploreResume, TheShapeMayBeLookedAt) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::explore_resume_test

@@ -18,7 +18,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::live_view_test {
 namespace {
 
 using testing::HasSubstr;
@@ -223,4 +223,4 @@ TEST_F(LiveViewTest, ManyThreadsAtOnce) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::live_view_test

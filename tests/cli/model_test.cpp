@@ -16,7 +16,7 @@
 #include "said_by.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate {
+namespace palpate::model_test {
 namespace {
 
 using testing::Contains;
@@ -146,4 +146,4 @@ TEST_F(Model, views_of_a_recording_are_fused_and_completed_on_the_table) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::model_test

@@ -8,7 +8,7 @@
 
 #include "temporary_folder.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::new_folder_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -60,4 +60,4 @@ TEST(NewFolder, ALinkStaysALink) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::new_folder_test

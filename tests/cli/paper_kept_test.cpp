@@ -16,7 +16,7 @@
 #include "cli/paper_seeds.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::paper_kept_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -165,4 +165,4 @@ TEST(PaperKept, SoAreTheTablesOfSeedsInDetail) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::paper_kept_test

@@ -10,7 +10,7 @@
 
 #include "cli/paper_views.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::paper_methods_test {
 namespace {
 
 using testing::Contains;
@@ -68,4 +68,4 @@ TEST(PaperViews, FourViewsShowHowTheirModelWasMade) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::paper_methods_test

@@ -16,7 +16,7 @@
 #include "cli/paper_tables.hpp"
 #include "cli/paper_words.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::paper_page_test {
 namespace {
 
 MethodAnswer answer(double young_pa, double lower_pa, double upper_pa, int solves) {
@@ -265,4 +265,4 @@ TEST(PaperPage, WithoutAnAnswerItSaysSo) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::paper_page_test

@@ -22,7 +22,7 @@
 #include "refusals.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::paper_run_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -353,4 +353,4 @@ TEST(PaperRun, SeedsOfOtherOptionsAreRefusedByName) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::paper_run_test

@@ -12,7 +12,7 @@
 #include "palpate/fem/boundary.hpp"
 #include "palpate/geometry/triangle_tree.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::paper_studies_test {
 namespace {
 
 bool holds(const StudyRow& row) {
@@ -77,4 +77,4 @@ TEST(PaperInputs, TheFinerMeshFollowsARoundSurface) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::paper_studies_test

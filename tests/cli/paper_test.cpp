@@ -11,6 +11,7 @@
 
 #include "temporary_folder.hpp"
 
+namespace paper_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -87,3 +88,4 @@ TEST(Paper, AnOpenMeshInTheCowsPlaceIsRefusedBeforeAnythingIsRun) {
 }
 
 }  // namespace
+}  // namespace paper_test

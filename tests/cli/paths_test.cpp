@@ -16,6 +16,7 @@
 
 #include "temporary_folder.hpp"
 
+namespace paths_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -145,3 +146,4 @@ TEST_F(Paths, PortThatIsTakenIsSaidBeforeAnythingIsRead) {
 }
 
 }  // namespace
+}  // namespace paths_test

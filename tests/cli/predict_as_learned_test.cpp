@@ -17,7 +17,7 @@
 #include "said_by.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate {
+namespace palpate::predict_as_learned_test {
 namespace {
 
 using testing::HasSubstr;
@@ -208,4 +208,4 @@ TEST_F(PressedByADisc, AlongWhatNothingHoldsIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::predict_as_learned_test

@@ -13,7 +13,7 @@
 #include "said_by.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate {
+namespace palpate::predict_test {
 namespace {
 
 using testing::HasSubstr;
@@ -227,4 +227,4 @@ TEST_F(LearnedBlock, BelongsToItsResult) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::predict_test

@@ -11,7 +11,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::cli {
+namespace palpate::cli::push_options_test {
 namespace {
 
 acquisition::PushOptions parsed(const std::vector<std::string>& words) {
@@ -84,4 +84,4 @@ TEST(PushOptionWords, WhatCannotBeIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::push_options_test

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace palpate::cli {
+namespace palpate::cli::push_words_test {
 namespace {
 
 using testing::ElementsAre;
@@ -47,4 +47,4 @@ TEST(StopWords, NameThePlaceThatTheRobotDoesNotReachOnce) {
 }
 
 }  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::push_words_test

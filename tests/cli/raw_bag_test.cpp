@@ -12,7 +12,7 @@
 #include "palpate/io/ros_messages.hpp"
 #include "palpate/io/urdf.hpp"
 
-namespace palpate::io {
+namespace palpate::io::raw_bag_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -128,4 +128,4 @@ INSTANTIATE_TEST_SUITE_P(Objects, RawBag,
                          [](const auto& one) { return one.index == 0 ? "cube" : "ball"; });
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::raw_bag_test

@@ -21,7 +21,7 @@
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate::io {
+namespace palpate::io::record_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -476,4 +476,4 @@ TEST_F(Record, ExploreKnowsItsLawBeforeItMoves) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::record_test

@@ -16,7 +16,7 @@
 #include "said_by.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate {
+namespace palpate::regions_test {
 namespace {
 
 constexpr double left_pa = 2e4, right_pa = 3.2e4;
@@ -189,4 +189,4 @@ TEST_F(TwoHalves, AsOneTheyAreCalledNotHomogeneous) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::regions_test

@@ -10,7 +10,7 @@
 #include "palpate/identify.hpp"
 #include "palpate/suggest.hpp"
 
-namespace palpate {
+namespace palpate::suggest_poisson_test {
 namespace {
 
 using estimation::block_size_m;
@@ -118,4 +118,4 @@ TEST(PushForPoisson, NothingIsNamedWhereNuIsKnownOrWhatIsKnownIsDoubtful) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::suggest_poisson_test

@@ -21,6 +21,7 @@
 #include "palpate/suggest.hpp"
 #include "temporary_folder.hpp"
 
+namespace suggest_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -317,3 +318,4 @@ TEST(SuggestAfterAFit, AResultOfATouchThatSlippedIsNotBuiltOn) {
 }
 
 }  // namespace
+}  // namespace suggest_test

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 
-namespace palpate {
+namespace palpate::process_heap_test {
 namespace {
 
 long page_faults_of_one_array(std::size_t bytes) {
@@ -47,4 +47,4 @@ TEST(ProcessHeap, MayBeAskedForTwice) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::process_heap_test

@@ -11,7 +11,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate {
+namespace palpate::recording_values_test {
 namespace {
 
 using testing::HasSubstr;
@@ -362,4 +362,4 @@ TEST(RecordingValues, WhatIsWrongIsNamedByItsPlace) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::recording_values_test

@@ -9,7 +9,7 @@
 #include "palpate/lab/random.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::cloud_camera_test {
 namespace {
 
 constexpr double pose_m = 1e-3, pose_rad = 0.02;
@@ -87,4 +87,4 @@ TEST(CloudCamera, ObservedCloudsAreOneCamerasWhereThereAreSeveral) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::cloud_camera_test

@@ -14,7 +14,7 @@
 #include "palpate/fem/regions.hpp"
 #include "scenes.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::contact_model_test {
 namespace {
 
 Support table(ContactLaw contact, double friction = 0) {
@@ -370,4 +370,4 @@ TEST_F(LyingBlock, IsAsStiffAsItIsAlthoughItLiftsOff) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::contact_model_test

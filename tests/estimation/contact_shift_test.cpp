@@ -9,7 +9,7 @@
 #include "palpate/estimation/load_columns.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::contact_shift_test {
 namespace {
 
 constexpr double young_pa = 2e4, size_m = 0.012;
@@ -141,4 +141,4 @@ TEST(WaysAtOnePlace, ASecondModelSolvesForNothing) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::contact_shift_test

@@ -4,7 +4,7 @@
 // what they say.
 #include "estimation/coverage_outcomes.hpp"
 
-namespace palpate::coverage {
+namespace palpate::coverage::coverage_kept_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -68,4 +68,4 @@ TEST(CoverageKept, ThePageSaysWhatTheKeptOutcomesSay) {
 }
 
 }  // namespace
-}  // namespace palpate::coverage
+}  // namespace palpate::coverage::coverage_kept_test

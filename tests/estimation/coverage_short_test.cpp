@@ -4,7 +4,7 @@
 // coverage_test.cpp; rows whose contacts are found anew cost ten times as much.
 #include "estimation/coverage_table.hpp"
 
-namespace palpate::coverage {
+namespace palpate::coverage::coverage_short_test {
 namespace {
 
 void intervals_hold(const std::string& scene) {
@@ -22,4 +22,4 @@ TEST(ShortCoverage, OfABall) { intervals_hold("ball_top"); }
 TEST(ShortCoverage, OfABar) { intervals_hold("bar_oblique"); }
 
 }  // namespace
-}  // namespace palpate::coverage
+}  // namespace palpate::coverage::coverage_short_test

@@ -14,7 +14,7 @@
 
 #include "estimation/coverage_table.hpp"
 
-namespace palpate::coverage {
+namespace palpate::coverage::coverage_test {
 namespace {
 
 int number(const char* name, int otherwise) {
@@ -47,4 +47,4 @@ TEST(Coverage, IntervalsHoldTheTruthAsOftenAsTheySay) {
 }
 
 }  // namespace
-}  // namespace palpate::coverage
+}  // namespace palpate::coverage::coverage_test

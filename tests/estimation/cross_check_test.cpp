@@ -12,7 +12,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::cross_check_test {
 namespace {
 
 bool says(const Identification& answer, const std::string& code) {
@@ -283,4 +283,4 @@ TEST(CochranQ, IsTheChiSquareTestOfWeightedMeans) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::cross_check_test

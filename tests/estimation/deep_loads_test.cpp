@@ -10,7 +10,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::deep_loads_test {
 namespace {
 
 constexpr double young_pa = 2e4;
@@ -178,4 +178,4 @@ TEST(DeepLoads, OneThatSpoiltTheEByWhichItCountsIsLeftOut) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::deep_loads_test

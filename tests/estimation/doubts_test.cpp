@@ -9,7 +9,7 @@
 #include "palpate/core/error.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::doubts_test {
 namespace {
 
 Recording glued_block() {
@@ -223,4 +223,4 @@ TEST(Doubts, NodesWithoutARimCannotSpread) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::doubts_test

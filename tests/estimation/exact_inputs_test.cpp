@@ -11,7 +11,7 @@
 #include "palpate/estimation/load_columns.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::exact_inputs_test {
 namespace {
 
 constexpr double noise_m = 3e-4;
@@ -172,4 +172,4 @@ TEST(BudgetIf, EveryRegionHasItsShare) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::exact_inputs_test

@@ -9,7 +9,7 @@
 #include "planned_scene.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::far_start_test {
 namespace {
 
 /// Rays of a camera above and beside the clamped block, as it sees the truth under every load.
@@ -60,4 +60,4 @@ TEST(FarStart, OfDepthRaysAndTheNeoHookeanLawEndsAtTheSameOptimum) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::far_start_test

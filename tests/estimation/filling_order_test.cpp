@@ -16,7 +16,7 @@
 #include "palpate/lab/robot.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::filling_order_test {
 namespace {
 
 /// Travel per newton under each site's pad.
@@ -84,4 +84,4 @@ TEST_P(FillingOrder, IsAboutThree) {
 INSTANTIATE_TEST_SUITE_P(Objects, FillingOrder, testing::Values("bear", "animal", "ball"), [](const auto& one) { return one.param; });
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::filling_order_test

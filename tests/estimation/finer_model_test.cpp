@@ -16,7 +16,7 @@
 #include "palpate/lab/implicit_surface.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::finer_model_test {
 namespace {
 
 class FinerMesh : public testing::Test {
@@ -160,4 +160,4 @@ TEST(FinerOutline, IsTheObjectsOwnWhereTheMeshCutsItOff) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::finer_model_test

@@ -13,7 +13,7 @@
 #include "pressed_bar.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::fit_test {
 namespace {
 
 // ---- Uniaxial compression between smooth platens: the state is homogeneous, so any mesh is exact.
@@ -432,4 +432,4 @@ TEST(FitWithoutObservations, IsAnError) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::fit_test

@@ -12,7 +12,7 @@
 #include "palpate/estimation/shape_error.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::foot_error_test {
 namespace {
 
 FootDoubt doubt_of_end() { return {Plane{Vec3::Zero(), Vec3::UnitX()}, 0.01, {}}; }
@@ -66,4 +66,4 @@ TEST(FootError, SaysWhatAFitWithAnotherFootSays) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::foot_error_test

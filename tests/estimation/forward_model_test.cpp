@@ -11,7 +11,7 @@
 #include "palpate/core/error.hpp"
 #include "scenes.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::forward_model_test {
 namespace {
 
 class Derivatives : public testing::TestWithParam<std::tuple<const char*, std::size_t, bool, bool>> {};
@@ -250,4 +250,4 @@ TEST(ForwardModel, FollowedStepsAreAsWrongAsTheySay) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::forward_model_test

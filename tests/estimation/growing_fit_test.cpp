@@ -9,7 +9,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::growing_fit_test {
 namespace {
 
 Recording six_steps() {
@@ -122,4 +122,4 @@ TEST(GrowingFit, FindsItsWayBackFromAFarStart) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::growing_fit_test

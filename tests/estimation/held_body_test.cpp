@@ -10,7 +10,7 @@
 
 #include "estimation/scenes.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::held_body_test {
 namespace {
 
 /// A sheet that is glued to a board has all its nodes held. The processor's time: other programs may run.
@@ -35,4 +35,4 @@ TEST(HeldBody, WhatIsNotHeldIsPinnedAndSaid) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::held_body_test

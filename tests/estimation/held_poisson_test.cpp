@@ -14,7 +14,7 @@
 #include "palpate/estimation/posterior.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::held_poisson_test {
 namespace {
 
 /// log E, nu, a region's ratio and its own nu, a nuisance.
@@ -220,4 +220,4 @@ TEST(HeldPoisson, TheSharedNuIsWhatIsLeftOfItOverTheRangeOfTheOther) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::held_poisson_test

@@ -10,7 +10,7 @@
 #include "palpate/estimation/rigid_tool.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::imposed_contact_test {
 namespace {
 
 constexpr double young_pa = 2e4, force_sigma_n = 2e-4;
@@ -290,4 +290,4 @@ TEST(HeldTool, ThatIsPushedBackLessAndLessHasNotSettled) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::imposed_contact_test

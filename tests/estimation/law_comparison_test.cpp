@@ -12,7 +12,7 @@
 #include "pressed_bar.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::law_comparison_test {
 namespace {
 
 constexpr double true_young_pa = 31415, true_poisson = 0.3;
@@ -152,4 +152,4 @@ TEST(BestLaw, IsTheFittedOneUnlessAnotherIsBetterBeyondChance) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::law_comparison_test

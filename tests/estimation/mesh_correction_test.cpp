@@ -9,7 +9,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::mesh_correction_test {
 namespace {
 
 class MeshCorrections : public testing::Test {
@@ -91,4 +91,4 @@ TEST_F(MeshCorrections, LeadToTheAnswerOfTheFinerMesh) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::mesh_correction_test

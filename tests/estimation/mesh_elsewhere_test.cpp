@@ -11,7 +11,7 @@
 #include "palpate/estimation/mesh_error.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::mesh_elsewhere_test {
 namespace {
 
 class MeshElsewhere : public testing::Test {
@@ -104,4 +104,4 @@ TEST_F(MeshElsewhere, IsStillTakenOutOnceToolsAreFine) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::mesh_elsewhere_test

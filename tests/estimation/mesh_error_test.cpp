@@ -11,7 +11,7 @@
 #include "palpate/estimation/answer_parts.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::mesh_error_test {
 namespace {
 
 TEST(MeshError, IsHalfToFourTimesTheBiasThatAFinerTruthShows) {
@@ -315,4 +315,4 @@ TEST(Widening, KeepsTheBoundsOfNu) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::mesh_error_test

@@ -17,7 +17,7 @@
 #include "pushed_block.hpp"
 #include "refusals.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::moved_balls_test {
 namespace {
 
 using testing::Contains;
@@ -218,4 +218,4 @@ TEST(MovedBalls, OthersKeepTheirForces) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::moved_balls_test

@@ -12,7 +12,7 @@
 #include "palpate/core/error.hpp"
 #include "planned_scene.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::next_push_test {
 namespace {
 
 Knowledge untouched() { return before_touch(block_on_table(), true_young_pa); }
@@ -407,4 +407,4 @@ TEST(NextPush, BadPlansAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::next_push_test

@@ -11,7 +11,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::optimise_test {
 namespace {
 
 struct Searched {
@@ -64,4 +64,4 @@ TEST(Optimise, OneThatStillFallsIsNot) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::optimise_test

@@ -10,7 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::paper_method_test {
 namespace {
 
 TEST(PaperMethod, ReachesTheMinimumThatAGridSearchFinds) {
@@ -98,4 +98,4 @@ TEST(PaperMethod, WithoutASurfaceIsAnError) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::paper_method_test

@@ -11,7 +11,7 @@
 #include "palpate/estimation/verdicts.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::posterior_test {
 namespace {
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
@@ -129,4 +129,4 @@ TEST(PosteriorWithoutEquilibria, SaysWhereNothingWasFound) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::posterior_test

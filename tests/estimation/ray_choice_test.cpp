@@ -14,7 +14,7 @@
 #include "palpate/lab/implicit_surface.hpp"
 #include "palpate/lab/random.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::ray_choice_test {
 namespace {
 
 constexpr double sigma_m = 2e-3, young_pa = 2e4, true_nu = 0.3, force_n = 10;
@@ -315,4 +315,4 @@ TEST(RayChoice, TheSearchOverThePoissonRatioAgreesWithTheFit) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::ray_choice_test

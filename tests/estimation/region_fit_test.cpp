@@ -10,7 +10,7 @@
 #include "palpate/estimation/fit.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::region_fit_test {
 namespace {
 
 Identification fit_halves(const PushedBlock& truth, bool regions = true) {
@@ -188,4 +188,4 @@ TEST(RegionFit, RegionThatNoPushReachesIsNotDetermined) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::region_fit_test

@@ -11,7 +11,7 @@
 #include "palpate/core/error.hpp"
 #include "planned_scene.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::self_check_test {
 namespace {
 
 struct Rig {
@@ -371,4 +371,4 @@ TEST(SelfCheckTouches, AContactThatWasPlannedIsNotWhereTheTipWas) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::self_check_test

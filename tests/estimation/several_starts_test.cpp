@@ -10,7 +10,7 @@
 #include "palpate/estimation/verdicts.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::several_starts_test {
 namespace {
 
 Starts two(double difference, double scale = 1) {
@@ -219,4 +219,4 @@ TEST(SeveralStarts, ALightLoadTellsThemApart) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::several_starts_test

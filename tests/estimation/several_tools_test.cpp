@@ -10,7 +10,7 @@
 #include "palpate/estimation/step_fits.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::several_tools_test {
 namespace {
 
 /// The block clamped at one end, pinched at the other by two pads; each tells its force.
@@ -177,4 +177,4 @@ TEST(SeveralSensors, CloudsOfAStepAreToldApartWhicheverIsExact) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::several_tools_test

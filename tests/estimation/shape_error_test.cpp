@@ -10,7 +10,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::shape_error_test {
 namespace {
 
 /// The block, as deep as its underside is said to be.
@@ -139,4 +139,4 @@ TEST(ShapeError, AShapeThatContradictsTheTravelIsRuledOut) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::shape_error_test

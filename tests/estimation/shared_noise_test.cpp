@@ -15,7 +15,7 @@
 #include "pushed_block.hpp"
 #include "random_field.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::shared_noise_test {
 namespace {
 
 constexpr double length_m = 6e-3, share = 0.15;
@@ -202,4 +202,4 @@ TEST(SharedNoise, IsInTheQuadraticFormOfTheSurface) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::shared_noise_test

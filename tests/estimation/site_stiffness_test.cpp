@@ -9,7 +9,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::site_stiffness_test {
 namespace {
 
 const Vec3 left_m(0.015, 0.02, block_size_m.z()), right_m(0.045, 0.02, block_size_m.z());
@@ -117,4 +117,4 @@ TEST(SiteStiffness, ChanceOfADifferenceHoldsWhatContactsLeaveOpen) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::site_stiffness_test

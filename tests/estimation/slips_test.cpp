@@ -11,7 +11,7 @@
 #include "palpate/fem/boundary.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::slips_test {
 namespace {
 
 constexpr std::size_t slips_at = 3;
@@ -310,4 +310,4 @@ TEST(Slips, NoHigherLoadsAreTakenThanBefore) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::slips_test

@@ -10,7 +10,7 @@
 #include "palpate/geometry/mesh_checks.hpp"
 #include "palpate/identify.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::smooth_platens_test {
 namespace {
 
 constexpr double young_pa = 30e3, nu = 0.3, height_m = 0.06, width_m = 0.1;
@@ -109,4 +109,4 @@ INSTANTIATE_TEST_SUITE_P(Shape, SmoothPlatens, testing::Bool(),
                          [](const auto& one) { return std::string(one.param ? "surface" : "volume"); });
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::smooth_platens_test

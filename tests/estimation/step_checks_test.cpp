@@ -9,7 +9,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::step_checks_test {
 namespace {
 
 constexpr std::size_t steps = 6;
@@ -207,4 +207,4 @@ TEST(StepChecks, APressureBeyondThePatch) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::step_checks_test

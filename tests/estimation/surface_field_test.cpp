@@ -11,7 +11,7 @@
 #include "palpate/fem/boundary.hpp"
 #include "scenes.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::surface_field_test {
 namespace {
 
 TriMesh cube_surface(double edge_m) {
@@ -43,4 +43,4 @@ TEST(SurfaceField, RefusesLengthsThatAreNone) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::surface_field_test

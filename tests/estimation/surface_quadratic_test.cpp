@@ -10,7 +10,7 @@
 #include "palpate/estimation/objective.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::surface_quadratic_test {
 namespace {
 
 /// Forces that err in all directions, at contacts that may be elsewhere.
@@ -160,4 +160,4 @@ TEST(SurfaceQuadratic, KnowsFieldsOfAnotherBodyFromItsOwn) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::surface_quadratic_test

@@ -11,7 +11,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::target_plan_test {
 namespace {
 
 Knowledge nearly_nothing() {
@@ -159,4 +159,4 @@ TEST(TargetPlan, AShuffledListNeedsWhatChanceSays) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::target_plan_test

@@ -11,7 +11,7 @@
 #include "palpate/estimation/surface_quadratic.hpp"
 #include "scenes.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::term_contract_test {
 namespace {
 
 /// Points a little off the surface of `predicted`, inside and outside, one a triangle (away from its edges).
@@ -309,4 +309,4 @@ INSTANTIATE_TEST_SUITE_P(Every, TermContract,
                          });
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::term_contract_test

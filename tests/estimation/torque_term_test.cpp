@@ -11,7 +11,7 @@
 #include "palpate/lab/random.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::torque_term_test {
 namespace {
 
 const Vec3 off_m(0.0032, -0.0024, 0);  // 4 mm beside the stated place
@@ -236,4 +236,4 @@ TEST(TorqueTerm, WithoutItsDeviationItIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::torque_term_test

@@ -9,7 +9,7 @@
 #include "planned_scene.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::two_cameras_test {
 namespace {
 
 constexpr double far_m = 8e-4, near_m = -6e-4;  // by how much they measure too much
@@ -58,4 +58,4 @@ TEST(DepthBias, IsEachCamerasOwn) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::two_cameras_test

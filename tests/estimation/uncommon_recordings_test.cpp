@@ -14,7 +14,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/identify.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::uncommon_recordings_test {
 namespace {
 
 using testing::HasSubstr;
@@ -322,4 +322,4 @@ TEST(UncommonRecordings, AStartIsFoundWhateverWasSeen) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::uncommon_recordings_test

@@ -11,7 +11,7 @@
 #include "palpate/estimation/shape_error.hpp"
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::unseen_modes_test {
 namespace {
 
 constexpr double true_pa = 2e4;
@@ -221,4 +221,4 @@ TEST(UnseenModes, ANuThatIsHeldAtItsBoundDoesNotTakeEAlong) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::unseen_modes_test

@@ -10,7 +10,7 @@
 
 #include "scenes.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::unseen_side_test {
 namespace {
 
 const Vec3 size_m(0.06, 0.04, 0.03);
@@ -76,4 +76,4 @@ TEST(UnseenSide, WhereAllWasSeenNoRayIsLeftOut) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::unseen_side_test

@@ -9,7 +9,7 @@
 
 #include "pushed_block.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::verdicts_test {
 namespace {
 
 PushedBlock clear_view(const std::string& material = "linear") {
@@ -338,4 +338,4 @@ TEST(TwoEquilibria, IsSaidOfAColumnAboveEulersLoad) {
 TEST(TwoEquilibria, IsNotSaidBelowIt) { EXPECT_FALSE(says(column_under(0.6), "two_equilibria")); }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::verdicts_test

@@ -12,7 +12,7 @@
 #include "fem/calculix.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::yielding_support_test {
 namespace {
 
 constexpr double young_pa = 2e4, nu = 0.3;
@@ -237,4 +237,4 @@ TEST(YieldingSupport, OneOfTwoIsAnErrorThatNamesIt) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::yielding_support_test

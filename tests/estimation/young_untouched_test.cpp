@@ -9,7 +9,7 @@
 #include "estimation/pushed_block.hpp"
 #include "palpate/estimation/growing_fit.hpp"
 
-namespace palpate::estimation {
+namespace palpate::estimation::young_untouched_test {
 namespace {
 
 FitOptions quick() {
@@ -119,4 +119,4 @@ TEST(YoungUntouched, RunningEstimatesGoThroughIt) {
 }
 
 }  // namespace
-}  // namespace palpate::estimation
+}  // namespace palpate::estimation::young_untouched_test

@@ -14,7 +14,7 @@
 #include "palpate/io/recording.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate {
+namespace palpate::converters_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -111,4 +111,4 @@ TEST_F(Converters, TakeBackWhatTheyWroteWhenAFileIsMissing) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::converters_test

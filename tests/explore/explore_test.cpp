@@ -1,6 +1,6 @@
 // label: unit
 // SPDX-License-Identifier: Apache-2.0
-// The loop of push, estimate, next push on a small robot with a truth of its own. PALPATE_LABS=40 explore_explore_test
+// The loop of push, estimate, next push on a small robot with a truth of its own. PALPATE_LABS=40 explore_unit_tests --gtest_filter='Explore.*'
 // --gtest_filter='*Fewer*' compares the orders on forty of them.
 #include "palpate/explore.hpp"
 
@@ -16,7 +16,7 @@
 #include "small_loop.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate {
+namespace palpate::explore_test {
 namespace {
 
 TEST(Explore, EndsWhenBothIntervalsAreAsNarrowAsAskedForAndHoldTheTruth) {
@@ -267,4 +267,4 @@ TEST(Explore, BadOptionsAreNamed) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::explore_test

@@ -9,7 +9,7 @@
 
 #include "small_loop.hpp"
 
-namespace palpate {
+namespace palpate::resume_test {
 namespace {
 
 bool is_loaded(const Step& step) { return !step.loads.empty(); }
@@ -150,4 +150,4 @@ TEST(Resume, APushThatFoundNothingCountsAndItsPlaceIsNotTriedAgain) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::resume_test

@@ -7,7 +7,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::boundary_test {
 namespace {
 
 VectorX shares(const Eigen::SparseMatrix<double>& columns) {
@@ -137,4 +137,4 @@ TEST(Support, IsChosenByVerticesBoxOrPlane) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::boundary_test

@@ -14,7 +14,7 @@
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::calculix_test {
 namespace {
 
 struct Case {
@@ -99,4 +99,4 @@ INSTANTIATE_TEST_SUITE_P(Elements, CalculiX, testing::ValuesIn(cases()), [](cons
 });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::calculix_test

@@ -10,7 +10,7 @@
 #include "palpate/fem/reduced_system.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::closed_form_test {
 namespace {
 
 constexpr double kYoung = 20000;
@@ -201,7 +201,7 @@ double pressed_cube(int cells, int nodes, const char* law, double nu, double rad
   return -(b.forces.col(2).transpose() * e.displacement_m).value();
 }
 
-TEST(PressedCube, MeetsOtherProgramsOnTheSameMesh) {
+TEST(PressedCubeElsewhere, MeetsOtherProgramsOnTheSameMesh) {
   const auto pointwise = Dilatation::pointwise;
   EXPECT_NEAR(pressed_cube(6, 4, "linear", 0.3, 0.025, 30, pointwise), 2.122605e-2, 5e-4 * 2.1e-2);
   EXPECT_NEAR(pressed_cube(6, 4, "corotational", 0.3, 0.025, 10, pointwise), 7.371653e-3, 5e-4 * 7.4e-3);
@@ -261,4 +261,4 @@ TEST(Robustness, CubePressedToFortyPercentOfItsHeight) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::closed_form_test

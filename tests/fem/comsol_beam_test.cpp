@@ -11,7 +11,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::comsol_beam_test {
 namespace {
 
 // Axis along x with the tip at 0 and the body at positive x (the reference's body lies at negative x), z up.
@@ -100,4 +100,4 @@ TEST(ComsolBeam, LinearElementsLock) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::comsol_beam_test

@@ -9,7 +9,7 @@
 #include "palpate/fem/contact_statics.hpp"
 #include "palpate/fem/discretisation.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::contact_closed_form_test {
 namespace {
 
 constexpr double kYoung = 20000, kPoisson = 0.3, kSize = 0.1;
@@ -207,4 +207,4 @@ TEST(HalfSpaceContact, MeshToolIsTheShapeItWasMadeOf) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::contact_closed_form_test

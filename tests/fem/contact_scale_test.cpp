@@ -7,7 +7,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/fem/contact_statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::contact_scale_test {
 namespace {
 
 constexpr double kYoung = 20000, kFriction = 0.6;
@@ -124,4 +124,4 @@ TEST(ContactScale, PulledOffARoughTableEndsWithAReason) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::contact_scale_test

@@ -10,7 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/fem/contact_statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::contact_sensitivity_test {
 namespace {
 
 struct Scene {
@@ -329,4 +329,4 @@ TEST(ContactPath, CarriesDerivativesThroughStepsInSequence) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::contact_sensitivity_test

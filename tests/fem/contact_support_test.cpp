@@ -7,7 +7,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/fem/contact_statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::contact_support_test {
 namespace {
 
 constexpr double kYoung = 20000;
@@ -256,4 +256,4 @@ TEST(ContactErrors, AreNamed) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::contact_support_test

@@ -13,7 +13,7 @@
 #include "palpate/fem/statics.hpp"
 #include "palpate/fem/tetrahedron.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::convergence_test {
 namespace {
 
 constexpr double kSize = 0.1, kYoung = 20e3;
@@ -176,4 +176,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& each) { return std::string(each.param.name); });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::convergence_test

@@ -10,7 +10,7 @@
 
 #include "fem_meshes.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::discretisation_test {
 namespace {
 
 struct Disc {
@@ -110,4 +110,4 @@ TEST(RefineNear, KeepsVolumeOrientationAndConformity) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::discretisation_test

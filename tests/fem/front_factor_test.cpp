@@ -11,7 +11,7 @@
 #include "fem/lattice.hpp"
 #include "palpate/fem/linear_solver/elimination_order.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::front_factor_test {
 namespace {
 
 using test::lattice_matrix;
@@ -131,4 +131,4 @@ TEST(FrontFactor, ThreadsAgreeThatAMatrixIsNotDefinite) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::front_factor_test

@@ -12,7 +12,7 @@
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/lab/box_surface.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::held_in_box_test {
 namespace {
 
 constexpr double width_m = 0.03, length_m = 0.09, held_m = 0.0233;
@@ -60,4 +60,4 @@ TEST(HeldInBox, TheFreePartBeginsAtTheBox) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::held_in_box_test

@@ -13,7 +13,7 @@
 #include "palpate/fem/contact_statics.hpp"
 #include "palpate/fem/discretisation.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::known_contact_error_test {
 namespace {
 
 constexpr double kYoung = 20e3, kPoisson = 0.3, kEdge = 0.075, kHeight = 0.15;
@@ -119,4 +119,4 @@ INSTANTIATE_TEST_SUITE_P(Tools, KnownContactError,
                          [](const auto& each) { return std::string(each.param.name); });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::known_contact_error_test

@@ -9,7 +9,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/fem/discretisation.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::known_error_test {
 namespace {
 
 constexpr double kYoung = 20e3, kPoisson = 0.3;
@@ -106,4 +106,4 @@ INSTANTIATE_TEST_SUITE_P(Tools, KnownError,
                          [](const auto& each) { return std::string(each.param.name); });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::known_error_test

@@ -7,7 +7,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::large_body_test {
 namespace {
 
 constexpr double kYoung = 20e3;
@@ -101,4 +101,4 @@ TEST(LargeBody, IsTheStateThatFactorsFind) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::large_body_test

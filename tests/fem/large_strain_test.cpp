@@ -9,7 +9,7 @@
 #include "palpate/fem/materials.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::large_strain_test {
 namespace {
 
 const double kYoung = 20e3;
@@ -214,4 +214,4 @@ TEST(Continuation, ShrinksAFailedStep) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::large_strain_test

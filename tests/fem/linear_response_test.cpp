@@ -7,7 +7,7 @@
 
 #include "fem_meshes.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::linear_response_test {
 namespace {
 
 struct Case {
@@ -166,4 +166,4 @@ INSTANTIATE_TEST_SUITE_P(Elements, LinearResponseContract,
                          });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::linear_response_test

@@ -16,7 +16,7 @@
 #include "palpate/fem/linear_solver/conjugate_gradients.hpp"
 #include "palpate/fem/linear_solver/large_array.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::linear_solver_test {
 namespace {
 
 using test::dense_of;
@@ -355,4 +355,4 @@ TEST(LinearSolver, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::linear_solver_test

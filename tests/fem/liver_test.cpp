@@ -12,7 +12,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::liver_test {
 namespace {
 
 const std::filesystem::path kLiver = std::filesystem::path(PALPATE_SHARED_DIR) / "data" / "liver";
@@ -168,4 +168,4 @@ INSTANTIATE_TEST_SUITE_P(Sequences, Liver,
                          [](const auto& each) { return std::string(each.param.sequence); });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::liver_test

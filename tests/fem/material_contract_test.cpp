@@ -11,7 +11,7 @@
 #include "palpate/fem/materials.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::material_contract_test {
 namespace {
 
 constexpr double kYoung = 20000, kPoisson = 0.37;
@@ -227,4 +227,4 @@ INSTANTIATE_TEST_SUITE_P(Table, MaterialContract, testing::ValuesIn(material_tab
                          [](const auto& each) { return std::string(each.param->name()); });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::material_contract_test

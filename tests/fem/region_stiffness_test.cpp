@@ -12,7 +12,7 @@
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::region_stiffness_test {
 namespace {
 
 // A bar along x, held at x = 0 and drawn at its other end by a force.
@@ -217,4 +217,4 @@ TEST(RegionsOf, ListsOfAnotherMeshAreFollowedQuickly) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::region_stiffness_test

@@ -10,7 +10,7 @@
 
 #include "fem_meshes.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::response_nuisances_test {
 namespace {
 
 const double kYoung = 20e3, kPoisson = 0.35;
@@ -167,4 +167,4 @@ INSTANTIATE_TEST_SUITE_P(Laws, NuisanceContract, testing::Values("linear", "neo_
                          [](const auto& each) { return std::string(each.param); });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::response_nuisances_test

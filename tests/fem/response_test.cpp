@@ -9,7 +9,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::response_test {
 namespace {
 
 const double kYoung = 20e3;
@@ -270,4 +270,4 @@ TEST(ContactColumns, ShiftAndWiden) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::response_test

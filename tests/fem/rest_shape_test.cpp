@@ -9,7 +9,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::rest_shape_test {
 namespace {
 
 constexpr double kYoung = 20000;
@@ -72,4 +72,4 @@ TEST(RestShape, SaysWhenTheLoadsAreTooLarge) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::rest_shape_test

@@ -11,7 +11,7 @@
 #include "palpate/fem/regions.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::sensitivity_test {
 namespace {
 
 struct Case {
@@ -205,4 +205,4 @@ INSTANTIATE_TEST_SUITE_P(Laws, SensitivityContract, testing::ValuesIn(cases()), 
 });
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::sensitivity_test

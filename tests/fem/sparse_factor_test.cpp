@@ -13,7 +13,7 @@
 #include "fem/lattice.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::sparse_factor_test {
 namespace {
 
 using test::dense_of;
@@ -202,4 +202,4 @@ TEST(SparseFactor, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::sparse_factor_test

@@ -8,7 +8,7 @@
 #include "palpate/fem/contact/surface_points.hpp"
 #include "palpate/fem/statics.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::thick_sphere_test {
 namespace {
 
 constexpr double kInner = 0.05, kOuter = 0.1, kYoung = 20000, kPressure = 100;
@@ -75,4 +75,4 @@ TEST(ThickSphere, AveragedDilatationIsRightNearlyIncompressible) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::thick_sphere_test

@@ -8,7 +8,7 @@
 #include <new>
 #include <stdexcept>
 
-namespace palpate::fem {
+namespace palpate::fem::thread_team_test {
 namespace {
 
 TEST(ThreadTeam, MembersMeet) {
@@ -52,4 +52,4 @@ TEST(ThreadTeam, OneOfSeveralErrorsIsThrown) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::thread_team_test

@@ -10,7 +10,7 @@
 #include "fem_meshes.hpp"
 #include "palpate/fem/response.hpp"
 
-namespace palpate::fem {
+namespace palpate::fem::two_equilibria_test {
 namespace {
 
 constexpr double kYoung = 20e3, kLength = 0.4, kWidth = 0.02, kDepth = 0.03;
@@ -124,4 +124,4 @@ TEST_F(Column, ACertificateOfTheStraightStateSaysSo) {
 }
 
 }  // namespace
-}  // namespace palpate::fem
+}  // namespace palpate::fem::two_equilibria_test

@@ -10,7 +10,7 @@
 
 #include "palpate/lab/box_surface.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::box_rims_test {
 namespace {
 
 // Two upright bars, 20 mm and 40 mm wide.
@@ -102,4 +102,4 @@ TEST(FinerAtRims, ABoxMayEndInTheMiddleOfAFace) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::box_rims_test

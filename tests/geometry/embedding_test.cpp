@@ -9,7 +9,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::embedding_test {
 namespace {
 
 /// Box of n^3 cells with six tetrahedra each, corners shaken.
@@ -100,4 +100,4 @@ TEST(Embedding, passes_over_elements_without_volume_and_refuses_when_there_is_no
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::embedding_test

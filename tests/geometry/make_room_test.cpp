@@ -6,7 +6,7 @@
 
 #include "palpate/geometry/tet_quality.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::make_room_test {
 namespace {
 
 double worst_of(const TetMesh& mesh) {
@@ -55,4 +55,4 @@ TEST(MakeRoom, LeavesGoodElementsAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::make_room_test

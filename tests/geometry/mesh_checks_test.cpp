@@ -8,7 +8,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::mesh_checks_test {
 namespace {
 using testing::Contains;
 using testing::Field;
@@ -208,4 +208,4 @@ TEST(BoundarySurface, of_a_box_is_closed_and_faces_outward) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::mesh_checks_test

@@ -13,7 +13,7 @@
 
 #include "refusals.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::nearest_vertices_test {
 namespace {
 
 double brute_force_m2(const Points& vertices_m, const Vec3& point_m) {
@@ -87,4 +87,4 @@ TEST(NearestVertices, RefuseWhatCannotBeAsked) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::nearest_vertices_test

@@ -12,7 +12,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/geometry/ray_bundle.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::outline_rays_test {
 namespace {
 
 TEST(SurfaceEdges, AreEveryEdgeOnceWithTheTrianglesBesideIt) {
@@ -132,4 +132,4 @@ TEST(BesideOutline, SaysNothingWhereTheSurfaceReachesAroundTheEye) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::outline_rays_test

@@ -10,7 +10,7 @@
 
 #include "geometry/shapes.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::ray_bundle_test {
 namespace {
 
 /// Triangles of all sizes, needles, and some that are a line or a point.
@@ -325,4 +325,4 @@ TEST(RayBundle, AnyNumberOfRaysMeetsWhatTheTreeSays) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::ray_bundle_test

@@ -9,7 +9,7 @@
 #include "palpate/geometry/tetrahedralise.hpp"
 #include "palpate/io/mesh_file.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::shared_meshes_test {
 namespace {
 
 struct Case {
@@ -50,4 +50,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& i) { return std::string(i.param.name) + "_" + std::to_string(i.param.tetrahedra); });
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::shared_meshes_test

@@ -11,7 +11,7 @@
 
 #include "palpate/lab/box_surface.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::subdivide_test {
 namespace {
 
 const Vec3 place(0.011, -0.007, 0.15);
@@ -69,4 +69,4 @@ TEST(Subdivided, EndsWhereTheWishIsEndless) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::subdivide_test

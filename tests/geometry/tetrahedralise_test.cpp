@@ -15,7 +15,7 @@
 #include "palpate/lab/box_surface.hpp"
 #include "refusals.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::tetrahedralise_test {
 namespace {
 
 using testing::Contains;
@@ -489,4 +489,4 @@ TEST(Tetrahedralise, can_be_cancelled) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::tetrahedralise_test

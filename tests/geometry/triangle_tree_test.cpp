@@ -14,7 +14,7 @@
 #include "palpate/core/error.hpp"
 #include "refusals.hpp"
 
-namespace palpate::geometry {
+namespace palpate::geometry::triangle_tree_test {
 namespace {
 
 using Vec3L = Eigen::Matrix<long double, 3, 1>;
@@ -307,4 +307,4 @@ TEST(TriangleTree, refuses_what_is_no_surface) {
 }
 
 }  // namespace
-}  // namespace palpate::geometry
+}  // namespace palpate::geometry::triangle_tree_test

@@ -10,7 +10,7 @@
 #include "palpate/io/depth_file.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate::io {
+namespace palpate::io::absurd_recording_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -188,4 +188,4 @@ TEST_F(AbsurdRecording, AnObjectOfAnySizeTakesToolsOfAnySize) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::absurd_recording_test

@@ -12,7 +12,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/io/file.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_contract_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -247,4 +247,4 @@ TEST(Bags, AMissingFolderIsAnError) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_contract_test

@@ -12,7 +12,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/io/ros_messages.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_fixed_frames_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -167,4 +167,4 @@ TEST_F(FixedFrames, AFrameIsNotTornOffTheBase) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_fixed_frames_test

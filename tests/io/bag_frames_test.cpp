@@ -13,7 +13,7 @@
 #include "io/rosbag2_metadata.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_frames_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -220,4 +220,4 @@ TEST(BagFrames, OfACameraThatMovesLaterAreSaidOfEveryImage) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_frames_test

@@ -16,7 +16,7 @@
 #include "palpate/io/bag_write.hpp"
 #include "palpate/io/ros_messages.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_mapping_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -484,4 +484,4 @@ TEST(Survey, SaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_mapping_test

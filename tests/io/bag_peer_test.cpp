@@ -10,7 +10,7 @@
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/ros_messages.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_peer_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -88,4 +88,4 @@ TEST(BagPeers, WhatRosWritesNowIsRead) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_peer_test

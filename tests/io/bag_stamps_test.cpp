@@ -12,7 +12,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/io/ros_messages.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_stamps_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -144,4 +144,4 @@ TEST_F(BagStamps, WhatStandsWasSaidAtAnyTime) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_stamps_test

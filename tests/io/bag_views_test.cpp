@@ -9,7 +9,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/io/bag_write.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_views_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -53,4 +53,4 @@ TEST(BagViews, TheObjectUntouchedMayBeSeenInTheBagItself) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_views_test

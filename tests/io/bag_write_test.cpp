@@ -14,7 +14,7 @@
 #include "palpate/io/message_source.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate::io {
+namespace palpate::io::bag_write_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -177,4 +177,4 @@ TEST(BagWrite, WhatATopicCannotSayIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::bag_write_test

@@ -10,7 +10,7 @@
 #include "palpate/io/depth_file.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate::io {
+namespace palpate::io::broken_recording_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -460,4 +460,4 @@ TEST_F(BrokenRecording, ANameThatIsNoneSaysWhichThereAre) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::broken_recording_test

@@ -13,6 +13,7 @@ namespace palpate::io {
 
 void PrintTo(const CloudFormat& format, std::ostream* out) { *out << format.name; }
 
+namespace cloud_file_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -125,4 +126,5 @@ TEST(Xyz, CommasCommentsAndNormals) {
 }
 
 }  // namespace
+}  // namespace cloud_file_test
 }  // namespace palpate::io

@@ -10,7 +10,7 @@
 #include "palpate/io/file.hpp"
 #include "palpate/io/png_image.hpp"
 
-namespace palpate::io {
+namespace palpate::io::depth_file_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -100,4 +100,4 @@ TEST(DepthFile, SharedDepthImageIsRead) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::depth_file_test

@@ -23,7 +23,7 @@
 #include "palpate/io/mesh_file.hpp"
 #include "palpate/io/xml.hpp"
 
-namespace palpate::io {
+namespace palpate::io::export_contract_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -430,4 +430,4 @@ TEST(Exporters, MujocoComesToRestWhereWeDo) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::export_contract_test

@@ -15,7 +15,7 @@
 #include "palpate/io/recording.hpp"
 #include "sensing/still_life.hpp"
 
-namespace palpate::io {
+namespace palpate::io::info_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -298,4 +298,4 @@ TEST(InfoOfABag, SuggestsMaskAndClouds) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::info_test

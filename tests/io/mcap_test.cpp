@@ -14,7 +14,7 @@
 #include "palpate/io/file.hpp"
 #include "palpate/io/ros_messages.hpp"
 
-namespace palpate::io {
+namespace palpate::io::mcap_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -217,4 +217,4 @@ TEST(RosMessages, EveryTypeHasADefinition) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::mcap_test

@@ -15,6 +15,7 @@ namespace palpate::io {
 
 void PrintTo(const MeshFormat& format, std::ostream* out) { *out << format.name; }
 
+namespace mesh_file_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -302,4 +303,5 @@ TEST(Sha256, MatchesTheStandardsExamples) {
 }
 
 }  // namespace
+}  // namespace mesh_file_test
 }  // namespace palpate::io

@@ -11,7 +11,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/io/depth_file.hpp"
 
-namespace palpate::io {
+namespace palpate::io::recording_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -467,4 +467,4 @@ TEST(ReadRecording, TheDocumentationsPlainFilesAreReadAsItSays) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::recording_test

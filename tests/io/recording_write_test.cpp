@@ -14,7 +14,7 @@
 #include "palpate/core/recording_values.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate::io {
+namespace palpate::io::recording_write_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -180,4 +180,4 @@ TEST_F(WrittenRecording, AClampIsWrittenWithWhatChoosesItsNodes) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::recording_write_test

@@ -17,7 +17,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/io/result_parts.hpp"
 
-namespace palpate::io {
+namespace palpate::io::result_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -266,4 +266,4 @@ TEST(Model, HoldsTheModuliOfEveryElement) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::result_test

@@ -12,7 +12,7 @@
 #include "palpate/io/file.hpp"
 #include "palpate/io/ros_messages.hpp"
 
-namespace palpate::io {
+namespace palpate::io::rosbag2_peer_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -161,4 +161,4 @@ TEST(Rosbag2Peers, ReadTheDatabasesOfTheTests) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::rosbag2_peer_test

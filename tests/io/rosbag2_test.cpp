@@ -7,7 +7,7 @@
 #include "io/rosbag2_files.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::io {
+namespace palpate::io::rosbag2_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -128,4 +128,4 @@ TEST(Rosbag2, MetadataWithoutItsFilesSaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::rosbag2_test

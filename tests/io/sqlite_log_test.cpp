@@ -10,7 +10,7 @@
 #include "io/recording_folder.hpp"
 #include "palpate/io/message_source.hpp"
 
-namespace palpate::io {
+namespace palpate::io::sqlite_log_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -114,4 +114,4 @@ TEST(SqliteLog, WhatIsNoLogIsSaid) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::sqlite_log_test

@@ -11,7 +11,7 @@
 #include "io/bag_files.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::io {
+namespace palpate::io::unpack_test {
 namespace {
 
 std::string packed(const std::string& text, const std::string& how) {
@@ -71,4 +71,4 @@ TEST(SqliteBag, PagesThatAreOnlyAnnouncedTakeNoMemory) {
 }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::unpack_test

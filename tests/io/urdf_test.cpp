@@ -7,7 +7,7 @@
 #include "io/broken_bytes.hpp"
 #include "io/recording_folder.hpp"
 
-namespace palpate::io {
+namespace palpate::io::urdf_test {
 namespace {
 
 using namespace palpate::io::test;
@@ -141,4 +141,4 @@ TEST(Urdf, CutOffAndDamagedFilesAreRefusedOrSurvived) {
 TEST(Urdf, WindowsLineEndsAreFine) { EXPECT_EQ(parse_urdf(with_crlf(arm), "arm.urdf", ".").links.size(), 4u); }
 
 }  // namespace
-}  // namespace palpate::io
+}  // namespace palpate::io::urdf_test

@@ -12,7 +12,7 @@
 #include "palpate/identify.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::around_interval_test {
 namespace {
 
 TEST(AroundInterval, OfABallHoldsTheTruth) {
@@ -61,4 +61,4 @@ TEST(AroundInterval, OfABallHoldsTheTruth) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::around_interval_test

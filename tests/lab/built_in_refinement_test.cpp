@@ -6,7 +6,7 @@
 
 #include "palpate/lab/built_in.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::built_in_refinement_test {
 namespace {
 
 // The demo's own error must be at most a fifth of the 1.5 % that the estimator states of its E: travel goes with 1/E. Near the end of
@@ -31,4 +31,4 @@ TEST(BuiltIn, RefinementMovesTheTruthLittle) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::built_in_refinement_test

@@ -11,7 +11,7 @@
 #include "palpate/sensing/observe.hpp"
 #include "refusals.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::built_in_test {
 namespace {
 
 DemoOptions quick() {
@@ -103,4 +103,4 @@ TEST(BuiltIn, BadOptionsAreRefusedAndCallersCanStop) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::built_in_test

@@ -21,7 +21,7 @@
 #include "palpate/lab/built_in.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::coverage_test {
 namespace {
 
 struct Lab {
@@ -174,4 +174,4 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Coverage, testing::ValuesIn(scenes()),
                          [](const auto& scene) { return scene.param.name; });
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::coverage_test

@@ -9,7 +9,7 @@
 #include "palpate/identify.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::cross_talk_test {
 namespace {
 
 /// In standard deviations that the answer states.
@@ -57,4 +57,4 @@ TEST(CrossTalk, StatedItIsInTheInterval) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::cross_talk_test

@@ -14,7 +14,7 @@
 #include "refusals.hpp"
 #include "sensing/small_camera.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::depth_sensor_test {
 namespace {
 
 PerfectView wall(float depth_m, float incidence_rad = 0) {
@@ -270,4 +270,4 @@ TEST(DepthSensor, BadOptionsAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::depth_sensor_test

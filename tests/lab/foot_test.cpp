@@ -12,7 +12,7 @@
 #include "palpate/identify.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::foot_test {
 namespace {
 
 struct Foot {
@@ -83,4 +83,4 @@ INSTANTIATE_TEST_SUITE_P(Objects, BuiltFoot,
                          [](const auto& bars) { return std::string(bars.param.object); });
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::foot_test

@@ -10,7 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/lab/pressed_block.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::force_curve_test {
 namespace {
 
 PressedBlockOptions block_of(const char* law) {
@@ -197,4 +197,4 @@ TEST(ForceCurve, EndsWhereASearchJustBeyondTheLastFindsNothing) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::force_curve_test

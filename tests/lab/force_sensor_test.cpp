@@ -11,7 +11,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/io/file.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::force_sensor_test {
 namespace {
 
 TEST(ForceSensor, ReadingsShowTheFiguresOfEveryRow) {
@@ -139,4 +139,4 @@ TEST(ForceSensor, ErrorsTurnWithTheWrist) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::force_sensor_test

@@ -11,7 +11,7 @@
 
 #include "refusals.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::graded_block_test {
 namespace {
 
 double smallest_dihedral_deg(const TetMesh& mesh) {
@@ -103,4 +103,4 @@ TEST(GradedBlock, BadOptionsAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::graded_block_test

@@ -9,7 +9,7 @@
 #include "palpate/lab/robot.hpp"
 #include "refusals.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::mishaps_test {
 namespace {
 
 LabObject small_ball() {
@@ -150,4 +150,4 @@ TEST(Mishaps, BadOptionsAreNamed) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::mishaps_test

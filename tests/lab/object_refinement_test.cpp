@@ -15,7 +15,7 @@
 #include "palpate/lab/object.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::object_refinement_test {
 namespace {
 
 struct Case {
@@ -153,4 +153,4 @@ std::vector<Case> cases() {
 INSTANTIATE_TEST_SUITE_P(Objects, Refinement, testing::ValuesIn(cases()), [](const auto& one) { return one.param.name; });
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::object_refinement_test

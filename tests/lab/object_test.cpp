@@ -15,7 +15,7 @@
 #include "palpate/lab/implicit_surface.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::object_test {
 namespace {
 
 TEST(ImplicitSurface, SphereHasItsVolumeAndLiesOnItself) {
@@ -341,4 +341,4 @@ TEST(Object, AnySurfaceOfAUserStandsOnTheTable) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::object_test

@@ -12,7 +12,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/lab/opposed_ball.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::paper_scenes_test {
 namespace {
 
 double travel_of(const Step& step) {
@@ -169,4 +169,4 @@ TEST(OpposedBall, IsPressedWhereItsTrianglesAre) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::paper_scenes_test

@@ -19,7 +19,7 @@
 #include "palpate/lab/random.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::partly_seen_test {
 namespace {
 
 int from_environment(const char* name, int otherwise) {
@@ -131,4 +131,4 @@ TEST_P(PartlySeen, CompletedShapeIsNearTheTrueOne) {
 INSTANTIATE_TEST_SUITE_P(Objects, PartlySeen, testing::Values("cube", "bear"), [](const auto& scene) { return std::string(scene.param); });
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::partly_seen_test

@@ -11,7 +11,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/geometry/mesh_checks.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::pressed_balloon_test {
 namespace {
 
 TEST(PressedBalloon, UnloadedItIsTheSphereThatItsPressureHolds) {
@@ -84,4 +84,4 @@ TEST(PressedBalloon, PushesBackMoreWhenBlownUpHarderAndSlackSkinOnlyPulls) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::pressed_balloon_test

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace palpate::lab {
+namespace palpate::lab::pressed_block_test {
 namespace {
 
 // A bar that is pushed at its side bends about its glued foot, whose edges are singular: cells of 20 mm there made the lab's bar 0.4 %
@@ -33,4 +33,4 @@ TEST(PressedBlock, ABentBarIsFineEnoughAwayFromThePadToo) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::pressed_block_test

@@ -14,7 +14,7 @@
 #include "palpate/lab/paper_scenes.hpp"
 #include "palpate/lab/pressed_block.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::pressed_memory_test {
 namespace {
 
 std::unique_ptr<Pressed> block(double young_modulus_pa, const PushSite&) {
@@ -214,4 +214,4 @@ TEST(PressedMemory, ARecordingIsTheSameWithAndWithoutIt) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::pressed_memory_test

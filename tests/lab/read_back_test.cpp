@@ -15,7 +15,7 @@
 #include "palpate/lab/built_in.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::read_back_test {
 namespace {
 
 constexpr double rounding = 1e-12;  // metres, newtons, entries of a rotation: all are of the order of one here
@@ -264,4 +264,4 @@ TEST(ReadBack, FolderAndBagGiveTheSameAnswer) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::read_back_test

@@ -16,7 +16,7 @@
 #include "palpate/lab/robot.hpp"
 #include "palpate/sensing/observe.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::rim_bias_test {
 namespace {
 
 // Weighted mean of errors as the robust loss hears them, over what is expected of it by chance.
@@ -129,4 +129,4 @@ TEST(OutlineBias, RaysThatCountAreRightOnAverageAndThoseBesideTheOutlineAreNot) 
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::rim_bias_test

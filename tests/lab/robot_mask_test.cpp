@@ -18,7 +18,7 @@
 #include "palpate/sensing/camera.hpp"
 #include "palpate/sensing/reach.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::robot_mask_test {
 namespace {
 
 TriMesh block(const Vec3& min, const Vec3& max) {
@@ -149,4 +149,4 @@ TEST(RobotMaskInTheLab, ArmReachesWhereItIsSent) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::robot_mask_test

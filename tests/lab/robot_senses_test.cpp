@@ -14,7 +14,7 @@
 #include "palpate/sensing/back_projection.hpp"
 #include "palpate/sensing/kinematics.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::robot_senses_test {
 namespace {
 
 LabRobot robot_with(const LabOptions& options, double albedo = 0.5, double texture = 1) {
@@ -233,4 +233,4 @@ TEST(RobotSenses, OptionsThatContradictAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::robot_senses_test

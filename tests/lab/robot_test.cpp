@@ -17,7 +17,7 @@
 #include "refusals.hpp"
 #include "temporary_folder.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::robot_test {
 namespace {
 
 LabOptions quick() {
@@ -294,4 +294,4 @@ TEST(LabRobot, PushesAtPlacesOfItsOwnWhereTheArmGetsThere) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::robot_test

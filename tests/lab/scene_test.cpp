@@ -9,7 +9,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/camera.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::scene_test {
 namespace {
 
 TEST(Scene, CylinderOnATableSeenFromTheSide) {
@@ -57,4 +57,4 @@ TEST(Scene, LookAtIsARightHandedCamera) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::scene_test

@@ -12,7 +12,7 @@
 #include "palpate/identify.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::seen_around_test {
 namespace {
 
 struct Bars {
@@ -75,4 +75,4 @@ INSTANTIATE_TEST_SUITE_P(Objects, SeenAround,
                          [](const auto& bars) { return std::string(bars.param.object); });
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::seen_around_test

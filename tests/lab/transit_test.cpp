@@ -13,7 +13,7 @@
 #include "palpate/lab/object.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::transit_test {
 namespace {
 
 // Sends a robot to the beginning of a push and no further, and keeps where its tip was.
@@ -110,4 +110,4 @@ TEST(LabTransit, AWayThroughTheObjectIsFelt) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::transit_test

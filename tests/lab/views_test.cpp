@@ -12,7 +12,7 @@
 #include "palpate/identify.hpp"
 #include "palpate/lab/robot.hpp"
 
-namespace palpate::lab {
+namespace palpate::lab::views_test {
 namespace {
 
 TEST(Views, ShapeOutOfDepthImagesIsGoodEnoughToMeasureWith) {
@@ -52,4 +52,4 @@ TEST(Views, LookingAroundNeedsAView) {
 }
 
 }  // namespace
-}  // namespace palpate::lab
+}  // namespace palpate::lab::views_test

@@ -12,7 +12,7 @@
 #include "palpate/io/bag_write.hpp"
 #include "palpate/io/recording.hpp"
 
-namespace palpate {
+namespace palpate::load_recording_test {
 namespace {
 
 using namespace io::test;
@@ -81,4 +81,4 @@ TEST(LoadRecording, SaysWhyNot) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::load_recording_test

@@ -13,7 +13,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/depth_render.hpp"
 
-namespace palpate {
+namespace palpate::online_test {
 namespace {
 
 /// The pushed block with its clouds as observations; first an unloaded step.
@@ -288,4 +288,4 @@ TEST(OnlineEstimator, RefusesAStepAndGoesOnWithoutIt) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::online_test

@@ -13,7 +13,7 @@
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/regions.hpp"
 
-namespace palpate::prediction {
+namespace palpate::prediction::predict_test {
 namespace {
 
 constexpr double edge_m = 0.1;
@@ -285,4 +285,4 @@ TEST(Predict, ElasticityTakesTheCovarianceOfTheTwo) {
 }
 
 }  // namespace
-}  // namespace palpate::prediction
+}  // namespace palpate::prediction::predict_test

@@ -11,7 +11,7 @@
 #include "palpate/geometry/stand_on.hpp"
 #include "palpate/lab/implicit_surface.hpp"
 
-namespace palpate::reconstruction {
+namespace palpate::reconstruction::build_object_test {
 namespace {
 
 TEST(BuildObject, a_surface_rides_on_its_volume_and_the_support_plane_finds_nodes) {
@@ -133,4 +133,4 @@ TEST(BuildObject, supports_by_node_number_need_a_given_volume) {
 }
 
 }  // namespace
-}  // namespace palpate::reconstruction
+}  // namespace palpate::reconstruction::build_object_test

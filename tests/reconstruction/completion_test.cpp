@@ -12,7 +12,7 @@
 #include "palpate/lab/object.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 
-namespace palpate::reconstruction {
+namespace palpate::reconstruction::completion_test {
 namespace {
 
 struct Seen {
@@ -187,4 +187,4 @@ TEST(Completion, WithoutFreeSpaceNothingIsGuessed) {
 }
 
 }  // namespace
-}  // namespace palpate::reconstruction
+}  // namespace palpate::reconstruction::completion_test

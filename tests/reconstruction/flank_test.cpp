@@ -10,7 +10,7 @@
 #include "palpate/reconstruction/fused_surface.hpp"
 #include "palpate/reconstruction/skirts.hpp"
 
-namespace palpate::reconstruction {
+namespace palpate::reconstruction::flank_test {
 namespace {
 
 constexpr double cell_m = 0.008, reach_cells = 4;
@@ -154,4 +154,4 @@ TEST(FusedSurface, StandsOnItsFootWithoutAChamfer) {
 }
 
 }  // namespace
-}  // namespace palpate::reconstruction
+}  // namespace palpate::reconstruction::flank_test

@@ -12,7 +12,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/reconstruction/build_object.hpp"
 
-namespace palpate::reconstruction {
+namespace palpate::reconstruction::foreign_points_test {
 namespace {
 
 using testing::Contains;
@@ -129,4 +129,4 @@ TEST(ForeignPoints, LeaveEveryPointItsNormalAndNoise) {
 }
 
 }  // namespace
-}  // namespace palpate::reconstruction
+}  // namespace palpate::reconstruction::foreign_points_test

@@ -14,7 +14,7 @@
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/registration/icp.hpp"
 
-namespace palpate::reconstruction {
+namespace palpate::reconstruction::fuse_views_test {
 namespace {
 
 TriMesh lump() {
@@ -170,4 +170,4 @@ TEST(FuseViews, says_what_is_missing) {
 }
 
 }  // namespace
-}  // namespace palpate::reconstruction
+}  // namespace palpate::reconstruction::fuse_views_test

@@ -14,7 +14,7 @@
 #include "palpate/reconstruction/build_object.hpp"
 #include "palpate/reconstruction/unseen_patches.hpp"
 
-namespace palpate::reconstruction {
+namespace palpate::reconstruction::fused_surface_test {
 namespace {
 
 /// Points of a ball with normals, evenly spread; noise along the normals. Those with `z` above the limit only.
@@ -174,4 +174,4 @@ TEST(FusedSurface, says_what_is_missing) {
 }
 
 }  // namespace
-}  // namespace palpate::reconstruction
+}  // namespace palpate::reconstruction::fused_surface_test

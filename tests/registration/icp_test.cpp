@@ -11,7 +11,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::registration {
+namespace palpate::registration::icp_test {
 namespace {
 
 /// A closed surface without symmetry, about 0.2 m.
@@ -236,4 +236,4 @@ TEST(Icp, options_and_clouds_are_checked) {
 }
 
 }  // namespace
-}  // namespace palpate::registration
+}  // namespace palpate::registration::icp_test

@@ -11,7 +11,7 @@
 #include "geometry/shapes.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::registration {
+namespace palpate::registration::views_test {
 namespace {
 
 constexpr double sigma_m = 0.001;
@@ -133,4 +133,4 @@ TEST(AlignViews, options_and_clouds_are_checked) {
 }
 
 }  // namespace
-}  // namespace palpate::registration
+}  // namespace palpate::registration::views_test

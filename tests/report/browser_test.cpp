@@ -15,6 +15,7 @@
 #include "report/pressed_block.hpp"
 #include "temporary_folder.hpp"
 
+namespace browser_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -92,3 +93,4 @@ TEST_F(Browser, LargeRecordingIsThinnedWithAWordAndTurns) {
 }
 
 }  // namespace
+}  // namespace browser_test

@@ -17,6 +17,7 @@
 #include "palpate/report/regions.hpp"
 #include "report/pressed_block.hpp"
 
+namespace figures_test {
 namespace {
 
 using namespace palpate;
@@ -144,3 +145,4 @@ TEST(Figures, HostileNamesStayText) {
 }
 
 }  // namespace
+}  // namespace figures_test

@@ -10,7 +10,7 @@
 #include "palpate/report/axes.hpp"
 #include "report/pressed_block.hpp"
 
-namespace palpate::report {
+namespace palpate::report::mesh_picture_test {
 namespace {
 
 std::array<int, 4> pixel(const Picture& picture, int x, int y) {
@@ -55,4 +55,4 @@ TEST(MeshPicture, EveryCloudHasAColourAndWhatIsInFrontCovers) {
 }
 
 }  // namespace
-}  // namespace palpate::report
+}  // namespace palpate::report::mesh_picture_test

@@ -16,6 +16,7 @@
 #include "report/pressed_block.hpp"
 #include "temporary_folder.hpp"
 
+namespace report_test {
 namespace {
 
 using namespace palpate;
@@ -205,3 +206,4 @@ TEST(Report, WriteFailsWithTheFilesName) {
 }
 
 }  // namespace
+}  // namespace report_test

@@ -6,7 +6,7 @@
 
 #include "palpate/sensing/images_at_rest.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::arm_mask_test {
 namespace {
 
 /// A disc of 20 mm above the middle of a camera's picture, 0.5 m away, before it touches and as it pushes.
@@ -106,4 +106,4 @@ TEST(ArmMask, TakesTheStickOutOfClouds) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::arm_mask_test

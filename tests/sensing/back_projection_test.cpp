@@ -13,7 +13,7 @@
 #include "palpate/sensing/depth_noise.hpp"
 #include "refusals.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::back_projection_test {
 namespace {
 
 DepthFrame empty_frame() {
@@ -283,4 +283,4 @@ TEST(BackProjection, BadInputIsNamed) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::back_projection_test

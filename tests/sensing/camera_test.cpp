@@ -9,7 +9,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::camera_test {
 namespace {
 
 Camera pinhole() {
@@ -143,4 +143,4 @@ TEST(Camera, BadFieldsAreNamed) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::camera_test

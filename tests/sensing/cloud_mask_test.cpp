@@ -11,7 +11,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::cloud_mask_test {
 namespace {
 
 enum class Part { table, object, robot, wall };
@@ -180,4 +180,4 @@ TEST(PointsOfObject, RefuseWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::cloud_mask_test

@@ -10,7 +10,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::depth_noise_test {
 namespace {
 
 TEST(DepthNoise, EveryRowIsNamedSourcedAndSane) {
@@ -93,4 +93,4 @@ TEST(DepthNoise, ConstantNeedsAFigureAndUnknownNamesAreListed) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::depth_noise_test

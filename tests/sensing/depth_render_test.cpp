@@ -10,7 +10,7 @@
 #include "palpate/geometry/triangle_tree.hpp"
 #include "palpate/sensing/camera.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::depth_render_test {
 namespace {
 
 Camera small_camera() {
@@ -178,4 +178,4 @@ TEST(DepthRender, WhatIsFarAsideOfABentLensIsNotDrawnIntoThePicture) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::depth_render_test

@@ -8,7 +8,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::free_space_test {
 namespace {
 
 // A camera at the origin that looks along z; a wall at 1 m, in the middle a box at 0.5 m, a hole without depth, a masked patch.
@@ -95,4 +95,4 @@ TEST(FreeSpace, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::free_space_test

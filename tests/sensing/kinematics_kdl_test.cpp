@@ -10,7 +10,7 @@
 #endif
 #include <random>
 
-namespace palpate::sensing {
+namespace palpate::sensing::kinematics_kdl_test {
 namespace {
 
 #ifdef PALPATE_WITH_KDL
@@ -87,4 +87,4 @@ TEST(KinematicsAgainstKdl, RandomTreesAgree) { GTEST_SKIP() << "built without li
 #endif
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::kinematics_kdl_test

@@ -10,7 +10,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::kinematics_test {
 namespace {
 
 RobotJoint joint(const std::string& name, const std::string& parent, const std::string& child, RobotJoint::Kind kind,
@@ -168,4 +168,4 @@ TEST(Kinematics, AJointWithoutAValueHidesWhatHangsOnIt) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::kinematics_test

@@ -10,7 +10,7 @@
 #include "palpate/lab/depth_sensor.hpp"
 #include "sensing/small_camera.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::lens_scatter_test {
 namespace {
 
 double stretch_at(int row, int column) {
@@ -78,4 +78,4 @@ TEST(LensScatter, IsThereWhereTheNoiseKnowsOfIt) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::lens_scatter_test

@@ -10,7 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/masked_points.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::plane_mask_test {
 namespace {
 
 // Camera 0.8 m above the table, looking straight down.
@@ -118,4 +118,4 @@ TEST(PlaneMask, MergesAndRefuses) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::plane_mask_test

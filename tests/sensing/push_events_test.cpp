@@ -10,7 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "refusals.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::push_events_test {
 namespace {
 
 const Vec3 down = -Vec3::UnitZ();
@@ -119,4 +119,4 @@ TEST(PushEventOptions, BadOnesAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::push_events_test

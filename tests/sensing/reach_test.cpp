@@ -13,7 +13,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sensing/arm_reach.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::reach_test {
 namespace {
 
 constexpr double upper_m = 0.4, fore_m = 0.3, hand_m = 0.1;
@@ -208,4 +208,4 @@ TEST(ArmReach, KeepsJointsWithinTheirLimitsAndLinksInFrontOfTheTable) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::reach_test

@@ -9,7 +9,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::rest_change_test {
 namespace {
 
 /// A block of 60 x 60 pixels, 0.1 m before a wall; pixels beside its edges report anything between.
@@ -54,4 +54,4 @@ TEST(ChangedShare, LooksAtNothingThatIsMaskedOrMissing) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::rest_change_test

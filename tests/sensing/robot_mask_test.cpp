@@ -9,7 +9,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::robot_mask_test {
 namespace {
 
 RobotShape shape(RobotShape::Kind kind, const Vec3& size) {
@@ -145,4 +145,4 @@ TEST(RobotMask, BadInputIsNamed) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::robot_mask_test

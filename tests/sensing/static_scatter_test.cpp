@@ -9,7 +9,7 @@
 
 #include "still_life.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::static_scatter_test {
 namespace {
 
 const StaticScatter& of(const std::vector<StaticScatter>& all, const std::string& what) {
@@ -70,4 +70,4 @@ TEST(StaticScatter, OfOneFrameNothingIsSaid) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::static_scatter_test

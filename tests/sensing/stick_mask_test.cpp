@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::sensing {
+namespace palpate::sensing::stick_mask_test {
 namespace {
 
 constexpr double sigma_m = 1e-3;
@@ -44,4 +44,4 @@ TEST(Sticks, AreMaskedInImages) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::stick_mask_test

@@ -10,7 +10,7 @@
 
 #include "palpate/core/error.hpp"
 
-namespace palpate::sensing {
+namespace palpate::sensing::wrench_test {
 namespace {
 
 const Vec3 gravity(0, 0, -9.81);
@@ -122,4 +122,4 @@ TEST(Wrench, OrientationsTooAlikeAreRefusedWithTheCure) {
 }
 
 }  // namespace
-}  // namespace palpate::sensing
+}  // namespace palpate::sensing::wrench_test

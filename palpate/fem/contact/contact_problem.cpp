@@ -13,7 +13,7 @@
 namespace palpate::fem {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 bool leaves_motions(const TetMesh& mesh, const Boundary& boundary) {
   if (boundary.inertia_relief) return false;
@@ -136,7 +136,7 @@ ContactProblem ContactSystem::problem(double young, double poisson, const Contac
 
 bool ContactSystem::evaluate(const ContactProblem& p, const std::vector<TouchMemory>& memory, ContactState& s) const {
   const double strain = assembly.energy_and_forces(law, p.m, s.u, s.internal, &s.inverted);
-  if (!(strain < kInfinity)) return false;
+  if (!(strain < kUnlimited)) return false;
   s.touching = VectorX::Zero(s.u.size());
   s.gradients.assign(contacts.size(), Vec6::Zero());
   s.energy = strain - p.external.dot(s.u) - p.wrench.dot(s.travelled);

@@ -41,7 +41,7 @@ void widen(ContactPathSensitivity& d, Index q) {
   for (auto& each : d.loads.radius) widen(each, q);
 }
 
-ContactLoadsAlong between(const ContactLoadsAlong& a, const ContactLoadsAlong& b, double t) {
+ContactLoadsAlong along_between(const ContactLoadsAlong& a, const ContactLoadsAlong& b, double t) {
   ContactLoadsAlong out = b;  // E, nu, radii, layers and regions are those of the whole step
   out.force_coefficients = (1 - t) * a.force_coefficients + t * b.force_coefficients;
   out.motion_coefficients = (1 - t) * a.motion_coefficients + t * b.motion_coefficients;
@@ -92,7 +92,7 @@ ContactPathSensitivity path_sensitivity(ContactSystem& system, const ContactEqui
   const ContactLoadsAlong start = d.loads;
   ContactLoadsAlong last = start;
   for (std::size_t i = 1; i < path.size(); ++i) {
-    const ContactLoadsAlong next = between(start, along, path[i].share);
+    const ContactLoadsAlong next = along_between(start, along, path[i].share);
     advance(system, at, path[i - 1], path[i], last, next, d);
     last = next;
   }

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "palpate/fem/linear_solver/at.hpp"
+
 #if defined(__x86_64__) && defined(__GNUC__)
 #define PALPATE_AVX2 __attribute__((target("avx2,fma")))
 #define PALPATE_X86 1
@@ -10,8 +12,6 @@
 
 namespace palpate::fem {
 namespace {
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 void multiply_plain(const Index* begin, const Index* column, const double* values, const double* x, double* y, Index first,
                     Index last) {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
+#include "palpate/fem/linear_solver/at.hpp"
+
 namespace palpate::fem {
 namespace {
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 constexpr int kBlock = 128;       // pivots eliminated between two updates of the rest of a front
 constexpr int kColumnChunk = 64;  // columns that a member of the team takes at a time

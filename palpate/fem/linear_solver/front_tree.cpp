@@ -5,13 +5,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "palpate/fem/linear_solver/at.hpp"
 #include "palpate/fem/linear_solver/elimination_order.hpp"
 
 namespace palpate::fem {
 namespace {
 
 using Indices = std::vector<Index>;
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 // Nodes. Minimum degree costs a third of nested dissection; its factor is within 20 % on cubes below the first limit, always
 // worse above the second, and in between both are tried.

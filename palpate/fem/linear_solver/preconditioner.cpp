@@ -5,12 +5,11 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "palpate/fem/linear_solver/at.hpp"
 #include "palpate/fem/linear_solver/large_array.hpp"
 
 namespace palpate::fem {
 namespace {
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 // Rigid motions of an aggregate whose nodes lie on a line, or that has lost unknowns, depend on each other; this share of
 // the diagonal keeps the coarse matrix regular in single precision and changes the coarse correction by less than a per

@@ -10,7 +10,7 @@
 namespace palpate::fem {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 // Share of the boundary that a uniform pressure gives each node: a third of a face to its corners, or to its midpoints where
 // it has some (the corners of a quadratic face then carry none of it).
@@ -82,7 +82,7 @@ void StaticSystem::forget_factors() {
 
 bool StaticSystem::evaluate(const StaticProblem& p, StaticState& s) const {
   const double strain_energy = assembly.energy_and_forces(law, p.m, s.u, s.internal, &s.inverted);
-  if (!(strain_energy < kInfinity)) return false;
+  if (!(strain_energy < kUnbounded)) return false;
   s.energy = strain_energy - p.external.dot(s.u);
   s.unbalanced = system.free_part(s.internal - p.external);
   const double scale = std::max(p.external.norm(), s.internal.norm());
