@@ -18,10 +18,10 @@ function(palpate_join name)
   endforeach()
 endfunction()
 
-# The largest of them take 1.5 GB: on a machine of many cores and little memory not as many at a time as there are cores.
+# The largest of them take 2 GB: on a machine of many cores and little memory not as many at a time as there are cores.
 if(PALPATE_JOIN_FILES AND PALPATE_IS_TOP_LEVEL AND NOT CMAKE_JOB_POOL_COMPILE)
   cmake_host_system_information(RESULT memory_mb QUERY TOTAL_PHYSICAL_MEMORY)
-  math(EXPR jobs "${memory_mb} / 1500 + 1")
+  math(EXPR jobs "${memory_mb} / 2000 + 1")
   set_property(GLOBAL APPEND PROPERTY JOB_POOLS palpate_compile=${jobs})
   set(CMAKE_JOB_POOL_COMPILE palpate_compile)
 endif()

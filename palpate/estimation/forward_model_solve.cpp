@@ -81,7 +81,7 @@ bool ForwardModel::follow(std::size_t s, const VectorX& unknowns, fem::ResponseS
 int ForwardModel::inverted_elements(std::size_t s, const VectorX& unknowns) {
   Body& body = body_of(push(s), worker_of(s));
   if (contact_) return predict(s, unknowns, false).inverted_elements;
-  return body.response->solve(query(coefficients(s, body, unknowns), unknowns, false)).inverted_elements;
+  return body.response->inverted_elements(query(coefficients(s, body, unknowns), unknowns, false));
 }
 
 std::optional<fem::Certificate> ForwardModel::certify(const VectorX& unknowns) {

@@ -18,6 +18,7 @@ struct Loss {
   double tukey = 4.685;    ///< cut of Tukey's biweight in standard deviations, 95 % efficient on clean data
   double widening = 1;     ///< cut over the final cut while annealing: sigma of robust rows grows with it, priors do not
   bool along_rays = true;  ///< depth residuals along the ray (else closest point)
+  Index most_points = 0;      ///< of a cloud or an image, evenly chosen, where closest points are asked for; 0: all
   std::size_t every = 1;      ///< steps that count: every n-th (the first rounds of a long recording need no more)
   std::vector<char> steps;    ///< steps that count, one flag each (held-out prediction, a push alone); empty = all
   /// Rays that count, a step each; nullptr or none: all. Which rays meet the object near its outline changes with the unknowns,

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "palpate/estimation/held_poisson.hpp"
 #include "palpate/fem/materials.hpp"
@@ -338,12 +339,15 @@ VectorX find_start(Objective& objective, double poisson_start) {
   Loss wide;
   wide.tukey = 1e3;
   wide.along_rays = false;
+  wide.most_points = 400;  // a modulus to start from shows in so many
   double best_cost = std::numeric_limits<double>::infinity();
-  double best_decade = 5;
+  constexpr double softest = 1.5, stiffest = 11.5, hardly = 1e-3, alike = 1e-2;
+  double best_decade = stiffest;  // where all that is softer moves farther than the object is long
   std::vector<StepPrediction> scaled = stiff;  // once: derivatives are large, and stay what they are
-  const auto try_at = [&](double decade, const std::vector<std::size_t>& steps) {
+  // @returns the cost where the surface hardly moves
+  const auto try_at = [&](double decade, const std::vector<std::size_t>& steps) -> std::optional<double> {
     const double ratio = std::exp(guess(log_young) - decade * std::log(10.0));
-    bool sensible = true;
+    bool sensible = true, hardly_moves = true;
     for (std::size_t s : steps) {
       StepPrediction& prediction = scaled[s];
       prediction.surface_m = stiff[s].surface_m;
@@ -360,23 +364,32 @@ VectorX find_start(Objective& objective, double poisson_start) {
         for (Index v = 0; v < prediction.material_m.rows(); ++v)
           prediction.material_m.row(v) += (ratio - 1) * material.segment<3>(3 * v).transpose();
       }
-      sensible = sensible && ratio * loaded.cwiseAbs().maxCoeff() < size_m;
+      const double moves_m = ratio * loaded.cwiseAbs().maxCoeff();
+      sensible = sensible && moves_m < size_m;
+      hardly_moves = hardly_moves && moves_m < hardly * size_m;
+      for (const auto& force : prediction.d_force) hardly_moves = hardly_moves && force.col(0).isZero(0);
       for (std::size_t l = 0; l < prediction.force_n.size(); ++l) {
         prediction.force_n[l] += (1 / ratio - 1) * prediction.d_force[l].col(0);
         prediction.travel_m(static_cast<Index>(l)) -= (ratio - 1) * prediction.d_travel(static_cast<Index>(l), 0);
       }
     }
-    if (!sensible) return;
+    if (!sensible) return {};
     const double cost = objective.cost_of(scaled, steps, guess, wide);
     if (cost < best_cost) {
       best_cost = cost;
       best_decade = decade;
     }
+    return hardly_moves ? std::optional(cost) : std::nullopt;
   };
   // Half decades first: at the worst of them the displacement is 0.8 of itself off, still less than no displacement is. The steps that
   // move most tell them apart; beside the best one the others have a say, too, up to where the next one would have led.
   const std::vector<std::size_t> known = usable_steps(stiff), few = moved_most(stiff, known);
-  for (double decade = 1.5; decade <= 11.5; decade += 0.5) try_at(decade, few);
+  std::optional<double> before;
+  for (double decade = softest; decade <= stiffest; decade += 0.5) {
+    const std::optional<double> still = try_at(decade, few);
+    if (still && before && std::abs(*still - *before) < alike) break;  // all that is stiffer looks as if nothing moved
+    before = still;
+  }
   const double rough = best_decade;
   if (few.size() < known.size()) {
     best_cost = std::numeric_limits<double>::infinity();

@@ -59,6 +59,35 @@ double last_coefficients(const std::vector<MatrixX>& data, const std::vector<Mat
   return error;
 }
 
+/// What is asked of every node, too, below what is watched.
+Eigen::SparseMatrix<double> over_field(const Eigen::SparseMatrix<double>& watched) {
+  Eigen::SparseMatrix<double, Eigen::RowMajor> all = watched;
+  all.conservativeResize(watched.rows() + watched.cols(), watched.cols());
+  for (Eigen::Index i = 0; i < watched.cols(); ++i) all.insert(watched.rows() + i, i) = 1;
+  return all;
+}
+
+/// Takes the rows below the first ones off an answer. @returns them: values, slopes to nu
+std::pair<MatrixX, MatrixX> cut_below(UnitResponses& r, Index rows) {
+  const Index k = static_cast<Index>(r.force.cols()), m = static_cast<Index>(r.motion.cols()),
+              below = static_cast<Index>(r.force.rows()) - rows;
+  MatrixX values(below, k + m), slopes(below, k + m);
+  values << r.force.bottomRows(below), r.motion.bottomRows(below);
+  slopes << r.force_d_poisson.bottomRows(below), r.motion_d_poisson.bottomRows(below);
+  for (MatrixX* all : {&r.force, &r.motion, &r.force_d_poisson, &r.motion_d_poisson}) all->conservativeResize(rows, Eigen::NoChange);
+  return {std::move(values), std::move(slopes)};
+}
+
+/// Coefficients of the polynomial through values (first half of `data`) and slopes at the nodes.
+std::vector<MatrixX> coefficients_of(const std::vector<MatrixX>& data, const MatrixX& inverse) {
+  std::vector<MatrixX> out(data.size());
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    out[i] = inverse(static_cast<Index>(i), 0) * data[0];
+    for (std::size_t j = 1; j < data.size(); ++j) out[i] += inverse(static_cast<Index>(i), static_cast<Index>(j)) * data[j];
+  }
+  return out;
+}
+
 }  // namespace
 
 LinearResponse::LinearResponse(const Statics& statics, Eigen::SparseMatrix<double> watched, Options options)
@@ -82,8 +111,8 @@ int LinearResponse::load_cases() const {
   return load_cases_;
 }
 
-UnitResponses LinearResponse::solve(double poisson_ratio) const {
-  UnitResponses solved = statics_.unit_responses(poisson_ratio, watched_);
+UnitResponses LinearResponse::solve(double poisson_ratio, const Eigen::SparseMatrix<double>& watched) const {
+  UnitResponses solved = statics_.unit_responses(poisson_ratio, watched);
   ++factorisations_;
   load_cases_ += 2 * static_cast<int>(solved.force.cols() + solved.motion.cols());  // values and slopes
   return solved;
@@ -102,7 +131,7 @@ std::shared_ptr<const UnitResponses> LinearResponse::at(double poisson_ratio) co
   if (inside && !coefficients_.empty()) {
     answer = std::make_shared<UnitResponses>(interpolate(poisson_ratio, 0));
   } else {
-    answer = std::make_shared<UnitResponses>(solve(poisson_ratio));
+    answer = std::make_shared<UnitResponses>(solve(poisson_ratio, watched_));
   }
   // A search that is refused a step comes back to where it was, and one over nu to the same places as data come in.
   constexpr double kept_bytes = 5e7;
@@ -120,10 +149,16 @@ void LinearResponse::make_polynomial() const {
   constexpr double begin = 0.3;
   double wanted = std::log(begin / options_.tolerance) / (2 * std::log(rate));
   usable_ = false;
+  const Eigen::Index columns = statics_.boundary().forces.cols() + statics_.boundary().motions.cols();
+  Eigen::SparseMatrix<double> all_rows;
+  if (options_.field_limit_bytes > 0) all_rows = over_field(watched_);
   while (wanted <= options_.max_factorisations) {
     const int nodes = std::max(3, static_cast<int>(std::ceil(wanted)));
     const Index terms = 2 * nodes;
-    std::vector<MatrixX> data(static_cast<std::size_t>(terms));
+    std::vector<MatrixX> data(static_cast<std::size_t>(terms)), field_data;
+    const double field_bytes = 8.0 * terms * static_cast<double>(watched_.cols()) * static_cast<double>(columns);
+    if (all_rows.rows() > 0 && field_bytes <= options_.field_limit_bytes) field_data.resize(data.size());
+    const Eigen::SparseMatrix<double>& wanted_rows = field_data.empty() ? watched_ : all_rows;
     MatrixX system(terms, terms);
     VectorX value(terms), slope(terms);
     VectorX gradients;
@@ -131,30 +166,32 @@ void LinearResponse::make_polynomial() const {
     for (int j = 0; j < nodes; ++j) {
       const double x = std::cos(EIGEN_PI * (2 * j + 1) / (2 * nodes));
       const double z = range.middle + range.half * x;
-      const UnitResponses solved = solve(z_to_poisson(z));
+      UnitResponses solved = solve(z_to_poisson(z), wanted_rows);
       residual = std::max(residual, solved.residual);
       const auto at = static_cast<std::size_t>(j);
+      const double to_slope = poisson_d_z(z) * range.half;
+      if (!field_data.empty()) {
+        auto [field, field_slope] = cut_below(solved, static_cast<Index>(watched_.rows()));
+        field_data[at] = std::move(field);
+        field_data[at + static_cast<std::size_t>(nodes)] = to_slope * field_slope;
+      }
       data[at] = stacked(solved, false);
       if (16.0 * static_cast<double>(data[at].size()) * nodes > options_.memory_limit_bytes) return;
       VectorX largest(data[at].cols());
       largest << solved.largest_gradient_force, solved.largest_gradient_motion;
       gradients = j == 0 ? largest : VectorX(gradients.cwiseMax(largest));
-      data[at + static_cast<std::size_t>(nodes)] = poisson_d_z(z) * range.half * stacked(solved, true);
+      data[at + static_cast<std::size_t>(nodes)] = to_slope * stacked(solved, true);
       chebyshev(x, value, slope);
       system.row(j) = value.transpose();
       system.row(nodes + j) = slope.transpose();
     }
     const MatrixX inverse = system.partialPivLu().inverse();
-    std::vector<MatrixX> coefficients(data.size());
-    for (std::size_t i = 0; i < data.size(); ++i) {
-      coefficients[i] = inverse(static_cast<Index>(i), 0) * data[0];
-      for (std::size_t j = 1; j < data.size(); ++j)
-        coefficients[i] += inverse(static_cast<Index>(i), static_cast<Index>(j)) * data[j];
-    }
+    std::vector<MatrixX> coefficients = coefficients_of(data, inverse);
     const double error = last_coefficients(data, coefficients, static_cast<Index>(watched_.rows()));
     if (error <= options_.tolerance) {
       coefficients_ = std::move(coefficients);
       coefficients_[0].bottomRows<1>() = gradients.transpose();
+      field_ = coefficients_of(field_data, inverse);
       error_ = error;
       residual_ = residual;
       usable_ = true;
@@ -172,6 +209,20 @@ std::shared_ptr<const ResponseSpan> LinearResponse::span(Index rows, double pois
     span_ = std::make_shared<const ResponseSpan>(span_of(coefficients_, rows, 0.5 * (low + high), 0.5 * (high - low)));
   }
   return span_;
+}
+
+std::optional<VectorX> LinearResponse::displacement_m(double poisson_ratio, const VectorX& force_over_young,
+                                                      const VectorX& motion) const {
+  const std::lock_guard lock(mutex_);
+  if (field_.empty() || poisson_ratio < options_.poisson_lower || poisson_ratio > options_.poisson_upper) return std::nullopt;
+  const double low = poisson_to_z(options_.poisson_lower), high = poisson_to_z(options_.poisson_upper);
+  VectorX value(static_cast<Index>(field_.size())), slope;
+  chebyshev(Range{0.5 * (low + high), 0.5 * (high - low)}.to_unit(poisson_to_z(poisson_ratio)), value, slope);
+  VectorX coefficients(force_over_young.size() + motion.size());
+  coefficients << force_over_young, motion;
+  VectorX out = field_[0] * coefficients;
+  for (std::size_t i = 1; i < field_.size(); ++i) out += field_[i] * (value(static_cast<Index>(i)) * coefficients);
+  return out;
 }
 
 UnitResponses LinearResponse::interpolate(double poisson_ratio, Index first_row) const {

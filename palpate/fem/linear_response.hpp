@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "palpate/fem/response_span.hpp"
@@ -22,6 +23,7 @@ class LinearResponse {
     double tolerance = 1e-7;      ///< of the polynomial's own error, relative to the column's largest watched value
     int max_factorisations = 24;
     double memory_limit_bytes = 1e9;  ///< of the polynomial; beyond it every ratio is solved for
+    double field_limit_bytes = 0;     ///< of a second one, of the whole displacement; beyond it there is no displacement_m()
   };
 
   /// @param statics  of a linear material; must outlive this object, and is used by it alone
@@ -37,6 +39,10 @@ class LinearResponse {
   /// What at() says of the watched rows from `first_row` on, where span() has an answer.
   UnitResponses rows_from(Index first_row, double poisson_ratio) const { return interpolate(poisson_ratio, first_row); }
 
+  /// The displacement of all nodes, 3n, without a solve. nullopt: its polynomial is not made, too large, or does not reach this ratio.
+  /// @param force_over_young  k: coefficients over E  @param motion  m
+  std::optional<VectorX> displacement_m(double poisson_ratio, const VectorX& force_over_young, const VectorX& motion) const;
+
   /// Of the polynomial, relative: the larger of its last coefficients and what the solver left over (0: not made).
   double interpolation_error() const;
   int factorisations() const;
@@ -44,7 +50,7 @@ class LinearResponse {
   int load_cases() const;
 
  private:
-  UnitResponses solve(double poisson_ratio) const;
+  UnitResponses solve(double poisson_ratio, const Eigen::SparseMatrix<double>& watched) const;
   void make_polynomial() const;
   UnitResponses interpolate(double poisson_ratio, Index first_row) const;
 
@@ -56,6 +62,7 @@ class LinearResponse {
   mutable int factorisations_ = 0, load_cases_ = 0;
   mutable bool usable_ = true;                 // false: the polynomial would be too large, or not accurate enough
   mutable std::vector<MatrixX> coefficients_;  // of T_i: [watched; reactions of forces and motions; gradients] x (k + m)
+  mutable std::vector<MatrixX> field_;         // of T_i: 3n x (k + m)
   mutable std::shared_ptr<const ResponseSpan> span_;
   mutable double error_ = 0, residual_ = 0;
 };

@@ -54,6 +54,7 @@ struct Response::Impl {
       linear_options.poisson_lower = options.poisson_lower;
       linear_options.poisson_upper = options.poisson_upper;
       linear_options.tolerance = options.superposed_tolerance;
+      linear_options.field_limit_bytes = 6e7;
       linear = std::make_unique<LinearResponse>(*statics, over_conjugates(rows, forces), linear_options);
     } else if (load.size() > 0 && load.norm() > 0 && motions == 0) {
       LoadingBranch::Options branch_options;
@@ -219,6 +220,15 @@ ResponseState Response::at(const ResponseQuery& query) const {
 ResponseState Response::solve(const ResponseQuery& query, const ResponseStart& start) const {
   impl_->check(query);
   return impl_->solved(query, start);
+}
+
+int Response::inverted_elements(const ResponseQuery& query) const {
+  impl_->check(query);
+  if (impl_->linear) {
+    const auto field_m = impl_->linear->displacement_m(query.poisson_ratio, query.force / query.young_modulus_pa, query.motion);
+    if (field_m) return impl_->statics->inverted_elements(*field_m);
+  }
+  return impl_->solved(query, {}).inverted_elements;
 }
 
 std::shared_ptr<const ResponseSpan> Response::span(double poisson_ratio) const {

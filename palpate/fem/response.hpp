@@ -132,6 +132,9 @@ class Response {
   /// Solved in full, whether or not a reduced model would do. Without a start: from rest.
   ResponseState solve(const ResponseQuery& query, const ResponseStart& start = {}) const;
 
+  /// Elements that are turned inside out there: by superposition where the whole displacement is kept as a polynomial, else solved for.
+  int inverted_elements(const ResponseQuery& query) const;
+
   /// Fields that the watched rows of a superposed answer are sums of (LinearResponse::span); nullptr: ask for `at` instead.
   std::shared_ptr<const ResponseSpan> span(double poisson_ratio) const;
   /// What `at` says beside the watched rows, where span() has an answer: a fraction of the work.

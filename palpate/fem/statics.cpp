@@ -74,6 +74,8 @@ UnitResponses Statics::unit_responses(double poisson_ratio, const Eigen::SparseM
   return impl_->unit_responses(poisson_ratio, watched);
 }
 
+int Statics::inverted_elements(const VectorX& displacement_m) const { return impl_->inverted_elements(displacement_m); }
+
 bool Statics::is_linear() const { return impl_->law.is_linear(); }
 const TetMesh& Statics::mesh() const { return impl_->mesh; }
 const Boundary& Statics::boundary() const { return impl_->boundary; }

@@ -172,6 +172,9 @@ class Statics {
   /// @param watched  r x 3n
   UnitResponses unit_responses(double poisson_ratio, const Eigen::SparseMatrix<double>& watched) const;
 
+  /// Elements with J <= 0 at a quadrature point of this displacement (3n) of a linear material, whether or not it is in equilibrium.
+  int inverted_elements(const VectorX& displacement_m) const;
+
   bool is_linear() const;
   const TetMesh& mesh() const;
   const Boundary& boundary() const;

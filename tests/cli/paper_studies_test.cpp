@@ -35,14 +35,6 @@ TEST(PaperStudies, APointLoadPutsBothMethodsOffAndPalpatesOwnModelDoesNot) {
   EXPECT_NE(to_surface.paper.young_modulus_pa, own.paper.young_modulus_pa);
 }
 
-TEST(PaperStudies, WithNothingWrongTheIntervalHoldsInSilenceAndElseItIsSaid) {
-  const auto rows = study_of("faults")->run({}, {});
-  ASSERT_EQ(rows.size(), 4u);
-  EXPECT_TRUE(holds(rows.front()));
-  EXPECT_TRUE(rows.front().palpate.verdicts.empty());
-  for (std::size_t k = 1; k < rows.size(); ++k) EXPECT_FALSE(rows[k].palpate.verdicts.empty()) << rows[k].what;
-}
-
 /// Root mean square of how far the surface's vertices lie from the mesh's outline.
 double off_m(const TriMesh& surface, const TetMesh& mesh) {
   const geometry::TriangleTree outline({mesh.nodes_m, fem::boundary_triangles(mesh)});

@@ -145,6 +145,35 @@ TEST_P(LinearResponseContract, SpansItsAnswers) {
   }
 }
 
+// The whole displacement and what it turns inside out, at loads where some of it is; with the same watched rows as without.
+TEST_P(LinearResponseContract, KnowsTheWholeDisplacement) {
+  const Statics statics(mesh, "linear", driven(), options);
+  const Eigen::SparseMatrix<double> some = everything().topRows(12);
+  const LinearResponse without(statics, some, range);
+  LinearResponse::Options whole = range;
+  whole.field_limit_bytes = 1e9;
+  const LinearResponse response(statics, some, whole);
+  const VectorX a = (VectorX(6) << 20, 10, 0, 0, 1000, -9000).finished();
+  const Eigen::Vector2d b(-0.1, 0.05);
+  EXPECT_FALSE(response.displacement_m(0.5 * (range.poisson_lower + range.poisson_upper), a, b)) << "nothing was solved for yet";
+  int most = 0;
+  for (double share : {0.0, 0.11, 0.83, 1.0}) {
+    const double nu = range.poisson_lower + share * (range.poisson_upper - range.poisson_lower), young = 20000;
+    const auto unit = response.at(nu), plain = without.at(nu);
+    EXPECT_EQ(unit->force, plain->force);
+    EXPECT_EQ(unit->motion_d_poisson, plain->motion_d_poisson);
+    const auto field_m = response.displacement_m(nu, a / young, b);
+    ASSERT_TRUE(field_m);
+    const Equilibrium full = statics.solve(young, nu, a, b);
+    EXPECT_LT((*field_m - full.displacement_m).norm(), 1e-6 * full.displacement_m.norm()) << nu;
+    EXPECT_EQ(statics.inverted_elements(*field_m), full.inverted_elements);
+    most = std::max(most, full.inverted_elements);
+    EXPECT_FALSE(without.displacement_m(nu, a / young, b));
+  }
+  EXPECT_GT(most, 0);
+  EXPECT_FALSE(response.displacement_m(range.poisson_upper + 1e-3, a, b));
+}
+
 TEST_P(LinearResponseContract, SpansNothingWhereNothingActs) {
   Boundary held = driven();
   held.forces.resize(held.forces.rows(), 0);

@@ -74,6 +74,7 @@ TEST_P(ResponseContract, AgreesWithFullSolves) {
       ASSERT_TRUE(c.converged) << c.reason;
       EXPECT_LT(c.difference, 2e-3);
       EXPECT_LT(c.difference, r.error);
+      EXPECT_EQ(response.inverted_elements(q), c.inverted_elements);
       EXPECT_TRUE(c.stable);
       EXPECT_FALSE(c.second_equilibrium);
       const ResponseState exact = full.solve(q);

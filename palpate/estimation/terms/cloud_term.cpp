@@ -56,6 +56,10 @@ class CloudTerm : public Term {
     VectorX slope(count);
     for (Index i = 0; i < points_m_.rows(); ++i) {
       const Vec3 seen = camera.apply(points_m_.row(i)), point = frame.apply(seen);
+      if (!view.asks(i, static_cast<Index>(points_m_.rows()))) {
+        rows.residual(i) = std::numeric_limits<double>::infinity();
+        continue;
+      }
       const auto hit = tree_->closest(point, hints_[static_cast<std::size_t>(i)]);
       hints_[static_cast<std::size_t>(i)] = hit.triangle;
       const auto triangle = rest_.triangles.row(hit.triangle);

@@ -78,7 +78,7 @@ class RayTerm : public Term {
       std::optional<Scattered> scattered;
       Vec3 lever = measured;  // where the frame's pose acts: the hit, for a ray
       const bool chosen = view.chosen != nullptr && (*view.chosen)[static_cast<std::size_t>(i)] == counts_in;
-      if (view.chosen != nullptr && !chosen) {
+      if ((view.chosen != nullptr && !chosen) || !view.asks(i, static_cast<Index>(rays_.range_m.size()))) {
         rows.residual(i) = std::numeric_limits<double>::infinity();
         continue;
       }
@@ -96,7 +96,8 @@ class RayTerm : public Term {
             range_m = hit->range_m;
           }
         } else if (chosen && !view.surface_slopes) {  // nearest points jump from edge to edge: no quadratic form holds them
-          if (const auto beside = beside_outline(tree_of(sight, predicted.surface_m), origin_m, direction, observed, rays_.sigma_m(i))) {
+          if (const auto beside = beside_outline(tree_of(sight, predicted.surface_m), origin_m, direction, observed, rays_.sigma_m(i),
+                                                 hints_[static_cast<std::size_t>(i)])) {
             triangle = beside->triangle;
             barycentric = beside->barycentric;
             gradient = across_edge(predicted.surface_m, *beside, direction);
@@ -315,20 +316,21 @@ class RayTerm : public Term {
   /// Where the surface comes nearest to a ray that counts and just misses it: its depth goes on as that of the outline. As an outlier
   /// it would hold the fit where the outline stood when the rays were chosen, at a sharp edge above all.
   /// @param observed_m  on the ray, near the surface
-  /// @returns nothing further off than noise reaches
-  static std::optional<geometry::ClosestPoint> beside_outline(const geometry::TriangleTree& tree, const Vec3& origin_m, const Vec3& direction,
-                                                              const Vec3& observed_m, double sigma_m) {
+  /// @param hint  a triangle to begin with; the one that was found @returns nothing further off than noise reaches
+  static std::optional<geometry::ClosestPoint> beside_outline(const geometry::TriangleTree& tree, const Vec3& origin_m,
+                                                              const Vec3& direction, const Vec3& observed_m, double sigma_m, Index& hint) {
     constexpr double near_std = 5;
     constexpr int rounds = 8;
     Vec3 on_ray = observed_m;
-    geometry::ClosestPoint nearest = tree.closest(on_ray);
+    geometry::ClosestPoint nearest = tree.closest(on_ray, hint);
     for (int round = 0; round < rounds; ++round) {
       const Vec3 across = origin_m + direction.dot(nearest.point_m - origin_m) * direction;
       const bool there = (across - on_ray).norm() < 1e-3 * sigma_m;
       on_ray = across;
       if (there) break;
-      nearest = tree.closest(on_ray);
+      nearest = tree.closest(on_ray, nearest.triangle);
     }
+    hint = nearest.triangle;
     if ((nearest.point_m - on_ray).norm() > near_std * sigma_m) return std::nullopt;
     return nearest;
   }

@@ -46,7 +46,13 @@ struct TermView {
   /// A RayChoice each: rays that count, whatever they meet and how they graze it; the others are not asked about. nullptr: all that meet the
   /// surface at no steeper an angle than the term trusts
   const std::vector<char>* chosen = nullptr;
+  Index most_points = 0;        ///< closest points are asked of so many, evenly chosen; rows of the others are infinite. 0: of all
   bool surface_slopes = false;  ///< TermRows::surface or facets is wanted, by terms that look at the surface
+
+  /// Is this one of the points that are asked, out of so many?
+  bool asks(Index point, Index count) const {
+    return along_rays || most_points <= 0 || count <= most_points || point % (1 + (count - 1) / most_points) == 0;
+  }
 };
 
 /// How a residual follows the surface that it looks at: it changes by the sum of per_corner.col(k) . motion of corner k.

@@ -90,6 +90,14 @@ bool StaticSystem::evaluate(const StaticProblem& p, StaticState& s) const {
   return std::isfinite(s.energy) && std::isfinite(s.residual);
 }
 
+int StaticSystem::inverted_elements(const VectorX& displacement_m) const {
+  if (displacement_m.size() != 3 * assembly.node_count()) throw Error("needs three values a node", "inverted_elements: displacement_m");
+  VectorX forces;
+  int inverted = 0;
+  assembly.energy_and_forces(law, moduli(1.0, 0.0), displacement_m, forces, &inverted);
+  return inverted;
+}
+
 StaticProblem StaticSystem::problem(double young, double poisson, const VectorX& a, const VectorX& b,
                                     const VectorX& extra) const {
   if (a.size() != boundary.forces.cols())

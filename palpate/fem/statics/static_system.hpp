@@ -44,6 +44,7 @@ class StaticSystem {
   std::vector<Equilibrium> other_equilibria(const Equilibrium& at);
   SensitivityAlong sensitivity(const Equilibrium& at, const MatrixX& along_force, const MatrixX& along_motion);
   std::vector<Equilibrium> solve_linear(double young, double poisson, const MatrixX& a, const MatrixX& b);
+  int inverted_elements(const VectorX& displacement_m) const;  ///< of a linear material
   UnitResponses unit_responses(double poisson, const Eigen::SparseMatrix<double>& watched);
 
   TetMesh mesh;
