@@ -128,7 +128,7 @@ std::vector<TermRows> Objective::rows_of(std::size_t s, const StepPrediction& pr
   std::vector<TermRows> rows;
   for (std::size_t t = 0; t < terms_[s].size(); ++t) {
     const bool some = chosen != nullptr && !(*chosen)[t].empty();
-    rows.push_back(terms_[s][t]->rows(predicted, unknowns, {loss.along_rays, some ? &(*chosen)[t] : nullptr, loss.most_points, surface_slopes}));
+    rows.push_back(terms_[s][t]->rows(predicted, unknowns, {loss.along_rays, some ? &(*chosen)[t] : nullptr, surface_slopes, loss.most_points}));
     if (!loss.noise) continue;
     auto noise = loss.noise->of(s, t);  // of the same points
     if (noise && noise->weight().size() == rows.back().residual.size()) rows.back().shared_noise = std::move(noise);

@@ -46,8 +46,8 @@ struct TermView {
   /// A RayChoice each: rays that count, whatever they meet and how they graze it; the others are not asked about. nullptr: all that meet the
   /// surface at no steeper an angle than the term trusts
   const std::vector<char>* chosen = nullptr;
-  Index most_points = 0;        ///< closest points are asked of so many, evenly chosen; rows of the others are infinite. 0: of all
   bool surface_slopes = false;  ///< TermRows::surface or facets is wanted, by terms that look at the surface
+  Index most_points = 0;        ///< closest points are asked of so many, evenly chosen; rows of the others are infinite. 0: of all
 
   /// Is this one of the points that are asked, out of so many?
   bool asks(Index point, Index count) const {
