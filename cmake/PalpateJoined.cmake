@@ -1,9 +1,10 @@
 # Most of what a file takes to compile are headers and templates that its neighbours read, too, Eigen's above all. The files of a room are
-# therefore compiled together, a few at a time: in less than half the time of one by one. What a file borrows of a neighbour (a header,
+# therefore compiled together, a few at a time: in about half the time of one by one. What a file borrows of a neighbour (a header,
 # a name) is then not missed: `-DPALPATE_JOIN_FILES=OFF` (the debug preset) shows it.
 option(PALPATE_JOIN_FILES "Compile neighbouring files together" ON)
 set(PALPATE_FILES_AT_ONCE 8)
 
+# palpate_joined(<target>): its neighbouring files are compiled together.
 function(palpate_joined target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${PALPATE_JOIN_FILES} UNITY_BUILD_MODE GROUP)
 endfunction()

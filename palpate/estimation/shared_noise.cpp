@@ -11,7 +11,7 @@
 namespace palpate::estimation {
 namespace {
 
-constexpr double place_spacing = 0.8;      // of places, in correlation lengths: a smooth field is known from its values there
+constexpr double place_spacing = 0.8;  // of places, in correlation lengths: a smooth field is known from its values there
 constexpr double reach = 3;          // correlation lengths at which nothing is left to share
 constexpr Index most_places = 600;   // of a frame: beyond, noise reaches so little far that all that counts is wide against it
 constexpr Index most_entries = 30000000;  // of all frames' modes: 0.4 GB, and as much again in the forms made of them

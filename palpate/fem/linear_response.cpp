@@ -150,14 +150,16 @@ void LinearResponse::make_polynomial() const {
   double wanted = std::log(begin / options_.tolerance) / (2 * std::log(rate));
   usable_ = false;
   const Eigen::Index columns = statics_.boundary().forces.cols() + statics_.boundary().motions.cols();
-  Eigen::SparseMatrix<double> all_rows;
-  if (options_.field_limit_bytes > 0) all_rows = over_field(watched_);
+  Eigen::SparseMatrix<double> all_rows;  // made where a field is kept
   while (wanted <= options_.max_factorisations) {
     const int nodes = std::max(3, static_cast<int>(std::ceil(wanted)));
     const Index terms = 2 * nodes;
     std::vector<MatrixX> data(static_cast<std::size_t>(terms)), field_data;
     const double field_bytes = 8.0 * terms * static_cast<double>(watched_.cols()) * static_cast<double>(columns);
-    if (all_rows.rows() > 0 && field_bytes <= options_.field_limit_bytes) field_data.resize(data.size());
+    if (field_bytes > 0 && field_bytes <= options_.field_limit_bytes) {
+      field_data.resize(data.size());
+      if (all_rows.rows() == 0) all_rows = over_field(watched_);
+    }
     const Eigen::SparseMatrix<double>& wanted_rows = field_data.empty() ? watched_ : all_rows;
     MatrixX system(terms, terms);
     VectorX value(terms), slope(terms);
