@@ -10,6 +10,7 @@
 #include "palpate/estimation/held_body.hpp"
 #include "palpate/fem/boundary.hpp"
 #include "palpate/fem/discretisation.hpp"
+#include "palpate/fem/materials.hpp"
 #include "palpate/fem/regions.hpp"
 #include "palpate/geometry/embedding.hpp"
 
@@ -23,6 +24,7 @@ constexpr Index most_corners = 4000;  // of a mesh that is fitted with
 /// Where a mesh does not follow the outline, most of its error is in parts that are too thin or too curved for its edges, and
 /// falls faster than their square (estimation_filling_order_test).
 constexpr double order_of_filling = 3;
+constexpr double unsure_of_filling = 0.15;  // and of a body that is not linear, whose change small strains say too little of, as of others
 
 struct RoundContact {
   fem::ContactPatch patch;
@@ -128,6 +130,7 @@ std::optional<FinerModel> filled(const Recording& recording, const SimulatedObje
   FinerModel out = on_volume(std::move(anew), recording, object);
   out.edge_share = std::min(0.9, 1 / std::cbrt(growth));
   out.order = order_of_filling;
+  if (fem::material_law(object.material).is_linear()) out.unsure = unsure_of_filling;
   return out;
 }
 

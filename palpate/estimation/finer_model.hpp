@@ -21,6 +21,9 @@ struct FinerModel {
   double order = 2;         ///< of its edges: the error that is left falls with this power (docs/estimator.md)
   bool everywhere = true;   ///< false: under round tools only
   AnswerShift elsewhere;    ///< if not: what is known of the error that the mesh makes elsewhere
+  /// Of the error that is taken out of an answer this share is left as one standard deviation. Halved edges have shown a quarter to
+  /// twice of what was there (fem.discretisation); fillings of a linear body err by a tenth of it (docs/estimator.md).
+  double unsure = 0.5;
   /// Of the coarser mesh's error, what this one has left.
   double left() const { return std::pow(edge_share, order); }
 };

@@ -376,7 +376,7 @@ Identification fit_around(const Recording& recording, const SimulatedObject& obj
   };
   if (mesh) {
     move_by(*mesh);
-    widen_by("mesh", {mesh->times(mesh_left_over)});
+    widen_by("mesh", {mesh->times(finer->unsure)});
   }
   if (doubt != nullptr && doubt->effect) {
     move_by(doubt->effect->move);

@@ -16,9 +16,10 @@ namespace palpate::estimation {
 namespace {
 
 /// What the mesh does to E, as a share; nothing where it is not known.
-std::optional<double> mesh_error(const Identification& answer) {
+/// @param finer  what showed it
+std::optional<double> mesh_error(const Identification& answer, const std::optional<FinerModel>& finer) {
   for (const BudgetEntry& entry : answer.budget) {
-    if (entry.input == "mesh") return entry.young_modulus_percent / 100 / mesh_left_over;
+    if (entry.input == "mesh" && finer) return entry.young_modulus_percent / 100 / finer->unsure;
   }
   return std::nullopt;
 }
@@ -89,7 +90,8 @@ std::optional<BetterMesh> better_mesh(const Recording& at, const SimulatedObject
 
 Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
                                 const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
-                                const OnProgress& progress, const FillAnew& fill_anew) {
+                                const OnProgress& progress, const FillAnew& fill_anew,
+                                std::optional<FinerModel>* shows) {
   constexpr int most_refinements = 3;
   const auto percent = [](double share) {
     std::ostringstream text;
@@ -143,7 +145,7 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
     }
     answer.provenance.merge(first.provenance);
     answer.verdicts.insert(answer.verdicts.begin(), first.verdicts.begin(), first.verdicts.end());
-    const std::optional<double> error = mesh_error(answer);
+    const std::optional<double> error = mesh_error(answer, finer);
     answer.provenance["mesh"] = mesh_words(object);
     answer.provenance["mesh's error in E"] = error ? percent(*error) : "not estimated";
     if (!history.empty()) answer.provenance["coarser meshes"] = history.substr(0, history.size() - 2);
@@ -151,8 +153,9 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
       answer.verdicts.push_back(
           {"mesh_too_coarse", "The mesh is estimated to put E off by " + percent(*error) +
                                   ", and no finer one can be had: that is taken out of the answer, and the interval "
-                                  "holds half of it; give a finer volume mesh to be rid of it."});
+                                  "holds " + percent(finer->unsure * *error) + " for it; give a finer volume mesh to be rid of it."});
     }
+    if (shows != nullptr) *shows = std::move(finer);
     return answer;
   }
 }

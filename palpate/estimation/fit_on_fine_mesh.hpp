@@ -2,6 +2,8 @@
 // A fit whose mesh is fine enough for its answer.
 #pragma once
 
+#include <optional>
+
 #include "palpate/estimation/finer_model.hpp"
 #include "palpate/estimation/fit.hpp"
 #include "palpate/estimation/shape_error.hpp"
@@ -15,8 +17,10 @@ namespace palpate::estimation {
 /// they were fitted last; the answer's provenance says which meshes were taken.
 /// @param doubt  other shapes of a side that nobody saw; nullptr: none
 /// @param fill_anew  finer_model.hpp
+/// @param shows      filled with what says of the last mesh what it does, for further fits on it; nullptr: not wanted
 Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
                                 const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
-                                const OnProgress& progress, const FillAnew& fill_anew = {});
+                                const OnProgress& progress, const FillAnew& fill_anew = {},
+                                std::optional<FinerModel>* shows = nullptr);
 
 }  // namespace palpate::estimation

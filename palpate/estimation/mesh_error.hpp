@@ -25,10 +25,6 @@ std::optional<AnswerShift> mesh_shift(const Recording& recording, const Simulate
                                       const OnProgress& progress,
                                       std::shared_ptr<ForwardModel::Solved>* solved = nullptr);
 
-/// Of an answer that was moved by what its mesh does to it this share of the move is left as one standard deviation: the true change
-/// lies between a quarter of what is estimated and twice of it (fem.discretisation).
-inline constexpr double mesh_left_over = 0.5;
-
 /// Moves a posterior to where it would be without an error that is known: what the data say of nu, with its ridge log E(nu), and is cut at
 /// nu's bounds there. Where it is pressed against a bound, that leaves nu about where it was.
 void move(Posterior& posterior, const AnswerShift& shift, double poisson_lower, double poisson_upper);

@@ -106,12 +106,11 @@ class Scene {
     Draw clean = draw(rows().front(), 1);
     estimation::FitOptions quick;
     quick.cross_checks = quick.stresses = false;
-    estimation::fit_on_fine_mesh(clean.recording, object_, clean.inputs, quick, IdentifyOptions{}.mesh_tolerance, nullptr, {}, anew);
+    estimation::fit_on_fine_mesh(clean.recording, object_, clean.inputs, quick, IdentifyOptions{}.mesh_tolerance, nullptr, {}, anew, &finer_);
     recording_ = clean.recording;
     recording_.pushes.clear();
     // Columns for contacts that may have shifted serve every row.
     const Recording shifted = with_push(shifts, 1);
-    finer_ = estimation::finer_model(shifted, object_, anew);
     estimation::Unknowns unknowns;
     memory_.model = estimation::ForwardModel(shifted, object_, unknowns, statics_options(shifted, object_, {})).solved();
   }

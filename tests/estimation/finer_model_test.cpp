@@ -84,7 +84,7 @@ TEST_F(FinerMesh, IsTakenSoonerForABodyThatIsNotLinear) {
     const std::string material = linear ? "linear" : "neo_hookean";
     const Identified coarse = within(1, material);
     ASSERT_EQ(coarse.volume.tetrahedra.rows(), 144) << material;
-    const double twice_its_error = 2 * share(coarse.answer) / mesh_left_over;
+    const double twice_its_error = 2 * share(coarse.answer) / FinerModel().unsure;
     EXPECT_EQ(within(twice_its_error, material).volume.tetrahedra.rows() == 144, linear) << material;
   }
 }

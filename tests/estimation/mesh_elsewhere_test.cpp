@@ -38,11 +38,7 @@ class MeshElsewhere : public testing::Test {
     return answer;
   }
   double error(const Identification& answer) const { return std::log(answer.parameters[0].value / truth.young_pa); }
-  static double stated(const Identification& answer) {
-    for (const BudgetEntry& entry : answer.budget)
-      if (entry.input == "mesh") return entry.young_modulus_percent / 100 / mesh_left_over;
-    return 0;
-  }
+  static double stated(const Identification& answer) { return std::stod(answer.provenance.at("mesh's error in E")) / 100; }
 
   Recording recording = pushed_block_recording();
   PushedBlock truth;

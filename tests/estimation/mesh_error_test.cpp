@@ -33,7 +33,7 @@ TEST(MeshError, IsHalfToFourTimesTheBiasThatAFinerTruthShows) {
   EXPECT_LT(std::abs(std::log(widened.parameters[0].value / truth.young_pa)), 0.6 * bias) << "most of it is taken out";
   ASSERT_FALSE(widened.budget.empty());
   EXPECT_EQ(widened.budget.front().input, "mesh");  // there is hardly any noise
-  const double estimated = widened.budget.front().young_modulus_percent / 100 / mesh_left_over;
+  const double estimated = widened.budget.front().young_modulus_percent / 100 / finer->unsure;
   EXPECT_GT(estimated, 0.5 * bias);
   EXPECT_LT(estimated, 4 * bias);
   EXPECT_LT(widened.parameters[0].lower_95, truth.young_pa);
