@@ -24,7 +24,7 @@ constexpr Index most_corners = 4000;  // of a mesh that is fitted with
 /// Where a mesh does not follow the outline, most of its error is in parts that are too thin or too curved for its edges, and
 /// falls faster than their square (estimation_filling_order_test).
 constexpr double order_of_filling = 3;
-constexpr double unsure_of_filling = 0.15;  // and of a body that is not linear, whose change small strains say too little of, as of others
+constexpr double unsure_of_filling = 0.15;  // of a linear body: small strains say too little of what a mesh does to another
 
 struct RoundContact {
   fem::ContactPatch patch;

@@ -22,7 +22,7 @@ struct FinerModel {
   bool everywhere = true;   ///< false: under round tools only
   AnswerShift elsewhere;    ///< if not: what is known of the error that the mesh makes elsewhere
   /// Of the error that is taken out of an answer this share is left as one standard deviation. Halved edges have shown a quarter to
-  /// twice of what was there (fem.discretisation); fillings of a linear body err by a tenth of it (docs/estimator.md).
+  /// twice of what was there (fem.discretisation); what fillings of a linear body say of it is off by 0.14 (docs/estimator.md).
   double unsure = 0.5;
   /// Of the coarser mesh's error, what this one has left.
   double left() const { return std::pow(edge_share, order); }
