@@ -45,6 +45,17 @@ int join(Session& session, const PaperArguments& arguments) {
   return done(session, folder.collect(), arguments.output);
 }
 
+/// @throws Error naming all there are.
+const lab::PaperScene& scene_of(const std::string& name) {
+  std::string names;
+  for (const lab::PaperScene& scene : lab::paper_scenes()) {
+    if (scene.name == name) return scene;
+    names += fmt::format("{}, ", scene.name);
+  }
+  for (const Study& study : studies()) names += fmt::format("{}{}", study.name, &study == &studies().back() ? "" : ", ");
+  throw Error("is no scene or study of the paper; there are: " + names, "--scene " + name);
+}
+
 /// What each stands for is in the tables; without names: all.
 void choose(const PaperArguments& arguments, std::uint64_t seed, PaperPlan& plan) {
   plan.study_seed = seed;
@@ -53,7 +64,7 @@ void choose(const PaperArguments& arguments, std::uint64_t seed, PaperPlan& plan
     if (const Study* study = study_of(name)) {
       plan.studies.push_back(study);
     } else {
-      plan.scenes.push_back(&lab::paper_scene(name));
+      plan.scenes.push_back(&scene_of(name));
     }
   }
   if (!arguments.scenes.empty()) return;

@@ -95,7 +95,8 @@ std::string sample_table(const TrialAnswer& trial, bool truth_known) {
   for (const SampleAnswer& sample : trial.samples) paper.push_back(&sample.paper), palpate.push_back(&sample.palpate);
   html += line("the paper's method, this machine", spread_of(paper));
   html += line("palpate, this machine", spread_of(palpate));
-  return html + "<tr><td>the paper (2010), its balloon</td><td>7</td><td></td><td></td><td>7</td><td></td><td>192.5</td></tr></table>\n";
+  return html + "<tr><td>the paper (2010), its balloon</td><td>7</td><td></td><td></td><td>7</td><td></td><td>192.5</td></tr></table>\n"
+                "<p class=\"small\">Means over the samples; the first of a push also solves for the object's answers to loads at that place, which serve the others.</p>\n";
 }
 
 std::string unused_table(const lab::PaperScene& scene, const TrialAnswer& trial) {

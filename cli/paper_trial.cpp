@@ -73,6 +73,7 @@ void answer_samples(const Prepared& given, const estimation::FitOptions& options
   for (const Push& push : given.recording.pushes) count += push.steps.size();
   for (std::size_t p = 0; p < given.recording.pushes.size(); ++p) {
     const Push& push = given.recording.pushes[p];
+    estimation::FitMemory of_paper, of_palpate;  // what is solved for at one contact serves all its samples
     for (std::size_t s = 0; s < push.steps.size(); ++s) {
       if (progress && !progress("samples alone", static_cast<double>(done++) / static_cast<double>(count))) return;
       if (!loaded(push.steps[s])) continue;
@@ -84,8 +85,8 @@ void answer_samples(const Prepared& given, const estimation::FitOptions& options
       // Ours may use the unloaded frame of the push as well; the paper's method has no use for it.
       const Prepared loaded_alone = part_of(given, [&](std::size_t q, std::size_t t) { return q == p && t == s; }),
                      with_unloaded = part_of(given, [&](std::size_t q, std::size_t t) { return q == p && (t == s || !loaded(push.steps[t])); });
-      sample.paper = asked([&] { return by_paper(loaded_alone, alone, nullptr, {}); });
-      sample.palpate = asked([&] { return by_palpate(with_unloaded, alone, nullptr, {}); });
+      sample.paper = asked([&] { return by_paper(loaded_alone, alone, &of_paper, {}); });
+      sample.palpate = asked([&] { return by_palpate(with_unloaded, alone, &of_palpate, {}); });
       out.samples.push_back(std::move(sample));
     }
   }
@@ -121,7 +122,9 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
 
 /// Far off to either side, and from the lowest point of the grid: a method that reaches the minimum of its own objective comes to where it
 /// came to before.
-void answer_starts(const Prepared& given, const estimation::FitOptions& options, SharedModels& shared, TrialAnswer& out, const OnProgress& progress) {
+/// @param mine  of palpate's fits; nullptr: of use to this seed alone, which three starts do not make worth all of nu's range
+void answer_starts(const Prepared& given, const estimation::FitOptions& options, SharedModels& shared, estimation::FitMemory* mine, TrialAnswer& out,
+                   const OnProgress& progress) {
   Eigen::Index row = 0, column = 0;
   out.surface.error_m2.minCoeff(&row, &column);
   const double young_pa = std::isfinite(out.young_modulus_pa) ? out.young_modulus_pa : out.palpate.young_modulus_pa;
@@ -134,7 +137,7 @@ void answer_starts(const Prepared& given, const estimation::FitOptions& options,
     StartAnswer& from = out.starts.emplace_back();
     from.young_modulus_pa = start_pa, from.poisson_ratio = start_nu;
     from.paper = asked([&] { return by_paper(given, there, &shared.fine.paper, progress); });
-    from.palpate = asked([&] { return by_palpate(given, there, &shared.fine.palpate, progress); });
+    from.palpate = asked([&] { return by_palpate(given, there, mine, progress); });
   }
 }
 
@@ -236,7 +239,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
     out.surface = error_surface(given, out.paper, scene.apparent ? out.palpate.young_modulus_pa : out.young_modulus_pa, options.surface_points, fit, progress);
   // Of a shape that is a guess palpate asks a dozen more: minutes a start, and nothing about starts.
   const bool guessed = given.doubt && !given.doubt->shapes.empty();
-  if (options.other_starts && out.surface.error_m2.cols() > 1 && !guessed) answer_starts(given, fit, *shared, out, progress);
+  if (options.other_starts && out.surface.error_m2.cols() > 1 && !guessed) answer_starts(given, fit, *shared, mine, out, progress);
   if (out.surface.error_m2.size() == 0) drop_paths(out);
 }
 

@@ -72,7 +72,12 @@ TEST(Paper, BothMethodsAnswerAndAGridJudgesTheBaseline) {
 }
 
 TEST(Paper, UnknownSceneIsNamedWithTheOnesThereAre) {
-  EXPECT_EQ(palpate("--quiet paper --quick --scene penguin -o /nonexistent/out 2>/dev/null"), 3);
+  const palpate::test::TemporaryFolder files("paper_unknown");
+  const fs::path said = files / "said";
+  EXPECT_EQ(palpate("--quiet paper --quick --scene penguin -o /nonexistent/out 2>" + said.string()), 3);
+  std::stringstream words;
+  words << std::ifstream(said).rdbuf();
+  for (const char* name : {"penguin", "cow", "between", "partial"}) EXPECT_NE(words.str().find(name), std::string::npos) << words.str();
 }
 
 TEST(Paper, AnOpenMeshInTheCowsPlaceIsRefusedBeforeAnythingIsRun) {
