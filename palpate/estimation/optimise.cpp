@@ -77,7 +77,6 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
     return true;
   };
   double damping = 1e-6;
-  int looked_again = 0;
   VectorX last_move = VectorX::Zero(start.size());  // that was accepted
   for (best.iterations = 1; best.iterations <= options.max_iterations; ++best.iterations) {
     const std::vector<int> moving = moving_unknowns(unknowns, best.unknowns, best.evaluation.gradient);
@@ -160,15 +159,8 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
     if (!accepted && model.reuse_error() > options.reuse_error && solve_anew()) continue;
     if (!accepted) {
       // Correspondences that flip between triangles leave a floor; a step that nothing improves on is the end.
-      Evaluation again = objective.evaluate(best.unknowns, loss, progress);
+      objective.evaluate(best.unknowns, loss, progress);
       best.termination = newton_step(best.evaluation, moving).gain < 0.5 ? Termination::converged : Termination::no_progress;
-      // A step that was refused may have moved what points are held against: next to that, the place that it started from costs more than
-      // it was said to, and so does every shorter step.
-      if (best.termination == Termination::no_progress && again.usable && again.cost > best.evaluation.cost && looked_again++ < 3) {
-        best.evaluation = std::move(again);
-        damping = 1e-6;
-        continue;
-      }
       best.message = best.termination == Termination::converged ? "converged" : "no step improves the fit: " + best.message;
       return best;
     }
