@@ -91,7 +91,7 @@ std::optional<BetterMesh> better_mesh(const Recording& at, const SimulatedObject
 Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
                                 const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
                                 const OnProgress& progress, const FillAnew& fill_anew,
-                                std::optional<FinerModel>* shows) {
+                                std::optional<FinerModel>* last_finer) {
   constexpr int most_refinements = 3;
   const auto percent = [](double share) {
     std::ostringstream text;
@@ -155,7 +155,7 @@ Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, c
                                   ", and no finer one can be had: that is taken out of the answer, and the interval "
                                   "holds " + percent(finer->unsure * *error) + " for it; give a finer volume mesh to be rid of it."});
     }
-    if (shows != nullptr) *shows = std::move(finer);
+    if (last_finer != nullptr) *last_finer = std::move(finer);
     return answer;
   }
 }

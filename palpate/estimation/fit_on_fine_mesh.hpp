@@ -17,10 +17,10 @@ namespace palpate::estimation {
 /// they were fitted last; the answer's provenance says which meshes were taken.
 /// @param doubt  other shapes of a side that nobody saw; nullptr: none
 /// @param fill_anew  finer_model.hpp
-/// @param shows      filled with what says of the last mesh what it does, for further fits on it; nullptr: not wanted
+/// @param last_finer  filled with what says of the last mesh what it does, for further fits on it; nullptr: not wanted
 Identification fit_on_fine_mesh(Recording& recording, SimulatedObject& object, const Inputs& observed,
                                 const FitOptions& options, double mesh_tolerance, ShapeDoubt* doubt,
                                 const OnProgress& progress, const FillAnew& fill_anew = {},
-                                std::optional<FinerModel>* shows = nullptr);
+                                std::optional<FinerModel>* last_finer = nullptr);
 
 }  // namespace palpate::estimation
