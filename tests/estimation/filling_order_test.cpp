@@ -1,6 +1,6 @@
 // label: statistics
 // SPDX-License-Identifier: Apache-2.0
-// How fast the error of a mesh falls that is filled anew with half the edges: FinerModel::order is measured here.
+// How fast the error of a mesh falls that is filled anew with half the edges: FinerModel::order and ::unsure are measured here.
 #include <gtest/gtest.h>
 
 #include <cmath>
