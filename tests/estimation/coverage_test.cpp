@@ -3,7 +3,7 @@
 // How often the intervals hold the truth, how far off the answers are, and how near they come to the Cramer-Rao bound: the table
 // of docs/uncertainty.md. A few recordings a row by default;
 //   PALPATE_SEEDS=400 PALPATE_CALCULIX_EACH=5 PALPATE_OUTCOMES=FILE estimation_coverage_test
-// for figures that mean something: 1600 recordings a row over all scenes, the truths of every fifth by CalculiX (not the teddy's, which take hours). FILE keeps what was
+// for figures that mean something: 1600 recordings a row over all scenes, the truths of every fifth by CalculiX. FILE keeps what was
 // done: a run that was stopped goes on, and runs of PALPATE_ROW=pose,rest or PALPATE_SCENE=ball_top come together. PALPATE_FIRST_SEED to
 // go on elsewhere, PALPATE_EACH=1 for a line a recording, PALPATE_NOISELESS=1 for what meshes alone do, PALPATE_TRUE_TETRAHEDRA and
 // PALPATE_FINE for the truth's mesh.
