@@ -16,6 +16,9 @@ constexpr double far_prior = 12;         // standard deviations of its prior tha
 constexpr double bends_more = 0.25;  // of log E: what linear theory takes a soft body for softer that bends away under its load
 constexpr double hardly_a_gain = 0.01;  // of half of chi-square: a seventh of a standard deviation
 constexpr std::size_t rough_steps = 5;  // of a long recording are enough to come near the optimum
+constexpr double floor_gain = 0.5;      // of half of chi-square, that rays which change triangles hide
+constexpr double of_a_ray = 4;          // what one ray costs at most (Tukey's loss at its usual cut: 3.7)
+constexpr int most_crossings = 5;
 
 MatrixX pick(const MatrixX& matrix, const std::vector<int>& which) {
   MatrixX out(static_cast<Index>(which.size()), static_cast<Index>(which.size()));
@@ -78,6 +81,7 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
   };
   double damping = 1e-6;
   VectorX last_move = VectorX::Zero(start.size());  // that was accepted
+  int crossings = 0;
   for (best.iterations = 1; best.iterations <= options.max_iterations; ++best.iterations) {
     const std::vector<int> moving = moving_unknowns(unknowns, best.unknowns, best.evaluation.gradient);
     const MatrixX hessian = pick(best.evaluation.curvature, moving);
@@ -91,6 +95,9 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
     }
 
     bool accepted = false;
+    VectorX lowest_at;
+    Evaluation lowest;  // of the attempts that were refused
+    lowest.usable = false;
     for (int attempt = 0; attempt < 12 && !accepted; ++attempt) {
       MatrixX damped = hessian;
       damped.diagonal() += damping * scale;
@@ -130,6 +137,10 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
       if (!trial.usable || trial.cost > best.evaluation.cost + tiny) {
         damping = std::max(1e-4, damping * 10);
         if (!trial.usable) best.message = trial.reason;
+        if (trial.usable && !(lowest.usable && lowest.cost <= trial.cost)) {
+          lowest = std::move(trial);
+          lowest_at = next;
+        }
         continue;
       }
       accepted = true;
@@ -159,8 +170,20 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
     if (!accepted && model.reuse_error() > options.reuse_error && solve_anew()) continue;
     if (!accepted) {
       // Correspondences that flip between triangles leave a floor; a step that nothing improves on is the end.
+      const bool at_floor = newton_step(best.evaluation, moving).gain < floor_gain;
+      // Where a ray comes to meet something else the cost jumps, and a search that came there with much before it is held by no
+      // matter how short a step: it goes over.
+      if (!at_floor && lowest.usable && lowest.cost - best.evaluation.cost < of_a_ray && crossings < most_crossings) {
+        ++crossings;
+        best.unknowns = lowest_at;
+        best.evaluation = std::move(lowest);
+        if (options.on_accepted) options.on_accepted(best, false);
+        last_move.setZero();
+        damping = 1e-6;
+        continue;
+      }
       objective.evaluate(best.unknowns, loss, progress);
-      best.termination = newton_step(best.evaluation, moving).gain < 0.5 ? Termination::converged : Termination::no_progress;
+      best.termination = at_floor ? Termination::converged : Termination::no_progress;
       best.message = best.termination == Termination::converged ? "converged" : "no step improves the fit: " + best.message;
       return best;
     }
