@@ -12,8 +12,7 @@
 namespace palpate::cli {
 namespace {
 
-/// Both methods are given every n-th pixel: about as many points a sample as the paper's time-of-flight camera has (3200).
-constexpr Index most_points = 2000;
+constexpr double coarse_edge = 0.6;  // of a look, under the pad: of its radius
 /// Squared distances have no defence against what is not the object (flying pixels, the table's edge), and the paper's
 /// points were cut to the object: so are those of both methods here.
 /// What a deeper push dents lies as far from where it was.
@@ -31,11 +30,12 @@ void fill(Recording& recording, const ModelChoice& choice, reconstruction::Compl
   }
   reconstruction::BuildOptions options;
   options.mesh.tetrahedra = choice.tetrahedra;
-  if (choice.edge_m > 0)
+  const double edge_m = choice.coarse && choice.edge_m == 0 ? coarse_edge * recording.tools.front().radius_m : choice.edge_m;
+  if (edge_m > 0)
     for (const Push& push : recording.pushes)
       for (const Step& step : push.steps)
         if (loaded(step) && (options.mesh.finer.empty() || options.mesh.finer.back().point_m != step.loads[0].contact_m))
-          options.mesh.finer.push_back({step.loads[0].contact_m, 1.5 * recording.tools.front().radius_m, choice.edge_m});
+          options.mesh.finer.push_back({step.loads[0].contact_m, 1.5 * recording.tools.front().radius_m, edge_m});
   auto built = reconstruction::build_object(*recording.rest.surface, recording.supports, options, progress);
   recording.supports = std::move(built.model.supports);
   recording.rest.volume = std::move(built.model.volume);
@@ -68,30 +68,45 @@ double near_of(const Recording& recording) {
   return near_m;
 }
 
-RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest, double near_m) {
+RayCloud thinned(const RayCloud& all, const geometry::TriangleTree& rest, double near_m, Index most) {
   std::vector<Index> near;
   for (Index i = 0; i < static_cast<Index>(all.range_m.size()); ++i) {
     const Vec3 point_m = Vec3(all.origins_m.row(i)) + all.range_m(i) * Vec3(all.directions.row(i));
     if (rest.closest(point_m).squared_distance_m2 < near_m * near_m) near.push_back(i);
   }
-  const std::size_t stride = std::max<std::size_t>(1, (near.size() + most_points - 1) / most_points);
+  const std::size_t stride = std::max<std::size_t>(1, (near.size() + static_cast<std::size_t>(most) - 1) / static_cast<std::size_t>(most));
   std::vector<Index> rows;
   for (std::size_t i = 0; i < near.size(); i += stride) rows.push_back(near[i]);
   return geometry::rays_at(all, rows);
 }
 
-ModelChoice choice_of(const lab::PaperScene& scene) {
+ModelChoice choice_of(const lab::PaperScene& scene, bool coarse) {
   ModelChoice choice;
+  choice.coarse = coarse;
   choice.tetrahedra = scene.tetrahedra;
   choice.edge_m = scene.edge_m;
+  if (coarse && choice.tetrahedra == 0) choice.tetrahedra = coarse_tetrahedra;
   choice.planar_back = scene.shape == lab::PaperShape::planar_back;
   return choice;
 }
 
-Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress,
+lab::PaperScene looked_at(lab::PaperScene scene) {
+  constexpr int few = 4;
+  scene.coarse_truth = true;
+  if (scene.travel_m == 0) scene.samples = std::min(scene.samples, few);
+  return scene;
+}
+
+Observed observed(Recording recording) {
+  estimation::Inputs inputs = observe(recording);
+  return {std::move(recording), std::move(inputs)};
+}
+
+Prepared prepare(Observed given, const ModelChoice& choice, SharedModel* shared, const OnProgress& progress,
                  std::shared_ptr<estimation::ShapeDoubt> doubt) {
   Prepared out;
-  out.inputs = observe(recording);
+  Recording& recording = given.recording;
+  out.inputs = std::move(given.inputs);
   const bool keep = shared != nullptr && recording.rest.views.empty();
   if (keep && shared->built) {
     recording.rest = shared->built->recording.rest;
@@ -103,6 +118,7 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
   } else {
     std::vector<char> seen;
     ShapeOfViews views;
+    if (choice.coarse) recording.model.refine = "none";
     const Recording as_given = recording;
     if (choice.linear) recording.model.element = "tet4";
     if (choice.linear) recording.model.refine = "none";
@@ -112,14 +128,15 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
     out.object = build_simulated_object(recording, progress, completion, choice.tetrahedra > 0 ? nullptr : &seen, &views);
     if (choice.point_load) press_at_nodes(recording, out.object.mesh);
     const double unseen = drop_unseen_side(recording, seen, out.inputs);
-    if (unseen > 0 && !choice.planar_back) {
+    const bool doubted = !choice.coarse && !choice.planar_back;
+    if (doubted && unseen > 0) {
       out.doubt = doubt ? std::move(doubt) : std::make_shared<estimation::ShapeDoubt>(other_shapes(as_given, unseen, views.symmetries));
       out.doubt->side = unseen_side(as_given, recording, seen);
-    } else if (const auto foot = foot_doubt(recording, views.strip_m); foot && !choice.planar_back) {
+    } else if (const auto foot = foot_doubt(recording, views.strip_m); foot && doubted) {
       out.doubt = std::make_shared<estimation::ShapeDoubt>();
       out.doubt->foot = foot;
     }
-    if (auto finer = estimation::finer_model(recording, out.object, fill_anew(as_given, recording)))
+    if (auto finer = choice.coarse ? std::nullopt : estimation::finer_model(recording, out.object, fill_anew(as_given, recording)))
       out.finer = std::make_shared<estimation::FinerModel>(std::move(*finer));
     if (keep) shared->built = Prepared{recording, out.object, {}, out.finer, nullptr};
   }
@@ -128,7 +145,7 @@ Prepared prepare(Recording recording, const ModelChoice& choice, SharedModel* sh
   const double near_m = near_of(recording);
   for (auto& step : out.inputs)
     for (auto& input : step)
-      if (auto* seen = std::get_if<estimation::RayObservation>(&input)) seen->rays = thinned(seen->rays, rest, near_m);
+      if (auto* seen = std::get_if<estimation::RayObservation>(&input)) seen->rays = thinned(seen->rays, rest, near_m, choice.coarse ? coarse_points : usual_points);
   out.recording = std::move(recording);
   return out;
 }

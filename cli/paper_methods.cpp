@@ -123,13 +123,13 @@ MethodAnswer by_palpate_told_of_slips(const Prepared& given, const Recording& sl
   return out;
 }
 
-MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
+MethodAnswer by_palpate_on_better_shape(const Observed& seen, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
                                         estimation::FitMemory* memory, const OnProgress& progress, Found* found) {
   const MethodAnswer first = by_palpate(given, options, memory, progress, found);
   if (!given.doubt || !given.doubt->effect || !given.doubt->effect->better) return first;
   given.doubt->effect->better.reset();
   choice.planar_agrees = true;  // the only alternative that is as likely
-  given = prepare(recording, choice, nullptr, progress, given.doubt);
+  given = prepare(seen, choice, nullptr, progress, given.doubt);
   MethodAnswer out = by_palpate(given, options, nullptr, progress, found);
   count_too(first, out);
   return out;

@@ -57,8 +57,8 @@ MethodAnswer by_palpate_told_of_slips(const Prepared& given, const Recording& sl
                                       estimation::FitMemory* memory, const OnProgress& progress);
 /// Of an object that was seen from one side, as `identify` does it: where a planar back side agrees better with the pushes
 /// than the one that was fitted, it takes its place, and the answer is of that one. What both fits took is counted.
-/// @param given  of `recording` and `choice`; both are changed to what was fitted at last
-MethodAnswer by_palpate_on_better_shape(const Recording& recording, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
+/// @param given  of `seen` and `choice`; both are changed to what was fitted at last
+MethodAnswer by_palpate_on_better_shape(const Observed& seen, ModelChoice& choice, Prepared& given, const estimation::FitOptions& options,
                                         estimation::FitMemory* memory, const OnProgress& progress, Found* found = nullptr);
 
 }  // namespace palpate::cli

@@ -14,7 +14,8 @@ namespace palpate::cli {
 /// One offline HTML file.
 /// @param version     of the program that made the answers
 /// @param details_of  the seed of which studies show their rows; where there is none, their first
+/// @param coarse      all are of --quick
 std::string paper_page(const std::vector<SceneAnswers>& scenes, const std::vector<StudyAnswer>& studies, const std::string& version,
-                       const std::string& command, const std::set<int>& threads, std::uint64_t details_of = 1);
+                       const std::string& command, const std::set<int>& threads, std::uint64_t details_of = 1, bool coarse = false);
 
 }  // namespace palpate::cli

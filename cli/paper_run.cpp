@@ -55,12 +55,13 @@ void run_side_by_side(const std::vector<std::function<void()>>& tasks, int worke
 TrialOptions options_of(const PaperPlan& plan, const lab::PaperScene& scene, std::uint64_t seed) {
   TrialOptions options;
   options.threads = plan.threads;
+  options.coarse = plan.quick;
   if (seed != plan.details_of) return options;
   const bool dear = scene.law != "linear";
   options.samples_alone = !plan.quick || scene.each_sample;
   options.other_starts = !plan.quick || scene.error_drawn;
   options.pictures = true;
-  options.surface_points = !plan.quick ? 25 : dear ? 5 : 9;
+  options.surface_points = !plan.quick ? 25 : dear ? 5 : 7;
   return options;
 }
 
@@ -73,11 +74,11 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
                 out.string());
   const auto asked_of = [&](const lab::PaperScene& scene, int k) {
     const std::uint64_t seed = plan.first_seed + static_cast<std::uint64_t>(k);
-    return SeedAsked{std::string(scene.name), seed, options_of(plan, scene, seed), plan.object, plan.quick};
+    return SeedAsked{std::string(scene.name), seed, options_of(plan, scene, seed), plan.object};
   };
   const auto asked_of_study = [&](const Study& study, int k) {
     const std::uint64_t seed = plan.study_seed + static_cast<std::uint64_t>(k);
-    return SeedAsked{std::string(study.name), seed, {.pictures = seed == plan.details_of}, {}, plan.quick};
+    return SeedAsked{std::string(study.name), seed, {.pictures = seed == plan.details_of, .coarse = plan.quick}, {}};
   };
   int there = 0;
   for (const lab::PaperScene* scene : plan.scenes)
@@ -121,7 +122,7 @@ PaperRuns run_plan(const PaperPlan& plan, const PaperWork& work, const std::file
       if (folder.has(asked)) continue;
       StudyAnswer answer{&study, asked.seed, {}, {}, 0};
       try {
-        work.study(study, {asked.seed, plan.threads, asked.options.pictures}, answer);
+        work.study(study, {asked.seed, plan.threads, asked.options.pictures, asked.options.coarse}, answer);
       } catch (const std::exception& error) {
         answer.failed = error.what();
       }

@@ -28,6 +28,7 @@ json options_json(const SeedAsked& asked) {
               {"surface_points", asked.options.surface_points},
               {"pictures", asked.options.pictures}};
   if (asked.options.other_starts) out["other_starts"] = true;
+  if (asked.options.coarse) out["coarse"] = true;
   if (asked.name == "cow" && !asked.object.name.empty())
     out["object"] = {{"sha256", asked.object.sha256}, {"up", asked.object.up}, {"size_m", asked.object.size_m}};
   return out;
@@ -35,7 +36,7 @@ json options_json(const SeedAsked& asked) {
 
 json header(const SeedAsked& asked, int threads) {
   json out = {{"palpate", version}, {"format", seed_format}, {"name", asked.name}, {"seed", asked.seed},
-              {"threads", threads}, {"quick", asked.quick},  {"options", options_json(asked)}};
+              {"threads", threads}, {"options", options_json(asked)}};
   if (asked.name == "cow") out["object_name"] = asked.object.name;
   return out;
 }
@@ -109,7 +110,7 @@ lab::PaperScene in_the_cows_place(std::string_view object, const TriMesh* surfac
 }
 
 std::string PaperRuns::command() const {
-  std::string out = fmt::format("palpate paper -o OUT{}", quick ? " --quick" : "");
+  std::string out = fmt::format("palpate paper -o OUT{}", coarse ? " --quick" : "");
   std::uint64_t first = ~std::uint64_t{0}, last = 0;
   std::string names;
   const auto count = [&](std::string_view name, std::uint64_t from, std::uint64_t to) {
@@ -187,7 +188,12 @@ void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
                 file);
   runs.version = made_by;
   runs.threads.insert(seed.at("threads").get<int>());
-  runs.quick = runs.quick || seed.at("quick").get<bool>();
+  const bool coarse = seed.at("options").value("coarse", false);
+  if (coarse != runs.coarse && !(runs.scenes.empty() && runs.studies.empty()))
+    throw Error(fmt::format("is a seed {} --quick, others are {}: their numbers do not compare; use another folder", coarse ? "of" : "without",
+                            coarse ? "without" : "of it"),
+                file);
+  runs.coarse = coarse;
   const bool pictures = seed.at("options").at("pictures");
   if (const Study* study = study_of(name)) {
     if (pictures) runs.details_of = number;
@@ -234,12 +240,12 @@ void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
 
 json write_page(const PaperRuns& runs, const fs::path& out) {
   const std::string command = runs.command();
-  json told = {{"command", command}, {"palpate", runs.version}, {"threads", runs.threads}, {"scenes", json::array()}, {"studies", json::array()}};
+  json told = {{"command", command}, {"palpate", runs.version}, {"threads", runs.threads}, {"quick", runs.coarse}, {"scenes", json::array()}, {"studies", json::array()}};
   for (const SceneAnswers& each : runs.scenes) told["scenes"].push_back(json_of(each));
   for (const StudyAnswer& each : runs.studies) told["studies"].push_back(json_of(each));
   told["study_scores"] = json_of(std::span(runs.studies));
   io::write_file(out / "paper.json", told.dump(2) + "\n");
-  io::write_file(out / "paper.html", paper_page(runs.scenes, runs.studies, runs.version, command, runs.threads, runs.details_of));
+  io::write_file(out / "paper.html", paper_page(runs.scenes, runs.studies, runs.version, command, runs.threads, runs.details_of, runs.coarse));
   return told;
 }
 

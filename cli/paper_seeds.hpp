@@ -26,9 +26,8 @@ struct PlacedObject {
 struct SeedAsked {
   std::string name;  ///< of a scene or a study
   std::uint64_t seed = 1;
-  TrialOptions options;  ///< of a study: pictures alone; the number of threads changes seconds alone
+  TrialOptions options;  ///< of a study: pictures and coarse; the number of threads changes seconds alone
   PlacedObject object;   ///< of the cow
-  bool quick = false;    ///< for the command that the page gives
 };
 
 /// All that pages and tables are made from.
@@ -41,7 +40,7 @@ struct PaperRuns {
   std::string placed;                ///< the same, and how it is put
   std::string put;                   ///< options that put it so
   std::shared_ptr<lab::PaperScene> cow;  ///< its scene
-  bool quick = false;
+  bool coarse = false;               ///< of --quick, all of them
   std::uint64_t details_of = 1;      ///< seed that also has pictures and the like
 
   /// That makes the same again.
@@ -72,6 +71,8 @@ class SeedFolder {
 };
 
 /// Adds what a file holds. @param file  to name in errors
+/// @throws Error when it is damaged, or no answer that compares with the others: of another version, another object in the cow's
+///         place, or one of them of --quick alone
 void add_seed(PaperRuns& runs, const nlohmann::json& seed, const std::string& file);
 
 /// OUT/paper.html and OUT/paper.json. Returns the latter.

@@ -22,8 +22,8 @@ bool wanted(const OnProgress& progress, std::string_view what) { return !progres
 /// One recording on meshes and under loads as the paper had them, up to the program's own.
 std::vector<StudyRow> meshes(const StudyOptions& study, const OnProgress& progress) {
   constexpr Index paper_tetrahedra = 815;
-  const lab::PaperScene& scene = lab::paper_scene("cube");
-  const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress);
+  const lab::PaperScene& whole = lab::paper_scene("cube");
+  const lab::PaperTrial trial = lab::make_paper_trial(study.coarse ? looked_at(whole) : whole, study.seed, progress);
   struct Model {
     const char* what;
     ModelChoice choice;
@@ -36,10 +36,11 @@ std::vector<StudyRow> meshes(const StudyOptions& study, const OnProgress& progre
                                      {"815 quadratic tetrahedra, the pad's patch", {.tetrahedra = paper_tetrahedra}},
                                      {"palpate's mesh with linear tetrahedra, the pad's patch", {.linear = true}},
                                      {"palpate's mesh and the pad's patch", {}}}};
+  const Observed seen = observed(trial.recording);
   std::vector<StudyRow> rows;
   for (const Model& model : models) {
     if (!wanted(progress, model.what)) break;
-    const Prepared given = prepare(trial.recording, model.choice, nullptr, progress);
+    const Prepared given = prepare(seen, model.choice, nullptr, progress);
     rows.push_back({model.what, trial.young_modulus_pa, trial.poisson_ratio, by_paper(given, options_of(study), nullptr, progress),
                     by_palpate(given, options_of(study), nullptr, progress)});
     if (&model != &models.back()) continue;
@@ -52,7 +53,8 @@ std::vector<StudyRow> meshes(const StudyOptions& study, const OnProgress& progre
 
 /// What goes wrong without being recorded. Cross-checks are on: it is they who should notice.
 std::vector<StudyRow> faults(const StudyOptions& study, const OnProgress& progress) {
-  const lab::PaperScene& scene = lab::paper_scene("cube");
+  lab::PaperScene scene = lab::paper_scene("cube");
+  if (study.coarse) scene.coarse_truth = true;  // a slip takes all samples
   estimation::FitOptions checked = options_of(study);
   checked.cross_checks = true;
   std::vector<lab::PaperFault> all{{.name = "none", .title = "nothing"}};
@@ -61,7 +63,7 @@ std::vector<StudyRow> faults(const StudyOptions& study, const OnProgress& progre
   for (const lab::PaperFault& fault : all) {
     if (!wanted(progress, fault.title)) break;
     const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress, fault);
-    const Prepared given = prepare(trial.recording, choice_of(scene), nullptr, progress);
+    const Prepared given = prepare(observed(trial.recording), choice_of(scene, study.coarse), nullptr, progress);
     rows.push_back({std::string(fault.title), trial.young_modulus_pa, trial.poisson_ratio,
                     by_paper(given, options_of(study), nullptr, progress), by_palpate(given, checked, nullptr, progress)});
   }
@@ -76,6 +78,7 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
     scene.region_ratio = 1;
     scene.sites = 1;
     scene.samples = 7;
+    if (study.coarse) scene = looked_at(scene);
     scene.view_azimuth_rad = -2;  // from where the camera watches the push
     scene.view_elevation_rad = 0.6;
     using lab::PaperShape;
@@ -90,13 +93,14 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
       const lab::PaperTrial trial = lab::make_paper_trial(scene, study.seed, progress);
       StudyRow& row = rows.emplace_back(StudyRow{what, trial.young_modulus_pa, trial.poisson_ratio, no_answer(), no_answer()});
       try {
-        ModelChoice choice = choice_of(scene);
-        Prepared given = prepare(trial.recording, choice, nullptr, progress);
+        ModelChoice choice = choice_of(scene, study.coarse);
+        const Observed seen = observed(trial.recording);
+        Prepared given = prepare(seen, choice, nullptr, progress);
         // Palpate does not take a planar back side for true, and is asked all the same; no finer mesh of it can be had.
         const bool planar = shape == PaperShape::planar_back;
         if (planar) given.finer.reset();
         row.palpate = planar ? by_palpate(given, options_of(study), nullptr, progress)
-                             : by_palpate_on_better_shape(trial.recording, choice, given, options_of(study), nullptr, progress);
+                             : by_palpate_on_better_shape(seen, choice, given, options_of(study), nullptr, progress);
         row.paper = by_paper(given, options_of(study), nullptr, progress);
         if (study.pictures && shape == PaperShape::four_views) row.views = views_of_model(trial.recording, given);
       } catch (const Error& error) {  // what one view shows may make no body: then neither has an answer

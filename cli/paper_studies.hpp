@@ -22,6 +22,7 @@ struct StudyOptions {
   std::uint64_t seed = 1;
   int threads = 1;
   bool pictures = false;
+  bool coarse = false;  ///< a look in minutes (ModelChoice)
 };
 
 struct Study {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "cli/paper_predictions.hpp"
 #include "cli/paper_views.hpp"
@@ -122,15 +123,16 @@ std::vector<double> answer_sites(const Prepared& given, const lab::PaperTrial& t
 
 /// Far off to either side, and from the lowest point of the grid: a method that reaches the minimum of its own objective comes to where it
 /// came to before.
+/// @param only_grids_lowest  from there alone
 /// @param mine  of palpate's fits; nullptr: of use to this seed alone, which three starts do not make worth all of nu's range
-void answer_starts(const Prepared& given, const estimation::FitOptions& options, SharedModels& shared, estimation::FitMemory* mine, TrialAnswer& out,
-                   const OnProgress& progress) {
+void answer_starts(const Prepared& given, const estimation::FitOptions& options, SharedModels& shared, estimation::FitMemory* mine, bool only_grids_lowest,
+                   TrialAnswer& out, const OnProgress& progress) {
   Eigen::Index row = 0, column = 0;
   out.surface.error_m2.minCoeff(&row, &column);
   const double young_pa = std::isfinite(out.young_modulus_pa) ? out.young_modulus_pa : out.palpate.young_modulus_pa;
   const std::pair<double, double> starts[] = {
       {0.2 * young_pa, 0.1}, {5 * young_pa, 0.45}, {out.surface.young_modulus_pa(row), out.surface.poisson_ratio(column)}};
-  for (const auto& [start_pa, start_nu] : starts) {
+  for (const auto& [start_pa, start_nu] : std::span(starts).last(only_grids_lowest ? 1 : std::size(starts))) {
     estimation::FitOptions there = options;
     there.young_start_pa = start_pa;
     there.poisson_start = start_nu;
@@ -152,8 +154,9 @@ void drop_paths(TrialAnswer& out) {
 
 }  // namespace
 
-void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
+void run_trial(const lab::PaperScene& whole, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
                const OnProgress& progress, TrialAnswer& out) {
+  const lab::PaperScene scene = options.coarse ? looked_at(whole) : whole;
   const Takes all(out.total_s);
   const Watch truth;
   lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress, {}, shared != nullptr ? &shared->truths : nullptr);
@@ -178,15 +181,17 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   fit.cross_checks = fit.stresses = false;  // the paper's method has none: neither side's solves count them
   fit.find_slips = true;                    // changes the answer, and counts
 
-  ModelChoice choice = choice_of(scene);
+  ModelChoice choice = choice_of(scene, options.coarse);
   const Watch model;
-  Prepared given = prepare(trial.recording, choice, &shared->fine, progress);
+  Observed seen = observed(trial.recording);
+  Prepared given = prepare(seen, choice, &shared->fine, progress);
   out.model_s = model.seconds();
   Found ours;
   ours.fitted = estimation::all_steps(given.recording);
-  out.palpate = asked([&] { return by_palpate_on_better_shape(trial.recording, choice, given, fit, mine, progress, &ours); });
+  out.palpate = asked([&] { return by_palpate_on_better_shape(seen, choice, given, fit, mine, progress, &ours); });
   // From here on these samples alone, by both methods.
-  estimation::keep_first_steps(trial.recording, ours.fitted);
+  seen.inputs = estimation::first_steps(seen.inputs, seen.recording, ours.fitted);
+  estimation::keep_first_steps(seen.recording, ours.fitted);
   out.left_out = samples(given.recording);
   given = first_samples(std::move(given), ours.fitted);
   out.left_out -= samples(given.recording);
@@ -195,10 +200,8 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
   out.paper = asked([&] { return by_paper(one, fit, &shared->fine.paper, progress); });
   // Sites are compared one by one, and not on those.
   if (options.pictures && !dear(given) && given.object.region_names.empty()) {
-    Recording coarse = trial.recording;
     choice.linear = true;
-    out.paper_coarse =
-        asked([&] { return by_paper(prepare(std::move(coarse), choice, &shared->linear, progress), fit, &shared->linear.paper, progress); });
+    out.paper_coarse = asked([&] { return by_paper(prepare(seen, choice, &shared->linear, progress), fit, &shared->linear.paper, progress); });
   }
   std::optional<Prepared> other;
   if (!scene.other_law.empty()) {
@@ -218,7 +221,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
                  known ? out.poisson_ratio : out.palpate.poisson_ratio, fit, out);
   }
   if (options.pictures) {
-    out.views = views_of(trial.recording, given, out.palpate, by_region, fit);
+    out.views = views_of(seen.recording, given, out.palpate, by_region, fit);
     estimation::FitOptions checked = fit;
     checked.cross_checks = true;
     const auto judged = [&](const Prepared& what, const Recording& slipped, MethodAnswer& answer, estimation::FitMemory* memory) {
@@ -239,7 +242,7 @@ void run_trial(const lab::PaperScene& scene, std::uint64_t seed, const TrialOpti
     out.surface = error_surface(given, out.paper, scene.apparent ? out.palpate.young_modulus_pa : out.young_modulus_pa, options.surface_points, fit, progress);
   // Of a shape that is a guess palpate asks a dozen more: minutes a start, and nothing about starts.
   const bool guessed = given.doubt && !given.doubt->shapes.empty();
-  if (options.other_starts && out.surface.error_m2.cols() > 1 && !guessed) answer_starts(given, fit, *shared, mine, out, progress);
+  if (options.other_starts && out.surface.error_m2.cols() > 1 && !guessed) answer_starts(given, fit, *shared, mine, options.coarse, out, progress);
   if (out.surface.error_m2.size() == 0) drop_paths(out);
 }
 

@@ -106,6 +106,7 @@ struct TrialOptions {
   int surface_points = 0;      ///< a side of the error surface; 0 = none
   bool other_starts = false;   ///< beside a surface of more than one nu, and not of a shape that is a guess
   bool pictures = false;       ///< registrations, verdicts, linear tetrahedra, and what ours says of an object with regions that it is not told of
+  bool coarse = false;         ///< a look in minutes (ModelChoice)
   int threads = 1;
 };
 

@@ -101,6 +101,10 @@ ObjectOptions truth_of(const PaperScene& scene, std::uint64_t seed) {
   if (scene.young_modulus_pa > 0) truth.young_modulus_pa = scene.young_modulus_pa;
   if (scene.poisson_ratio > 0) truth.poisson_ratio = scene.poisson_ratio;
   truth.region_ratio = scene.region_ratio;
+  if (scene.coarse_truth) {
+    truth.tetrahedra = 5000;
+    truth.cells_in_radius = 3;
+  }
   return truth;
 }
 

@@ -58,6 +58,7 @@ struct PaperScene {
   std::string_view true_law = "linear";   ///< the paper's, at small strains; not that of an object that is no solid
   std::string_view law = "linear";        ///< that both methods fit
   std::string_view other_law = {};             ///< that palpate fits as well; empty: none
+  bool coarse_truth = false;  ///< for a look: solved on a quarter of the mesh
   bool apparent = false;   ///< no solid: a modulus that is found has no truth to compare with
   Index tetrahedra = 0;    ///< of the model; 0: as many as the program takes by itself, fine under the pad
   double edge_m = 0;       ///< where these are given: of those under the pad; 0: like all others

@@ -42,7 +42,7 @@ TEST(PaperInputs, TheFinerMeshFollowsARoundSurface) {
   push.steps.resize(2);
   push.steps[1].loads = {load};
   recording.pushes = {push};
-  const Prepared prepared = prepare(recording, {}, nullptr, {}, nullptr);
+  const Prepared prepared = prepare(observed(recording), {}, nullptr, {}, nullptr);
   ASSERT_TRUE(prepared.finer);
   EXPECT_LT(off_m(ball.surface, prepared.finer->object.mesh), 0.8 * off_m(ball.surface, prepared.object.mesh));
 }

@@ -92,7 +92,7 @@ TEST(PaperKept, TheTableIsMadeOfTheSeedsThatAreKept) {
 TEST(PaperKept, SoIsTheRowOfAMeshInTheCowsPlace) {
   const PaperRuns runs = kept_in(docs / "paper" / "spot");
   ASSERT_EQ(runs.scenes.size(), 1u);
-  EXPECT_EQ(runs.command(), "palpate paper -o OUT --quick --seed 1 --seeds 100 --details-of 0 --scene cow --object spot_crane.obj --object-up y --object-size 0.28");
+  EXPECT_EQ(runs.command(), "palpate paper -o OUT --seed 1 --seeds 100 --details-of 0 --scene cow --object spot_crane.obj --object-up y --object-size 0.28");
   const SceneAnswers& scene = runs.scenes[0];
   const std::string wanted = row(scene, ", Spot in its place");
   EXPECT_NE(contents(docs / "benchmarks.md").find(wanted + "\n"), std::string::npos) << "docs/benchmarks.md lacks this row:\n" << wanted;

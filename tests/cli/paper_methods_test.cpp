@@ -27,7 +27,7 @@ TEST(PaperMethods, ASlipThatAFitDoesNotFindItIsTold) {
   const lab::PaperScene& scene = lab::paper_scene("cube");
   const lab::PaperFault slip{"slip", "aside and deeper", 0.005, 0.003, 0, 1};
   const lab::PaperTrial trial = lab::make_paper_trial(scene, 3, {}, slip);
-  const Prepared given = prepare(trial.recording, {.tetrahedra = 815}, nullptr, {});
+  const Prepared given = prepare(observed(trial.recording), {.tetrahedra = 815}, nullptr, {});
   estimation::FitOptions finding = without_checks();
   finding.find_slips = true;
   Found found;
@@ -55,7 +55,7 @@ TEST(PaperViews, FourViewsShowHowTheirModelWasMade) {
   const lab::PaperTrial trial = lab::make_paper_trial(scene, 3);
   ASSERT_EQ(trial.recording.rest.views.size(), 4u);
   EXPECT_FALSE(trial.recording.rest.surface);
-  const Prepared given = prepare(trial.recording, choice_of(scene), nullptr, {});
+  const Prepared given = prepare(observed(trial.recording), choice_of(scene, false), nullptr, {});
   const auto views = views_of_model(trial.recording, given);
   ASSERT_EQ(views.size(), 4u);
   EXPECT_THAT(views[1].what, HasSubstr("4 views"));

@@ -133,8 +133,10 @@ TEST(PaperRun, QuickModeTakesWhatThePaperHas) {
   EXPECT_TRUE(options_of(plan, cube, 1).samples_alone) << "fig. 6";
   EXPECT_FALSE(options_of(plan, cube, 1).other_starts);
   EXPECT_FALSE(options_of(plan, cube, 2).samples_alone) << "a seed without details";
+  EXPECT_TRUE(options_of(plan, cube, 1).coarse && options_of(plan, cube, 2).coarse);
   plan.quick = false;
   for (const lab::PaperScene& scene : lab::paper_scenes()) {
+    EXPECT_FALSE(options_of(plan, scene, 1).coarse) << scene.name;
     EXPECT_TRUE(options_of(plan, scene, 1).other_starts) << scene.name;
     EXPECT_TRUE(options_of(plan, scene, 1).samples_alone) << scene.name;
   }
@@ -319,6 +321,26 @@ TEST(PaperRun, AStudyThatIsAskedForSeveralSeedsIsToldOverThem) {
   again.plan = run.plan;
   run_plan(again.plan, again.work, files / "out");
   EXPECT_EQ(again.made, 0);
+}
+
+TEST(PaperRun, QuickSeedsAreToldAndNotCountedWithOthers) {
+  const test::TemporaryFolder files("paper_quick");
+  MadeUp quick;
+  quick.plan.quick = true;
+  quick.plan.seeds = 1;
+  run_plan(quick.plan, quick.work, files / "quick");
+  EXPECT_THAT(contents(files / "quick" / "paper.html"), HasSubstr("A quick look"));
+  EXPECT_THAT(contents(files / "quick" / "paper.json"), HasSubstr("paper -o OUT --quick"));
+  MadeUp more;
+  more.plan.first_seed = 2;
+  more.plan.seeds = 1;
+  more.plan.details_of = 0;
+  more.plan.studies.clear();
+  run_plan(more.plan, more.work, files / "whole");
+  EXPECT_THAT(contents(files / "whole" / "paper.html"), Not(HasSubstr("A quick look")));
+  const SeedFolder joined(files / "quick");
+  joined.take_from(files / "whole");
+  EXPECT_THAT(message_of([&] { joined.collect(); }), HasSubstr("cow_0002.json: is a seed without --quick, others are of it"));
 }
 
 TEST(PaperRun, SeedsOfOtherOptionsAreRefusedByName) {
