@@ -190,8 +190,8 @@ void add_seed(PaperRuns& runs, const json& seed, const std::string& file) try {
   runs.threads.insert(seed.at("threads").get<int>());
   const bool coarse = seed.at("options").value("coarse", false);
   if (coarse != runs.coarse && !(runs.scenes.empty() && runs.studies.empty()))
-    throw Error(fmt::format("is a seed {} --quick, others are {}: their numbers do not compare; use another folder", coarse ? "of" : "without",
-                            coarse ? "without" : "of it"),
+    throw Error(fmt::format("was made {} --quick, others {} it: their numbers do not compare; use another folder", coarse ? "with" : "without",
+                            coarse ? "without" : "with"),
                 file);
   runs.coarse = coarse;
   const bool pictures = seed.at("options").at("pictures");

@@ -340,7 +340,7 @@ TEST(PaperRun, QuickSeedsAreToldAndNotCountedWithOthers) {
   EXPECT_THAT(contents(files / "whole" / "paper.html"), Not(HasSubstr("A quick look")));
   const SeedFolder joined(files / "quick");
   joined.take_from(files / "whole");
-  EXPECT_THAT(message_of([&] { joined.collect(); }), HasSubstr("cow_0002.json: is a seed without --quick, others are of it"));
+  EXPECT_THAT(message_of([&] { joined.collect(); }), HasSubstr("cow_0002.json: was made without --quick, others with it"));
 }
 
 TEST(PaperRun, SeedsOfOtherOptionsAreRefusedByName) {
