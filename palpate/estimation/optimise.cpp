@@ -171,8 +171,8 @@ Optimum search(Objective& objective, const VectorX& start, const Loss& loss, con
     if (!accepted) {
       // Correspondences that flip between triangles leave a floor; a step that nothing improves on is the end.
       const bool at_floor = newton_step(best.evaluation, moving).gain < floor_gain;
-      // Where a ray comes to meet something else the cost jumps, and a search that came there with much before it is held by no
-      // matter how short a step: it goes over.
+      // Where a ray comes to meet something else the cost jumps, and no step is short enough not to go over it: a search that has much to
+      // gain beyond goes.
       if (!at_floor && lowest.usable && lowest.cost - best.evaluation.cost < of_a_ray && crossings < most_crossings) {
         ++crossings;
         best.unknowns = lowest_at;

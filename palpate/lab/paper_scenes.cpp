@@ -119,7 +119,7 @@ LabObject object_of(const PaperScene& scene, std::uint64_t seed, PressedMemory& 
   LabObject object = made(scene, truth);
   if (scene.sites > 0) object.sites.resize(static_cast<std::size_t>(scene.sites));
   if (scene.apparent) return object;  // a skin under pressure does not scale with its E
-  const std::string what = std::string(scene.name) + " " + std::to_string(object.poisson_ratio);
+  const std::string what = std::string(scene.name) + " " + std::to_string(object.poisson_ratio) + (scene.coarse_truth ? " coarse" : "");
   object.press = [scene, truth, what, &memory, young_modulus_pa = object.young_modulus_pa](const PushSite& site) {
     return memory.at(what, young_modulus_pa, site, [scene, truth](double pa, const PushSite& at) mutable {
       truth.young_modulus_pa = pa;
