@@ -13,6 +13,7 @@ namespace palpate::cli {
 namespace {
 
 constexpr double coarse_edge = 0.6;  // of a look, under the pad: of its radius
+
 /// Squared distances have no defence against what is not the object (flying pixels, the table's edge), and the paper's
 /// points were cut to the object: so are those of both methods here.
 /// What a deeper push dents lies as far from where it was.
@@ -90,7 +91,7 @@ ModelChoice choice_of(const lab::PaperScene& scene, bool coarse) {
   return choice;
 }
 
-lab::PaperScene looked_at(lab::PaperScene scene) {
+lab::PaperScene for_a_look(lab::PaperScene scene) {
   constexpr int few = 4;
   scene.coarse_truth = true;
   if (scene.travel_m == 0) scene.samples = std::min(scene.samples, few);

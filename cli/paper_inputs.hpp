@@ -51,7 +51,7 @@ struct ModelChoice {
 ModelChoice choice_of(const lab::PaperScene& scene, bool coarse);
 /// For a look: four samples a push, as deep as seven, of a truth on a quarter of its mesh. A push that slips or goes as far as it can
 /// keeps its samples.
-lab::PaperScene looked_at(lab::PaperScene scene);
+lab::PaperScene for_a_look(lab::PaperScene scene);
 
 /// Both methods are given every n-th pixel of what lies near the object: about as many points a sample as the paper's time-of-flight
 /// camera has (3200).

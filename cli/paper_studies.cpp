@@ -23,7 +23,7 @@ bool wanted(const OnProgress& progress, std::string_view what) { return !progres
 std::vector<StudyRow> meshes(const StudyOptions& study, const OnProgress& progress) {
   constexpr Index paper_tetrahedra = 815;
   const lab::PaperScene& whole = lab::paper_scene("cube");
-  const lab::PaperTrial trial = lab::make_paper_trial(study.coarse ? looked_at(whole) : whole, study.seed, progress);
+  const lab::PaperTrial trial = lab::make_paper_trial(study.coarse ? for_a_look(whole) : whole, study.seed, progress);
   struct Model {
     const char* what;
     ModelChoice choice;
@@ -78,7 +78,7 @@ std::vector<StudyRow> partial(const StudyOptions& study, const OnProgress& progr
     scene.region_ratio = 1;
     scene.sites = 1;
     scene.samples = 7;
-    if (study.coarse) scene = looked_at(scene);
+    if (study.coarse) scene = for_a_look(scene);
     scene.view_azimuth_rad = -2;  // from where the camera watches the push
     scene.view_elevation_rad = 0.6;
     using lab::PaperShape;

@@ -156,7 +156,7 @@ void drop_paths(TrialAnswer& out) {
 
 void run_trial(const lab::PaperScene& whole, std::uint64_t seed, const TrialOptions& options, SharedModels* shared,
                const OnProgress& progress, TrialAnswer& out) {
-  const lab::PaperScene scene = options.coarse ? looked_at(whole) : whole;
+  const lab::PaperScene scene = options.coarse ? for_a_look(whole) : whole;
   const Takes all(out.total_s);
   const Watch truth;
   lab::PaperTrial trial = lab::make_paper_trial(scene, seed, progress, {}, shared != nullptr ? &shared->truths : nullptr);
